@@ -1,0 +1,15 @@
+!> Working precision and the constants every module shares.
+module hc_precision
+  use, intrinsic :: iso_fortran_env, only: real64
+  implicit none
+  private
+
+  public :: wp, pi
+
+  !> Kind of every real in the library; every literal carries it.
+  integer, parameter :: wp = real64
+
+  !> Circle constant.
+  real(wp), parameter :: pi = 3.14159265358979323846_wp
+
+end module hc_precision

@@ -1,0 +1,396 @@
+!> Influence functions of one pyramid of traction on the surface of a half-space.
+!>
+!> The pyramid h is the piecewise linear hat of a lattice node: one at the node,
+!> zero at its six neighbours. With rho the distance to the field point (x, y),
+!> five kernels give every displacement of both bodies (Table 8.1):
+!>
+!>     K1  = iint h/rho                    K_x  = iint h (x - xi)/rho^2
+!>     K_xx = iint h (x - xi)^2/rho^3      K_y  = iint h (y - eta)/rho^2
+!>     K_xy = iint h (x - xi)(y - eta)/rho^3
+!>
+!> K1, K_xx, K_xy are even, K_x, K_y odd; K_yy = K1 - K_xx.
+!>
+!> Near the pyramid: integration by parts turns the double integrals into line
+!> integrals of rho and ln rho over the nine segments in which h has a crease
+!> (three spokes of double length, six rims). Far away: the hat is the
+!> probability density of z = sum_q U_q d_q with U_q uniform on (-1/2, 1/2) and
+!> d_q the three edge directions, so that its moments are coefficients of
+!> product_q sinh(w_q/2)/(w_q/2), w_q = s d_q + t conj(d_q), and the kernels are
+!> power series in 1/z. Both hold for any lattice; lengths are in units of the
+!> longest edge inside this module.
+module hc_pyramid_influence
+  use hc_precision, only: wp
+  use hc_lattice, only: edge_directions
+  implicit none
+  private
+
+  public :: pyramid_t, new_pyramid
+  public :: k_1, k_xx, k_xy, k_x, k_y
+
+  !> Positions of the five kernels in a vector.
+  integer, parameter :: k_1 = 1, k_xx = 2, k_xy = 3, k_x = 4, k_y = 5
+
+  !> The moment expansion holds from here on, in longest edges.
+  real(wp), parameter :: far_radius = 3.0_wp
+  !> Highest order of the moments.
+  integer, parameter :: max_order = 24
+  !> Number of powers of 1/R^2 that are kept.
+  integer, parameter :: max_power = max_order/2
+  !> Beyond band_radius(k) the orders up to 2*band_power(k) suffice (truncation < 3e-16 K1).
+  real(wp), parameter :: band_radius(5) = [5.0_wp, 8.0_wp, 20.0_wp, 60.0_wp, 300.0_wp]
+  integer, parameter :: band_power(5) = [8, 6, 4, 3, 2]
+
+  !> One family of parallel creases: a spoke through the node and two rims.
+  type :: crease_t
+    !> Unit direction and unit normal
+    real(wp) :: along(2) = 0.0_wp, normal(2) = 0.0_wp
+    !> Length of a rim; the spoke is twice as long
+    real(wp) :: length = 0.0_wp
+    !> Distance of the rims from the node
+    real(wp) :: height = 0.0_wp
+    !> Abscissa of the centre of the rim on the side of the normal
+    real(wp) :: skew = 0.0_wp
+  end type crease_t
+
+  !> The pyramid of a lattice: creases and moments, ready for evaluation.
+  type :: pyramid_t
+    private
+    !> Longest edge [m]
+    real(wp), public :: spacing = 1.0_wp
+    type(crease_t) :: crease(3)
+    !> Volume of the pyramid of unit height
+    real(wp) :: volume = 0.0_wp
+    !> Angular step: harmonics are multiples of it (6 if the lattice is equilateral, else 2)
+    integer :: fold = 2
+    !> Largest harmonic over fold
+    integer :: n_harmonic = 0
+    !> Series of K1: power of 1/R^2, harmonic 0...
+    complex(wp), allocatable :: even(:, :)
+    !> Series of K_xx - K_yy + 2 i K_xy: power of 1/R^2, harmonic of either sign
+    complex(wp), allocatable :: quadrupole(:, :)
+    !> Series of K_x - i K_y: power of Z^-fold
+    complex(wp), allocatable :: odd(:)
+  contains
+    !> The five kernels at one point [m]
+    procedure :: kernels
+    !> The five kernels at all lattice offsets of a box [m]
+    procedure :: kernel_table
+  end type pyramid_t
+
+contains
+
+  !> Creases and moments of the pyramid of a lattice.
+  pure subroutine new_pyramid(pyramid, basis)
+    !> Pyramid to be set up
+    type(pyramid_t), intent(out) :: pyramid
+    !> Basis vectors of the lattice as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+
+    real(wp) :: edges(2, 3), rim(2, 3)
+    integer :: q
+
+    edges = edge_directions(basis)
+    pyramid%spacing = maxval(norm2(edges, dim=1))
+    edges = edges/pyramid%spacing
+    pyramid%volume = edges(1, 1)*edges(2, 2) - edges(2, 1)*edges(1, 2)
+    ! centres of the rims on the side to which the normals point
+    rim(:, 1) = edges(:, 2) - 0.5_wp*edges(:, 1)
+    rim(:, 2) = 0.5_wp*edges(:, 2) - edges(:, 1)
+    rim(:, 3) = -0.5_wp*(edges(:, 1) + edges(:, 2))
+    do q = 1, 3
+      associate (crease => pyramid%crease(q))
+        crease%length = norm2(edges(:, q))
+        crease%along = edges(:, q)/crease%length
+        crease%normal = [-crease%along(2), crease%along(1)]
+        crease%height = pyramid%volume/crease%length
+        crease%skew = dot_product(rim(:, q), crease%along)
+        ! a rim is centred on its spoke exactly where the lattice is equilateral
+        if (abs(crease%skew) < 4.0_wp*epsilon(1.0_wp)) crease%skew = 0.0_wp
+      end associate
+    end do
+    call expand(pyramid, cmplx(edges(1, :), edges(2, :), wp))
+  end subroutine new_pyramid
+
+  !> The five kernels at a point relative to the node.
+  pure function kernels(self, x, y) result(k)
+    class(pyramid_t), intent(in) :: self
+    !> Field point relative to the node [m]
+    real(wp), intent(in) :: x, y
+    !> K1, K_xx, K_xy, K_x, K_y [m]
+    real(wp) :: k(5)
+    real(wp) :: xs, ys
+
+    xs = x/self%spacing
+    ys = y/self%spacing
+    if (hypot(xs, ys) < far_radius) then
+      k = self%spacing*near_kernels(self, xs, ys)
+    else
+      k = self%spacing*far_kernels(self, xs, ys)
+    end if
+  end function kernels
+
+  !> Kernels at the offsets i*basis(:, 1) + j*basis(:, 2) with |i| <= n(1), |j| <= n(2).
+  !>
+  !> Only half of the offsets is evaluated: the kernels are even or odd.
+  subroutine kernel_table(self, basis, table)
+    class(pyramid_t), intent(in) :: self
+    !> Basis vectors of the lattice as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> Kernels (5, -n(1):n(1), -n(2):n(2)) [m]
+    real(wp), intent(out) :: table(:, :, :)
+
+    real(wp), parameter :: parity(5) = [1.0_wp, 1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]
+    integer :: n(2), i, j
+
+    n = [size(table, 2)/2, size(table, 3)/2]
+    !$omp parallel do schedule(dynamic, 8) private(i)
+    do j = 0, n(2)
+      do i = -n(1), n(1)
+        if (j == 0 .and. i < 0) cycle
+        table(:, n(1) + 1 + i, n(2) + 1 + j) = self%kernels(i*basis(1, 1) + j*basis(1, 2), &
+                                                           i*basis(2, 1) + j*basis(2, 2))
+        table(:, n(1) + 1 - i, n(2) + 1 - j) = parity*table(:, n(1) + 1 + i, n(2) + 1 + j)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine kernel_table
+
+  !> Line integrals over the nine creases; exact everywhere, loses digits like R^2.
+  pure function near_kernels(self, x, y) result(k)
+    class(pyramid_t), intent(in) :: self
+    !> Field point relative to the node, in longest edges
+    real(wp), intent(in) :: x, y
+    !> K1, K_xx, K_xy, K_x, K_y over the longest edge
+    real(wp) :: k(5)
+
+    real(wp) :: t, n, b, v, rim_b(2), rim_v(2), spoke_b, spoke_v
+    integer :: q
+
+    k = 0.0_wp
+    do q = 1, 3
+      associate (crease => self%crease(q))
+        t = -(x*crease%along(1) + y*crease%along(2))
+        n = x*crease%normal(1) + y*crease%normal(2)
+        call segment(n - crease%height, t + crease%skew, 0.5_wp*crease%length, rim_b(1), rim_v(1))
+        call segment(n + crease%height, t - crease%skew, 0.5_wp*crease%length, rim_b(2), rim_v(2))
+        call segment(n, t, crease%length, spoke_b, spoke_v)
+        b = ((rim_b(1) + rim_b(2)) - spoke_b)/crease%height
+        v = 0.5_wp*((rim_v(1) + rim_v(2)) - spoke_v)/crease%height
+        k(k_1) = k(k_1) + b
+        k(k_xx) = k(k_xx) + crease%normal(2)**2*b
+        k(k_xy) = k(k_xy) - crease%normal(1)*crease%normal(2)*b
+        k(k_x) = k(k_x) + crease%normal(1)*v
+        k(k_y) = k(k_y) + crease%normal(2)*v
+      end associate
+    end do
+  end function near_kernels
+
+  !> Integrals of rho and of n*ln(rho) along a straight segment, in a form
+  !> that cancels nowhere; the constant -length*n of the second is left out,
+  !> it adds up to zero over a crease family.
+  pure subroutine segment(n, tm, half, s, w)
+    !> Signed distance of the field point from the line
+    real(wp), intent(in) :: n
+    !> Abscissa of the middle of the segment, from the foot of the point
+    real(wp), intent(in) :: tm
+    !> Half its length
+    real(wp), intent(in) :: half
+    !> Integral of rho
+    real(wp), intent(out) :: s
+    !> n times the integral of ln(rho), less the constant
+    real(wp), intent(out) :: w
+
+    real(wp) :: t1, t2, length, r1, r2, rs, q, log_ratio, lam
+
+    t1 = tm - half
+    t2 = tm + half
+    length = 2.0_wp*half
+    r1 = hypot(t1, n)
+    r2 = hypot(t2, n)
+    rs = r1 + r2
+    s = length*(tm*tm/rs + 0.25_wp*rs)
+    w = 0.0_wp
+    if (abs(n) < 1.0e-30_wp*length) return
+
+    q = length/rs
+    if (q < 0.5_wp) then
+      lam = 2.0_wp*atanh(q)
+    else if (t1 >= 0.0_wp) then
+      lam = log((r2 + t2)/(r1 + t1))
+    else if (t2 <= 0.0_wp) then
+      lam = log((r1 - t1)/(r2 - t2))
+    else
+      lam = log((r2 + t2)/abs(n)*((r1 - t1)/abs(n)))
+    end if
+    q = 2.0_wp*tm*length/rs**2
+    if (abs(q) < 0.5_wp) then
+      log_ratio = 2.0_wp*atanh(q)
+    else
+      log_ratio = log(r2/r1)
+    end if
+    s = s + 0.5_wp*n*n*lam
+    w = n*(tm*log_ratio + half*log(r1*r2) + n*atan2(n*length, n*n + t1*t2))
+  end subroutine segment
+
+  !> Moment series.
+  pure function far_kernels(self, x, y) result(k)
+    class(pyramid_t), intent(in) :: self
+    !> Field point relative to the node, in longest edges
+    real(wp), intent(in) :: x, y
+    !> K1, K_xx, K_xy, K_x, K_y over the longest edge
+    real(wp) :: k(5)
+
+    complex(wp) :: u, turn, turns, k2, k1, kc, inverse
+    real(wp) :: r, q
+    integer :: power, harmonic
+
+    r = hypot(x, y)
+    u = cmplx(x/r, -y/r, wp)            ! conjugate direction, exp(-i theta)
+    q = 1.0_wp/r
+    q = q*q
+    power = max_power
+    do harmonic = 1, size(band_radius)
+      if (r >= band_radius(harmonic)) power = band_power(harmonic)
+    end do
+
+    turn = u*u
+    if (self%fold == 6) turn = turn*turn*turn
+    k1 = horner(self%even(:power, 0), q)
+    k2 = horner(self%quadrupole(:power, 0), q)
+    turns = 1.0_wp
+    do harmonic = 1, 2*power/self%fold
+      turns = turns*turn
+      k1 = k1 + turns*horner(self%even(:power, harmonic), q)
+      k2 = k2 + turns*horner(self%quadrupole(:power, harmonic), q) &
+           + conjg(turns)*horner(self%quadrupole(:power, -harmonic), q)
+    end do
+    k2 = conjg(u)**2*k2
+
+    inverse = turn*q**(self%fold/2)
+    kc = 0.0_wp
+    do harmonic = 2*power/self%fold, 0, -1
+      kc = self%odd(harmonic) + inverse*kc
+    end do
+    kc = u*kc
+
+    k = self%volume/r*[real(k1, wp), 0.5_wp*real(k1 + k2, wp), 0.5_wp*aimag(k2), real(kc, wp), -aimag(kc)]
+  end function far_kernels
+
+  !> Polynomial with complex coefficients at a real argument, smallest terms first.
+  pure complex(wp) function horner(coefficient, q)
+    !> Coefficients of q**0, q**1, ...
+    complex(wp), intent(in) :: coefficient(0:)
+    !> Argument
+    real(wp), intent(in) :: q
+    integer :: i
+
+    horner = coefficient(ubound(coefficient, 1))
+    do i = ubound(coefficient, 1) - 1, 0, -1
+      horner = coefficient(i) + q*horner
+    end do
+  end function horner
+
+  !> Coefficients of the moment series from the three edge directions.
+  pure subroutine expand(pyramid, edge)
+    !> Pyramid whose series are set up
+    type(pyramid_t), intent(inout) :: pyramid
+    !> Edge directions in the complex plane, in longest edges
+    complex(wp), intent(in) :: edge(3)
+
+    complex(wp) :: moment(0:max_order, 0:max_order)
+    real(wp), dimension(0:max_order) :: inverse_root, root, inverse_cube
+    integer :: a, b, harmonic, power
+
+    moment = hat_moments(edge)
+    pyramid%fold = 6
+    do b = 0, 4
+      do a = 0, 4
+        if (modulo(a - b, 6) /= 0 .and. abs(moment(a, b)) > 1.0e-14_wp) pyramid%fold = 2
+      end do
+    end do
+    pyramid%n_harmonic = max_order/pyramid%fold
+
+    inverse_root = binomial_series(-0.5_wp)
+    root = binomial_series(0.5_wp)
+    inverse_cube = binomial_series(-1.5_wp)
+    allocate (pyramid%even(0:max_power, 0:pyramid%n_harmonic), source=(0.0_wp, 0.0_wp))
+    allocate (pyramid%quadrupole(0:max_power, -pyramid%n_harmonic:pyramid%n_harmonic), source=(0.0_wp, 0.0_wp))
+    allocate (pyramid%odd(0:pyramid%n_harmonic), source=(0.0_wp, 0.0_wp))
+    do harmonic = -pyramid%n_harmonic, pyramid%n_harmonic
+      do power = 0, max_power
+        a = power + pyramid%fold*harmonic/2
+        b = power - pyramid%fold*harmonic/2
+        if (a < 0 .or. b < 0) cycle
+        pyramid%quadrupole(power, harmonic) = root(a)*inverse_cube(b)*moment(a, b)
+        if (harmonic == 0) pyramid%even(power, 0) = inverse_root(a)*inverse_root(b)*moment(a, b)
+        ! the terms of opposite harmonics are conjugate
+        if (harmonic > 0) pyramid%even(power, harmonic) = 2.0_wp*inverse_root(a)*inverse_root(b)*moment(a, b)
+      end do
+      if (harmonic >= 0) pyramid%odd(harmonic) = moment(pyramid%fold*harmonic, 0)
+    end do
+  end subroutine expand
+
+  !> E[z**a conj(z)**b] for z distributed like the hat, a + b <= max_order.
+  pure function hat_moments(edge) result(moment)
+    !> Edge directions in the complex plane
+    complex(wp), intent(in) :: edge(3)
+    complex(wp) :: moment(0:max_order, 0:max_order)
+
+    complex(wp), dimension(0:max_order, 0:max_order) :: series, factor, product
+    real(wp) :: scale
+    integer :: q, m, p, a, b
+
+    series = 0.0_wp
+    series(0, 0) = 1.0_wp
+    do q = 1, 3
+      ! sinh(w/2)/(w/2) = sum_m w**(2m)/(4**m (2m+1)!), w = s*edge + t*conj(edge)
+      factor = 0.0_wp
+      scale = 1.0_wp
+      do m = 0, max_power
+        if (m > 0) scale = scale/(4.0_wp*(2*m)*(2*m + 1))
+        do p = 0, 2*m
+          factor(p, 2*m - p) = scale*binomial(2*m, p)*edge(q)**p*conjg(edge(q))**(2*m - p)
+        end do
+      end do
+      product = 0.0_wp
+      do b = 0, max_order
+        do a = 0, max_order - b
+          product(a, b) = sum(series(0:a, 0:b)*factor(a:0:-1, b:0:-1))
+        end do
+      end do
+      series = product
+    end do
+    moment = 0.0_wp
+    do b = 0, max_order
+      do a = 0, max_order - b
+        moment(a, b) = series(a, b)*gamma(real(a + 1, wp))*gamma(real(b + 1, wp))
+      end do
+    end do
+  end function hat_moments
+
+  !> Taylor coefficients of (1 - u)**exponent.
+  pure function binomial_series(exponent) result(c)
+    !> Exponent
+    real(wp), intent(in) :: exponent
+    real(wp) :: c(0:max_order)
+    integer :: n
+
+    c(0) = 1.0_wp
+    do n = 1, max_order
+      c(n) = c(n - 1)*(n - 1 - exponent)/n
+    end do
+  end function binomial_series
+
+  !> Binomial coefficient.
+  pure real(wp) function binomial(n, k)
+    !> Upper and lower argument
+    integer, intent(in) :: n, k
+    integer :: i
+
+    binomial = 1.0_wp
+    do i = 1, k
+      binomial = binomial*(n - k + i)/i
+    end do
+  end function binomial
+
+end module hc_pyramid_influence

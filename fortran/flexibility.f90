@@ -1,0 +1,113 @@
+!> The flexibility operator: tractions on the lattice -> relative surface displacements.
+!>
+!> With * the sum over all pyramids (a convolution, since the lattice is the
+!> same everywhere) and w the closing of the gap, (s_x, s_y) the tangential
+!> displacement of body 1 over body 2 (superposition of Table 8.1 over two bodies):
+!>
+!>     w   =  lambda_1 K1 * p   + lambda_2 (K_x * q_x + K_y * q_y)
+!>     s_x = -lambda_2 K_x * p  + (lambda_1 K1 + lambda_5 K_xx) * q_x + lambda_5 K_xy * q_y
+!>     s_y = -lambda_2 K_y * p  + lambda_5 K_xy * q_x + (lambda_1 K1 + lambda_5 K_yy) * q_y
+!>
+!> The complete operator is symmetric (Betti) and positive definite.
+module hc_flexibility
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_pyramid_influence, only: k_1, k_xx, k_xy, k_x, k_y
+  implicit none
+  private
+
+  public :: flexibility_t, normal, along_x, along_y, block_weights
+
+  !> Components of a traction and of a relative displacement.
+  integer, parameter :: normal = 1, along_x = 2, along_y = 3
+
+  !> A flexibility operator over the nodes of a window.
+  type, abstract :: flexibility_t
+    !> Lattice and window
+    type(lattice_t) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t) :: pair
+    !> Products so far, in full 3x3 applications: every component that acts or is wanted counts 1/6
+    real(wp) :: applications = 0.0_wp
+  contains
+    !> Relative displacements of given tractions
+    procedure(apply), deferred :: apply
+    !> Do the arrays fit the window and the components?
+    procedure :: check
+    !> Add one product to the count
+    procedure :: count => count_application
+  end type flexibility_t
+
+  abstract interface
+    !> displacement(:, :, o) = sum over i of block(onto(o), from(i)) * traction(:, :, i)
+    subroutine apply(self, from, traction, onto, displacement, error)
+      import :: flexibility_t, wp, error_t
+      class(flexibility_t), intent(inout) :: self
+      !> Components that act: normal, along_x, along_y
+      integer, intent(in) :: from(:)
+      !> Their values (n_col, n_row, size(from)) [Pa]
+      real(wp), intent(in), contiguous :: traction(:, :, :)
+      !> Components that are wanted
+      integer, intent(in) :: onto(:)
+      !> Their values (n_col, n_row, size(onto)) [m]
+      real(wp), intent(out), contiguous :: displacement(:, :, :)
+      !> Allocated on failure: the shapes do not fit the window
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine apply
+  end interface
+
+contains
+
+  !> Weights of the five kernels in one block of the operator.
+  pure function block_weights(pair, onto, from) result(weight)
+    !> Elastic constants
+    type(elastic_pair_t), intent(in) :: pair
+    !> Component of the displacement and of the traction
+    integer, intent(in) :: onto, from
+    !> Weight of each kernel [1/Pa]
+    real(wp) :: weight(5)
+
+    weight = 0.0_wp
+    if (onto == normal .and. from == normal) then
+      weight(k_1) = pair%lambda_1
+    else if (onto == normal) then
+      weight(merge(k_x, k_y, from == along_x)) = pair%lambda_2
+    else if (from == normal) then
+      weight(merge(k_x, k_y, onto == along_x)) = -pair%lambda_2
+    else if (onto /= from) then
+      weight(k_xy) = pair%lambda_5
+    else if (onto == along_x) then
+      weight(k_1) = pair%lambda_1
+      weight(k_xx) = pair%lambda_5
+    else
+      weight(k_1) = pair%lambda_1 + pair%lambda_5
+      weight(k_xx) = -pair%lambda_5
+    end if
+  end function block_weights
+
+  subroutine check(self, from, traction, onto, displacement, error)
+    class(flexibility_t), intent(in) :: self
+    !> Components that act, and that are wanted
+    integer, intent(in) :: from(:), onto(:)
+    !> Their values
+    real(wp), intent(in) :: traction(:, :, :), displacement(:, :, :)
+    !> Allocated if they do not fit
+    type(error_t), allocatable, intent(out) :: error
+
+    if (any(shape(traction) /= [self%lattice%extent, size(from)]) .or. &
+        any(shape(displacement) /= [self%lattice%extent, size(onto)])) then
+      call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
+    end if
+  end subroutine check
+
+  subroutine count_application(self, from, onto)
+    class(flexibility_t), intent(inout) :: self
+    !> Components that acted, and that were wanted
+    integer, intent(in) :: from(:), onto(:)
+
+    self%applications = self%applications + (size(from) + size(onto))/6.0_wp
+  end subroutine count_application
+
+end module hc_flexibility

@@ -1,0 +1,222 @@
+!> Contact by the dissertation's active-set iteration on LAPACK solves (section 8.6).
+!>
+!> The pressure on the current contact area makes the gap vanish there; nodes
+!> in tension leave, and nodes that penetrate enter again. Should the number of wrong
+!> nodes not fall any more, one node at a time is exchanged (Murty's rule, with
+!> which the iteration ends for every positive definite matrix).
+module hc_direct_contact
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: normal
+  use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
+  use hc_contact_state, only: contact_state_t, new_contact_state, slip, load_control
+  use hc_contact_residuals, only: normal_self_compliance, normal_residual, force_residual
+  implicit none
+  private
+
+  public :: direct_contact_t, new_direct_contact
+
+  !> Exchanges of whole sets that may fail to lower the number of wrong nodes.
+  integer, parameter :: patience = 10
+
+  !> A frictionless contact problem with its explicit matrix.
+  type :: direct_contact_t
+    private
+    type(dense_flexibility_t) :: flexibility
+    !> Initial gap (n_col, n_row) [m]
+    real(wp), allocatable :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, allocatable :: candidate(:, :)
+    !> Self-compliance of a node [m/Pa]
+    real(wp) :: compliance = 0.0_wp
+  contains
+    !> Solve for a normal load or an approach
+    procedure :: solve
+  end type direct_contact_t
+
+  interface
+    subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
+      import :: wp
+      character(len=1), intent(in) :: uplo
+      integer, intent(in) :: n, nrhs, lda, ldb
+      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+      integer, intent(out) :: info
+    end subroutine dposv
+  end interface
+
+contains
+
+  !> Matrix of a problem.
+  subroutine new_direct_contact(self, lattice, pair, initial_gap, candidate, error)
+    !> Problem to be set up
+    type(direct_contact_t), intent(out) :: self
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Initial gap (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Allocated on failure: wrong shapes, no candidate at all, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
+      call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
+      return
+    end if
+    if (.not. any(candidate)) then
+      call raise(error, status%invalid_input, 'no node of the window may come into contact')
+      return
+    end if
+    self%initial_gap = initial_gap
+    self%candidate = candidate
+    self%compliance = normal_self_compliance(lattice, pair)
+    call new_dense_flexibility(self%flexibility, lattice, pair, error, normal_only=.true.)
+  end subroutine new_direct_contact
+
+  !> Solve for a normal load or an approach.
+  subroutine solve(self, control, target, tolerance, max_sweeps, state, error)
+    class(direct_contact_t), intent(inout) :: self
+    !> load_control or approach_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Bound of both residuals
+    real(wp), intent(in) :: tolerance
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> Solution; `converged` tells whether the residuals are within the tolerance
+    type(contact_state_t), intent(out) :: state
+    !> Allocated on failure: not enough memory, a matrix that is not positive definite
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), allocatable :: h(:), p(:)
+    logical, allocatable :: candidate(:), active(:), wrong(:)
+    real(wp) :: delta, gap(self%flexibility%lattice%size())
+    integer :: n, n_wrong, fewest, left, last
+
+    call new_contact_state(state, self%flexibility%lattice)
+    self%flexibility%applications = 0.0_wp
+    n = self%flexibility%lattice%size()
+    h = reshape(self%initial_gap, [n])
+    candidate = reshape(self%candidate, [n])
+    delta = minval(h, mask=candidate)
+    allocate (p(n), source=0.0_wp)
+    allocate (wrong(n), source=.false.)
+    active = candidate
+    if (target <= merge(0.0_wp, delta, control == load_control)) then
+      active = .false.
+      if (control /= load_control) delta = target
+    end if
+    fewest = huge(1)
+    left = patience
+
+    do while (any(active) .and. state%sweeps < max_sweeps)
+      state%sweeps = state%sweeps + 1
+      call solve_active(self, control, target, h, active, p, delta, error)
+      if (allocated(error)) return
+      call find_gap(self, p, h - delta, gap, error)
+      if (allocated(error)) return
+
+      ! the gap of a node in contact is zero up to rounding, which must not count as penetration
+      wrong = (active .and. p < 0.0_wp) .or. (candidate .and. .not. active .and. gap < 0.0_wp)
+      n_wrong = count(wrong)
+      if (n_wrong == 0) exit
+      if (n_wrong < fewest) then
+        fewest = n_wrong
+        left = patience
+      else
+        left = left - 1
+      end if
+      if (left > 0) then
+        active = active .neqv. wrong
+      else
+        last = findloc(wrong, .true., dim=1, back=.true.)
+        active(last) = .not. active(last)
+      end if
+      if (.not. any(active)) active = candidate .and. gap <= minval(gap, mask=candidate)
+    end do
+
+    state%pressure = reshape(max(p, 0.0_wp), shape(state%pressure))
+    call find_gap(self, reshape(state%pressure, [n]), h - delta, gap, error)
+    if (allocated(error)) return
+    state%gap = reshape(gap, shape(state%gap))
+    where (state%pressure > 0.0_wp) state%zone = slip
+    state%approach = delta
+    state%normal_load = self%flexibility%lattice%cell_area()*sum(state%pressure)
+    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%compliance)
+    state%residual_force = 0.0_wp
+    if (control == load_control) state%residual_force = force_residual(state%normal_load, target)
+    state%converged = max(state%residual_normal, state%residual_force) <= tolerance
+    state%operator_applications = self%flexibility%applications
+  end subroutine solve
+
+  !> Pressure that closes the gap on the active nodes: K p = approach - h.
+  subroutine solve_active(self, control, target, h, active, p, delta, error)
+    class(direct_contact_t), intent(in) :: self
+    !> load_control or approach_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Initial gap [m]
+    real(wp), intent(in) :: h(:)
+    !> Active nodes
+    logical, intent(in) :: active(:)
+    !> Pressure, zero off the active nodes [Pa]
+    real(wp), intent(out) :: p(:)
+    !> Approach [m]
+    real(wp), intent(out) :: delta
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), allocatable :: matrix(:, :), rhs(:, :)
+    integer, allocatable :: node(:)
+    integer :: i, n, info, stat
+
+    delta = target
+    p = 0.0_wp
+    node = pack([(i, i=1, size(active))], active)
+    n = size(node)
+    allocate (matrix(n, n), rhs(n, 2), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the matrix of the contact area: use method "fft"')
+      return
+    end if
+    !$omp parallel do
+    do i = 1, n
+      matrix(:i, i) = self%flexibility%matrix(node(:i), node(i))
+    end do
+    !$omp end parallel do
+    rhs(:, 1) = 1.0_wp
+    rhs(:, 2) = h(node)
+    call dposv('U', n, 2, matrix, n, rhs, n, info)
+    if (info /= 0) then
+      call raise(error, status%no_convergence, 'the flexibility matrix of the contact area is not positive definite')
+      return
+    end if
+    if (control == load_control) delta = (target/self%flexibility%lattice%cell_area() + sum(rhs(:, 2)))/sum(rhs(:, 1))
+    p(node) = delta*rhs(:, 1) - rhs(:, 2)
+  end subroutine solve_active
+
+  !> Gap under a pressure.
+  subroutine find_gap(self, pressure, rigid_gap, gap, error)
+    class(direct_contact_t), intent(inout) :: self
+    !> Pressure [Pa]
+    real(wp), intent(in) :: pressure(:)
+    !> Gap of the undeformed bodies [m]
+    real(wp), intent(in) :: rigid_gap(:)
+    !> Gap [m]
+    real(wp), intent(out) :: gap(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: closing(self%flexibility%lattice%extent(1), self%flexibility%lattice%extent(2), 1)
+
+    call self%flexibility%apply([normal], reshape(pressure, shape(closing)), [normal], closing, error)
+    if (allocated(error)) return
+    gap = rigid_gap + reshape(closing, shape(gap))
+  end subroutine find_gap
+
+end module hc_direct_contact

@@ -1,0 +1,25 @@
+!> Public names of the library.
+!>
+!> A contact problem in four calls:
+!>
+!>     call new_lattice(lattice, equilateral_basis(1.0e-5_wp), first=[-60, -60], extent=[121, 121], error=error)
+!>     call new_elastic_pair(pair, material_t(210e9_wp, 0.3_wp), material_t(rigid=.true.), error)
+!>     call new_normal_contact(contact, lattice, pair, initial_gap, candidate, error)
+!>     call contact%solve(load_control, 100.0_wp, 1e-8_wp, 60, state, error)
+module hexcontact
+  use hc_precision, only: wp, pi
+  use hc_error, only: error_t, status
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_triangle_integrals
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy, k_x, k_y
+  use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
+  use hc_flexibility, only: flexibility_t, normal, along_x, along_y
+  use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
+  use hc_contact_state, only: contact_state_t, separated, stick, slip, load_control, approach_control
+  use hc_contact_residuals, only: normal_residual, force_residual
+  use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
+  use hc_direct_contact, only: direct_contact_t, new_direct_contact
+  implicit none
+  public
+end module hexcontact

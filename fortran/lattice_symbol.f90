@@ -1,0 +1,96 @@
+!> Fourier symbol of the normal flexibility on the lattice.
+!>
+!> The pyramid is a box spline over the three edge directions d_q, so that its
+!> transform is cell_area * product_q sinc(k.d_q/2), and that of 1/r is
+!> 2 pi/|k|. On the lattice the symbol is the alias sum over reciprocal vectors,
+!>
+!>     symbol(k) = sum_G product_q sinc((k + G).d_q/2) * 2 pi/|k + G|,
+!>
+!> in which sin((k + G).d_q/2) is that of k up to a sign. It diverges at k = 0:
+!> there the kernel is summed over a disc with the area of the grid instead.
+module hc_lattice_symbol
+  use hc_precision, only: wp, pi
+  implicit none
+  private
+
+  public :: normal_symbol
+
+  !> Reciprocal vectors on each side; the terms fall off like |G|^-3 at least.
+  integer, parameter :: n_alias = 1
+
+contains
+
+  !> Symbol of K1 at one frequency of a periodic grid [m].
+  pure real(wp) function normal_symbol(basis, length, frequency)
+    !> Basis vectors as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> Number of columns and rows of the grid
+    integer, intent(in) :: length(2)
+    !> Frequency indices, of any sign
+    integer, intent(in) :: frequency(2)
+
+    real(wp) :: area, theta(2)
+    integer :: wrapped(2)
+
+    area = basis(1, 1)*basis(2, 2) - basis(2, 1)*basis(1, 2)
+    wrapped = modulo(frequency + (length - 1)/2, length) - (length - 1)/2
+    if (all(wrapped == 0)) then
+      normal_symbol = 2.0_wp*pi*sqrt(area*product(real(length, wp))/pi)
+      return
+    end if
+    theta = 2.0_wp*pi*wrapped/length
+    normal_symbol = alias_sum(basis, area, theta)
+    ! On a Nyquist row k and -k are the same frequency: a cut-off sum has to be made even.
+    if (any(2*wrapped == length)) then
+      where (2*wrapped == length)
+        theta = theta
+      elsewhere
+        theta = -theta
+      end where
+      normal_symbol = 0.5_wp*(normal_symbol + alias_sum(basis, area, theta))
+    end if
+  end function normal_symbol
+
+  !> Sum over reciprocal vectors; theta = k.basis in (-pi, pi].
+  pure real(wp) function alias_sum(basis, area, theta)
+    !> Basis vectors as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> Cell area [m^2]
+    real(wp), intent(in) :: area
+    !> Phases along the two basis vectors
+    real(wp), intent(in) :: theta(2)
+
+    real(wp) :: phase(2), k(2), half(3), sine(3), term
+    integer :: i, j
+
+    sine = [sin(0.5_wp*theta(1)), sin(0.5_wp*theta(2)), sin(0.5_wp*(theta(2) - theta(1)))]
+    alias_sum = 0.0_wp
+    do j = -n_alias, n_alias
+      do i = -n_alias, n_alias
+        phase = theta + 2.0_wp*pi*[i, j]
+        ! k from its products with the basis vectors
+        k = [phase(1)*basis(2, 2) - phase(2)*basis(2, 1), phase(2)*basis(1, 1) - phase(1)*basis(1, 2)]/area
+        half = 0.5_wp*[phase(1), phase(2), phase(2) - phase(1)]
+        term = sinc_ratio(sine(1), half(1), i)*sinc_ratio(sine(2), half(2), j)*sinc_ratio(sine(3), half(3), j - i)
+        alias_sum = alias_sum + term*2.0_wp*pi/norm2(k)
+      end do
+    end do
+  end function alias_sum
+
+  !> sinc(half) from the sine of the phase before it was shifted by shift*pi.
+  elemental real(wp) function sinc_ratio(sine, half, shift)
+    !> Sine of half the unshifted phase
+    real(wp), intent(in) :: sine
+    !> Half the shifted phase
+    real(wp), intent(in) :: half
+    !> Number of half turns between them
+    integer, intent(in) :: shift
+
+    if (abs(half) < 1.0e-8_wp) then
+      sinc_ratio = 1.0_wp
+    else
+      sinc_ratio = merge(sine, -sine, modulo(shift, 2) == 0)/half
+    end if
+  end function sinc_ratio
+
+end module hc_lattice_symbol

@@ -1,0 +1,4 @@
+from typing import Any
+
+hc_f2py_api: Any
+hc_f2py_influence: Any

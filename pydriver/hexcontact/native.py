@@ -1,0 +1,319 @@
+"""The compiled core as Python objects: arrays are checked here, failures become exceptions.
+
+Nothing is computed in this module, and nothing below it knows Python.
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
+from .lattice import Lattice
+
+_api = _core.hc_f2py_api
+
+Method = Literal["direct", "fft"]
+_METHODS = {"direct": 0, "fft": 1}
+_ERRORS: dict[int, type[HexcontactError]] = {1: DeckError, 2: ConvergenceError, 3: ResourceError, 4: HexcontactError}
+
+
+def raise_for(code: int, message: bytes) -> None:
+    """Raise the exception that belongs to a status of the core; 0 means success."""
+    if code:
+        raise _ERRORS.get(code, HexcontactError)(message.decode().strip())
+
+
+def _field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
+    """Return finite values over the window as one contiguous vector."""
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.shape != lattice.shape:
+        raise DeckError(f"{name}: an array of shape {array.shape}, expected {lattice.shape} (rows, columns)")
+    if not np.isfinite(array).all():
+        raise DeckError(f"{name}: {np.count_nonzero(~np.isfinite(array))} values are not finite numbers")
+    return array.ravel()
+
+
+def _method(name: str) -> int:
+    if name not in _METHODS:
+        raise DeckError(f"method = {name!r}: expected 'direct' or 'fft'")
+    return _METHODS[name]
+
+
+@dataclass(frozen=True)
+class ElasticPair:
+    """Compliance constants of two bodies in contact.
+
+    Attributes
+    ----------
+    lambda_1
+        Normal compliance ``1/(pi E*)`` [1/Pa].
+    lambda_2
+        Coupling of normal and tangential displacements, ``beta*lambda_1`` [1/Pa].
+    lambda_5
+        Additional tangential compliance, ``gamma*lambda_1`` [1/Pa].
+    """
+
+    lambda_1: float
+    lambda_2: float
+    lambda_5: float
+
+    @classmethod
+    def from_materials(
+        cls,
+        young_modulus_1: float | None,
+        poisson_ratio_1: float | None,
+        young_modulus_2: float | None,
+        poisson_ratio_2: float | None,
+    ) -> ElasticPair:
+        """Return the constants of two materials; ``None`` for both numbers of a body means rigid.
+
+        Parameters
+        ----------
+        young_modulus_1, young_modulus_2
+            Young's moduli [Pa].
+        poisson_ratio_1, poisson_ratio_2
+            Poisson's ratios, above -1 and at most 0.5.
+
+        Raises
+        ------
+        DeckError
+            A number out of its range, or two rigid bodies.
+        """
+        bodies = [(young_modulus_1, poisson_ratio_1), (young_modulus_2, poisson_ratio_2)]
+        rigid = [young is None for young, _ in bodies]
+        constants, code, message = _api.elastic_constants(
+            [young or 0.0 for young, _ in bodies], [poisson or 0.0 for _, poisson in bodies], rigid
+        )
+        raise_for(code, message)
+        return cls(*constants.tolist())
+
+    @property
+    def effective_modulus(self) -> float:
+        """Effective modulus E* [Pa]."""
+        return float(1.0 / (np.pi * self.lambda_1))
+
+    @property
+    def beta(self) -> float:
+        """Dundurs' second constant: coupling of normal and tangential contact."""
+        return self.lambda_2 / self.lambda_1
+
+    @property
+    def gamma(self) -> float:
+        """Ratio of the additional tangential to the normal compliance."""
+        return self.lambda_5 / self.lambda_1
+
+    def as_array(self) -> NDArray[np.float64]:
+        """Return the three constants as an array [1/Pa]."""
+        return np.array([self.lambda_1, self.lambda_2, self.lambda_5])
+
+
+class FlexibilityOperator:
+    """Tractions on the lattice to relative surface displacements.
+
+    Parameters
+    ----------
+    lattice
+        Lattice and window.
+    pair
+        Elastic constants.
+    method
+        ``"fft"`` for convolutions, ``"direct"`` for an explicit matrix.
+    threads
+        Threads to use; 0: as many as OpenMP would take.
+    """
+
+    def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
+        self.lattice = lattice
+        extent = [lattice.n_col, lattice.n_row]
+        self._handle, code, message = _api.create_operator(
+            _method(method), lattice.basis.T, extent, pair.as_array(), threads
+        )
+        raise_for(code, message)
+        weakref.finalize(self, _api.free_handle, self._handle)
+
+    def apply(
+        self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the closing of the gap and the displacement of body 1 over body 2 along x and y.
+
+        Parameters
+        ----------
+        pressure, traction_x, traction_y
+            Tractions on body 1, shape ``(n_row, n_col)`` [Pa]; an absent one is zero.
+
+        Returns
+        -------
+        tuple of ndarray
+            ``(w, s_x, s_y)``, shape ``(n_row, n_col)`` each [m].
+        """
+        zero = np.zeros(self.lattice.shape)
+        named = {"pressure": pressure, "traction_x": traction_x, "traction_y": traction_y}
+        columns = [_field(zero if value is None else value, self.lattice, name) for name, value in named.items()]
+        traction = np.array(columns).T
+        displacement, code, message = _api.apply_operator(self._handle, traction)
+        raise_for(code, message)
+        w, s_x, s_y = (column.reshape(self.lattice.shape) for column in displacement.T)
+        return w, s_x, s_y
+
+
+@dataclass(frozen=True)
+class NormalSolution:
+    """Solution of a frictionless contact problem, with its residuals.
+
+    Attributes
+    ----------
+    pressure, gap
+        Shape ``(n_row, n_col)`` [Pa], [m].
+    zone
+        0 separated, 2 slip (contact without friction), shape ``(n_row, n_col)``.
+    normal_load, approach
+        Carried load [N] and approach of the remote parts [m].
+    residual_normal, residual_force
+        Residuals of the contact conditions and of the prescribed load.
+    converged
+        Both residuals are within the tolerance.
+    sweeps
+        Active sets that were tried on the finest lattice.
+    operator_applications
+        All work, coarse lattices and preconditioner included, in applications of the full 3x3 operator.
+    """
+
+    pressure: NDArray[np.float64]
+    gap: NDArray[np.float64]
+    zone: NDArray[np.int8]
+    normal_load: float
+    approach: float
+    residual_normal: float
+    residual_force: float
+    converged: bool
+    sweeps: int
+    operator_applications: float
+
+
+class NormalContact:
+    """A frictionless contact problem; `solve` may be called for many loads.
+
+    Parameters
+    ----------
+    lattice
+        Lattice and window of the nodes that may come into contact.
+    pair
+        Elastic constants.
+    initial_gap
+        Gap before loading, shape ``(n_row, n_col)`` [m].
+    candidate
+        False where a node can never touch, shape ``(n_row, n_col)``; default: all may.
+    method
+        ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
+    threads
+        Threads to use; 0: as many as OpenMP would take.
+    """
+
+    def __init__(
+        self,
+        lattice: Lattice,
+        pair: ElasticPair,
+        initial_gap: ArrayLike,
+        candidate: ArrayLike | None = None,
+        method: Method = "fft",
+        threads: int = 0,
+    ) -> None:
+        self.lattice = lattice
+        mask = np.ones(lattice.shape, dtype=bool) if candidate is None else np.asarray(candidate, dtype=bool)
+        if mask.shape != lattice.shape:
+            raise DeckError(f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)")
+        # nodes that can never touch may have any gap, also none at all
+        gap = np.where(mask, np.asarray(initial_gap, dtype=np.float64), 0.0)
+        self._mask = mask
+        self._outside = np.asarray(initial_gap, dtype=np.float64)[~mask]
+        self._handle, code, message = _api.create_normal_contact(
+            _method(method),
+            lattice.basis.T,
+            [lattice.col_first, lattice.row_first],
+            [lattice.n_col, lattice.n_row],
+            pair.as_array(),
+            _field(gap, lattice, "initial_gap"),
+            mask.ravel().astype(np.int32),
+            threads,
+        )
+        raise_for(code, message)
+        weakref.finalize(self, _api.free_handle, self._handle)
+
+    def solve(
+        self,
+        *,
+        normal_load: float | None = None,
+        approach: float | None = None,
+        tolerance: float = 1e-8,
+        max_sweeps: int = 60,
+    ) -> NormalSolution:
+        """Solve for a normal load or for an approach.
+
+        Parameters
+        ----------
+        normal_load
+            Load that presses the bodies together, not negative [N].
+        approach
+            Approach of the remote parts instead [m].
+        tolerance
+            Bound of the residuals.
+        max_sweeps
+            Active sets that may be tried.
+
+        Returns
+        -------
+        NormalSolution
+            Look at ``converged``: a solution that is not is returned, too.
+        """
+        if (normal_load is None) == (approach is None):
+            raise DeckError("expected either a normal load or an approach")
+        target = normal_load if normal_load is not None else approach
+        assert target is not None
+        if not np.isfinite(target) or (normal_load is not None and normal_load < 0):
+            name, kind = ("approach", "a number") if normal_load is None else ("normal_load", "a number not below zero")
+            raise DeckError(f"{name} = {target!r}: expected {kind}")
+        if not 0 < tolerance < 1:
+            raise DeckError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
+        out: Any = _api.solve_normal_contact(
+            self._handle, 1 if approach is None else 2, target, tolerance, max_sweeps, self.lattice.size
+        )
+        pressure, gap, zone, load, delta, residuals, sweeps, work, converged, code, message = out
+        raise_for(code, message)
+        shape = self.lattice.shape
+        gap = gap.reshape(shape)
+        gap[~self._mask] += self._outside
+        return NormalSolution(
+            pressure=pressure.reshape(shape),
+            gap=gap,
+            zone=zone.reshape(shape).astype(np.int8),
+            normal_load=load,
+            approach=delta,
+            residual_normal=float(residuals[0]),
+            residual_force=float(residuals[1]),
+            converged=bool(converged),
+            sweeps=sweeps,
+            operator_applications=work,
+        )
+
+
+def memory_needed(method: Method, n_row: int, n_col: int, *, operator_only: bool = False, threads: int = 1) -> int:
+    """Return the bytes that a frictionless problem takes on a window of the given size.
+
+    Parameters
+    ----------
+    method
+        ``"direct"`` or ``"fft"``.
+    n_row, n_col
+        Rows and columns of the window.
+    operator_only
+        The full 3x3 flexibility operator alone instead.
+    threads
+        Threads that will be used.
+    """
+    return int(_api.memory_needed(_method(method), [n_col, n_row], int(operator_only), threads))

@@ -377,8 +377,14 @@ contains
       odd = m >= first_odd
       factor(:n) = factor(:n) + weight(m)*spectrum(:, m)
     end do
-    if (start_from_zero) total = 0.0_wp
     ! written in real arithmetic: the compiler would promote the factor to complex
+    if (start_from_zero .and. .not. odd) then
+      do f = 1, n
+        total(f) = cmplx(factor(f)*real(field(f), wp), factor(f)*aimag(field(f)), wp)
+      end do
+      return
+    end if
+    if (start_from_zero) total = 0.0_wp
     if (odd) then
       do f = 1, n
         total(f) = total(f) + cmplx(-factor(f)*aimag(field(f)), factor(f)*real(field(f), wp), wp)

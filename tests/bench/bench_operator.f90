@@ -1,0 +1,128 @@
+!> Time of one application of the FFT operator, over that of the bare transforms it needs.
+!>
+!> The bare transforms are those of FFTW as planned for the whole array: real
+!> transforms of the rows of the window, complex ones along all columns, there
+!> and back; "blocked" are the same transforms in the operator's cache-sized
+!> blocks. Nothing is copied, padded or multiplied in either. All in one run,
+!> best of several repetitions, one thread.
+program bench_operator
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_int
+  use, intrinsic :: iso_fortran_env, only: int64
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_fftw, only: fftw_plan_many_dft, fftw_plan_many_dft_r2c, fftw_plan_many_dft_c2r, fftw_execute_dft, &
+                     fftw_execute_dft_r2c, fftw_execute_dft_c2r, fftw_destroy_plan, &
+                     fftw_forward, fftw_backward, fftw_estimate, good_size
+  implicit none
+
+  integer, parameter :: sides(4) = [256, 512, 1024, 2048], n_repeat = 7
+  integer :: i
+
+  print '(a)', '| window | scalar product [ms] | over bare FFTs | over blocked FFTs | 3x3 product [ms] | over bare FFTs |'
+  print '(a)', '|---|---|---|---|---|---|'
+  do i = 1, size(sides)
+    call measure(sides(i))
+  end do
+
+contains
+
+  !> One row of the table.
+  subroutine measure(side)
+    !> Nodes on a side of the window
+    integer, intent(in) :: side
+    real(wp) :: scalar, full, bare, blocked
+
+    bare = bare_transforms(side)
+    call products(side, 1, scalar, blocked)
+    call products(side, 3, full)
+    print '(a,i0,a,f0.2,a,f0.2,a,f0.2,a,f0.2,a,f0.2,a)', '| ', side, '^2 | ', 1e3_wp*scalar, ' | ', scalar/bare, ' | ', &
+      scalar/blocked, ' | ', 1e3_wp*full, ' | ', full/(3*bare), ' |'
+  end subroutine measure
+
+  !> Seconds of an application to one or to three components.
+  subroutine products(side, n_component, best, blocked)
+    !> Nodes on a side of the window, components
+    integer, intent(in) :: side, n_component
+    !> Seconds of a product
+    real(wp), intent(out) :: best
+    !> Seconds of its transforms
+    real(wp), intent(out), optional :: blocked
+    type(lattice_t) :: lattice
+    type(fft_flexibility_t) :: operator
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: traction(:, :, :), displacement(:, :, :)
+    real(wp) :: start
+    integer :: repeat, j
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [side, side], error)
+    call new_fft_flexibility(operator, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, &
+                             normal_only=n_component == 1, n_threads=1)
+    if (allocated(error)) error stop 'the operator could not be set up'
+    allocate (traction(side, side, n_component), displacement(side, side, n_component))
+    call random_number(traction)
+    best = huge(best)
+    do repeat = 1, n_repeat
+      start = seconds()
+      call operator%apply([(j, j=1, n_component)], traction, [(j, j=1, n_component)], displacement, error)
+      best = min(best, seconds() - start)
+    end do
+    if (.not. present(blocked)) return
+    blocked = huge(blocked)
+    do repeat = 1, n_repeat
+      start = seconds()
+      call operator%convolution%time_transforms()
+      blocked = min(blocked, seconds() - start)
+    end do
+  end subroutine products
+
+  !> Seconds of the bare transforms of a scalar product.
+  real(wp) function bare_transforms(side)
+    !> Nodes on a side of the window
+    integer, intent(in) :: side
+    real(wp), allocatable :: rows(:, :)
+    complex(wp), allocatable :: spectrum(:, :)
+    type(c_ptr) :: row_forward, row_inverse, column_forward, column_inverse
+    integer(c_int) :: length(1), n, m, k
+    real(wp) :: start
+    integer :: repeat
+
+    k = side
+    n = good_size(2*side - 1)
+    m = n/2 + 1
+    length = n
+    allocate (rows(n, side), source=0.0_wp)
+    allocate (spectrum(m, n), source=(0.0_wp, 0.0_wp))
+    row_forward = fftw_plan_many_dft_r2c(1_c_int, length, k, rows, length, 1_c_int, n, spectrum, length, 1_c_int, m, &
+                                         fftw_estimate)
+    row_inverse = fftw_plan_many_dft_c2r(1_c_int, length, k, spectrum, length, 1_c_int, m, rows, length, 1_c_int, n, &
+                                         fftw_estimate)
+    column_forward = fftw_plan_many_dft(1_c_int, length, m, spectrum, length, m, 1_c_int, &
+                                        spectrum, length, m, 1_c_int, fftw_forward, fftw_estimate)
+    column_inverse = fftw_plan_many_dft(1_c_int, length, m, spectrum, length, m, 1_c_int, &
+                                        spectrum, length, m, 1_c_int, fftw_backward, fftw_estimate)
+    bare_transforms = huge(start)
+    do repeat = 1, n_repeat
+      start = seconds()
+      call fftw_execute_dft_r2c(row_forward, rows, spectrum)
+      call fftw_execute_dft(column_forward, spectrum, spectrum)
+      call fftw_execute_dft(column_inverse, spectrum, spectrum)
+      call fftw_execute_dft_c2r(row_inverse, spectrum, rows)
+      bare_transforms = min(bare_transforms, seconds() - start)
+    end do
+    call fftw_destroy_plan(row_forward)
+    call fftw_destroy_plan(row_inverse)
+    call fftw_destroy_plan(column_forward)
+    call fftw_destroy_plan(column_inverse)
+  end function bare_transforms
+
+  !> Wall-clock time.
+  real(wp) function seconds()
+    integer(int64) :: count, rate
+    call system_clock(count, rate)
+    seconds = real(count, wp)/real(rate, wp)
+  end function seconds
+
+end program bench_operator

@@ -1,0 +1,31 @@
+!> Runs the unit tests: `tester [suite [test]]`.
+!>
+!> A new suite is a file test_<name>.f90 with a module of that name and its
+!> collect_<name>, a `use` and an entry here, and its name in meson.build.
+program tester
+  use testing, only: suite_t, new_suite, run_suites
+  use test_testing, only: collect_testing
+  use test_precision, only: collect_precision
+  use test_triangle_integrals, only: collect_triangle_integrals
+  use test_pyramid_influence, only: collect_pyramid_influence
+  use test_lattice, only: collect_lattice
+  use test_flexibility, only: collect_flexibility
+  use test_contact, only: collect_contact
+  implicit none
+
+  type(suite_t), allocatable :: suites(:)
+  integer :: n_failed
+
+  suites = [ &
+    new_suite('testing', collect_testing), &
+    new_suite('precision', collect_precision), &
+    new_suite('triangle_integrals', collect_triangle_integrals), &
+    new_suite('pyramid_influence', collect_pyramid_influence), &
+    new_suite('lattice', collect_lattice), &
+    new_suite('flexibility', collect_flexibility), &
+    new_suite('contact', collect_contact) &
+  ]
+  call run_suites(suites, n_failed)
+  if (n_failed > 0) stop 1, quiet=.true.
+  stop 0, quiet=.true.
+end program tester

@@ -1,0 +1,286 @@
+!> The flexibility operators: explicit matrix and convolution.
+module test_flexibility
+  use hc_precision, only: wp, pi
+  use hc_error, only: error_t, status
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
+  use hc_flexibility, only: normal, along_x, along_y
+  use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_contact_residuals, only: normal_self_compliance
+  use hc_lattice_symbol, only: normal_symbol
+  use hc_preconditioner, only: preconditioner_t, new_preconditioner
+  use testing, only: test_t, new_test, check, check_raised, check_true
+  implicit none
+  private
+
+  public :: collect_flexibility
+
+  integer, parameter :: all_components(3) = [normal, along_x, along_y]
+
+  interface
+    subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info)
+      import :: wp
+      character(len=1), intent(in) :: jobz, uplo
+      integer, intent(in) :: n, lda, lwork
+      real(wp), intent(inout) :: a(lda, *)
+      real(wp), intent(out) :: w(*), work(*)
+      integer, intent(out) :: info
+    end subroutine dsyev
+  end interface
+
+contains
+
+  subroutine collect_flexibility(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('elastic_pair', test_elastic_pair), &
+      new_test('bad_materials', test_bad_materials), &
+      new_test('dense_equals_fft', test_dense_equals_fft), &
+      new_test('any_lattice', test_any_lattice), &
+      new_test('components', test_components), &
+      new_test('positive_definite', test_positive_definite), &
+      new_test('threads', test_threads), &
+      new_test('wrong_shapes', test_wrong_shapes), &
+      new_test('self_compliance', test_self_compliance), &
+      new_test('symbol', test_symbol), &
+      new_test('preconditioner', test_preconditioner) &
+    ]
+  end subroutine collect_flexibility
+
+  !> Steel on a rubber-like body: nu = 0.5 takes its own coupling away.
+  subroutine test_elastic_pair(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(elastic_pair_t) :: pair
+
+    call new_elastic_pair(pair, material_t(210.0_wp, 0.3_wp), material_t(6.0_wp, 0.5_wp), error)
+    if (allocated(error)) return
+    ! 1/E* = sum (1 - nu^2)/E
+    call check(error, pair%effective_modulus(), 1.0_wp/(0.91_wp/210.0_wp + 0.75_wp/6.0_wp), 1.0e-13_wp, 'E*')
+    if (allocated(error)) return
+    ! G_1 = 210/2.6, lambda_2 = (1 - 0.6)/(4 pi G_1)
+    call check(error, pair%lambda_2, 0.4_wp*2.6_wp/(4*pi*210.0_wp), 1.0e-16_wp, 'lambda_2')
+    if (allocated(error)) return
+    ! rigid plane: beta = (1 - 2 nu)/(2 - 2 nu)
+    call new_elastic_pair(pair, material_t(1.0_wp, 0.2_wp), material_t(rigid=.true.), error)
+    if (allocated(error)) return
+    call check(error, pair%beta(), 0.6_wp/1.6_wp, 1.0e-15_wp, 'beta on a rigid plane')
+    if (allocated(error)) return
+    call check(error, pair%gamma(), 0.2_wp/0.8_wp, 1.0e-15_wp, 'gamma on a rigid plane')
+  end subroutine test_elastic_pair
+
+  subroutine test_bad_materials(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: raised
+    type(elastic_pair_t) :: pair
+    type(material_t) :: good, bad(4)
+    integer :: i
+
+    good = material_t(1.0_wp, 0.3_wp)
+    bad = [material_t(-1.0_wp, 0.3_wp), material_t(0.0_wp, 0.3_wp), material_t(1.0_wp, 0.6_wp), material_t(1.0_wp, -1.0_wp)]
+    do i = 1, size(bad)
+      call new_elastic_pair(pair, good, bad(i), raised)
+      call check_raised(error, raised, status%invalid_input, 'a bad material')
+      if (allocated(error)) return
+    end do
+    call new_elastic_pair(pair, material_t(rigid=.true.), material_t(rigid=.true.), raised)
+    call check_raised(error, raised, status%invalid_input, 'two rigid bodies')
+  end subroutine test_bad_materials
+
+  !> Both operators agree to 1e-12 on random tractions.
+  subroutine test_dense_equals_fft(error)
+    type(error_t), allocatable, intent(out) :: error
+    call compare(equilateral_basis(2.5e-6_wp), [17, 12], error)
+    if (allocated(error)) return
+    call compare(equilateral_basis(1.0_wp), [1, 9], error)
+    if (allocated(error)) return
+    call compare(equilateral_basis(1.0_wp), [8, 1], error)
+  end subroutine test_dense_equals_fft
+
+  !> Nothing above the lattice knows 60 degrees.
+  subroutine test_any_lattice(error)
+    type(error_t), allocatable, intent(out) :: error
+    call compare(reshape([1.3_wp, 0.1_wp, 0.4_wp, 1.1_wp], [2, 2]), [9, 14], error)
+  end subroutine test_any_lattice
+
+  !> Compare the two operators on one window.
+  subroutine compare(basis, extent, error)
+    !> Basis vectors as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> Number of columns and rows
+    integer, intent(in) :: extent(2)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(elastic_pair_t) :: pair
+    type(dense_flexibility_t) :: dense
+    type(fft_flexibility_t) :: fft
+    real(wp), dimension(extent(1), extent(2), 3) :: traction, u, v
+
+    call new_lattice(lattice, basis, [-3, 5], extent, error)
+    if (allocated(error)) return
+    pair = elastic_pair_t(1.0_wp, -0.3_wp, 0.6_wp)
+    call new_dense_flexibility(dense, lattice, pair, error)
+    if (allocated(error)) return
+    call new_fft_flexibility(fft, lattice, pair, error)
+    if (allocated(error)) return
+    call random_number(traction)
+    traction = traction - 0.4_wp
+    call dense%apply(all_components, traction, all_components, u, error)
+    if (allocated(error)) return
+    call fft%apply(all_components, traction, all_components, v, error)
+    if (allocated(error)) return
+    call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 1.0e-12_wp*maxval(abs(u)), 'convolution')
+  end subroutine compare
+
+  !> A block alone is that block of the whole; the work is counted by its components.
+  subroutine test_components(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(fft_flexibility_t) :: fft
+    real(wp) :: traction(10, 7, 3), whole(10, 7, 3), part(10, 7, 1)
+    integer :: i, o
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [10, 7], error)
+    if (allocated(error)) return
+    call new_fft_flexibility(fft, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error)
+    if (allocated(error)) return
+    do i = 1, 3
+      traction = 0.0_wp
+      call random_number(traction(:, :, i))
+      call fft%apply(all_components, traction, all_components, whole, error)
+      if (allocated(error)) return
+      do o = 1, 3
+        fft%applications = 0.0_wp
+        call fft%apply([i], traction(:, :, i:i), [o], part, error)
+        if (allocated(error)) return
+        call check(error, reshape(part, [70]), reshape(whole(:, :, o), [70]), 1.0e-13_wp*maxval(abs(whole)), 'block')
+        if (allocated(error)) return
+        call check(error, fft%applications, 1.0_wp/3.0_wp, 1.0e-15_wp, 'count of a scalar block')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_components
+
+  !> Symmetric (Betti) to 1e-13 and positive definite for couplings up to the largest possible ones.
+  subroutine test_positive_definite(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(dense_flexibility_t) :: dense
+    integer, parameter :: n = 3*81
+    real(wp) :: values(n), work(8*n), asymmetry
+    real(wp), parameter :: beta(3) = [0.0_wp, 0.5_wp, -0.5_wp], gamma(3) = [1.0_wp, 0.0_wp, 1.0_wp]
+    integer :: i, info
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-4, -4], [9, 9], error)
+    if (allocated(error)) return
+    do i = 1, 3
+      call new_dense_flexibility(dense, lattice, elastic_pair_t(1.0_wp, beta(i), gamma(i)), error)
+      if (allocated(error)) return
+      asymmetry = maxval(abs(dense%matrix - transpose(dense%matrix)))
+      call check(error, asymmetry, 0.0_wp, 1.0e-13_wp, 'asymmetry')
+      if (allocated(error)) return
+      call dsyev('N', 'U', n, dense%matrix, n, values, work, size(work), info)
+      call check_true(error, info == 0 .and. minval(values) > 0.01_wp*maxval(values)/sqrt(real(n, wp)), 'positive definite')
+      if (allocated(error)) return
+    end do
+  end subroutine test_positive_definite
+
+  !> The number of threads does not change a single bit.
+  subroutine test_threads(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(fft_flexibility_t) :: one, three
+    real(wp) :: traction(53, 61, 3), u(53, 61, 3), v(53, 61, 3)
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [53, 61], error)
+    if (allocated(error)) return
+    call new_fft_flexibility(one, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, n_threads=1)
+    if (allocated(error)) return
+    call new_fft_flexibility(three, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, n_threads=3)
+    if (allocated(error)) return
+    call random_number(traction)
+    call one%apply(all_components, traction, all_components, u, error)
+    if (allocated(error)) return
+    call three%apply(all_components, traction, all_components, v, error)
+    if (allocated(error)) return
+    call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'three threads')
+  end subroutine test_threads
+
+  subroutine test_wrong_shapes(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: raised
+    type(lattice_t) :: lattice
+    type(fft_flexibility_t) :: fft
+    real(wp) :: field(4, 5, 1), answer(5, 4, 1), other(4, 5, 1)
+
+    field = 0.0_wp
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [4, 5], error)
+    if (allocated(error)) return
+    call new_fft_flexibility(fft, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, normal_only=.true.)
+    if (allocated(error)) return
+    call fft%apply([normal], field, [normal], answer, raised)
+    call check_raised(error, raised, status%invalid_input, 'an answer of another shape')
+    if (allocated(error)) return
+    call fft%apply([normal], field, [along_x], other, raised)
+    call check_raised(error, raised, status%invalid_input, 'a component it was not set up for')
+  end subroutine test_wrong_shapes
+
+  !> K1(0) = (3 sqrt(3)/2) ln 3 spacings.
+  subroutine test_self_compliance(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+
+    call new_lattice(lattice, equilateral_basis(2.0_wp), [0, 0], [1, 1], error)
+    if (allocated(error)) return
+    call check(error, normal_self_compliance(lattice, elastic_pair_t(0.5_wp, 0.0_wp, 0.0_wp)), &
+               1.5_wp*sqrt(3.0_wp)*log(3.0_wp), 1.0e-14_wp, 'self-compliance')
+  end subroutine test_self_compliance
+
+  !> Long waves: 2 pi/|k|; the symbol is even, also on Nyquist rows.
+  subroutine test_symbol(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: basis(2, 2), k
+    integer :: i, j
+
+    basis = equilateral_basis(1.0_wp)
+    ! the frequency (1, 0) has the wave number 2 pi/(512 sin 60)
+    k = 2*pi/(512*0.5_wp*sqrt(3.0_wp))
+    call check(error, normal_symbol(basis, [512, 512], [1, 0])*k/(2*pi), 1.0_wp, 1.0e-4_wp, 'long wave')
+    do i = 0, 11
+      do j = 0, 9
+        if (allocated(error)) return
+        call check(error, normal_symbol(basis, [12, 10], [i, j]), normal_symbol(basis, [12, 10], [-i, -j]), &
+                   1.0e-13_wp, 'even symbol')
+      end do
+    end do
+  end subroutine test_symbol
+
+  !> In the middle of the window the preconditioner undoes the operator within a few per cent.
+  subroutine test_preconditioner(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(fft_flexibility_t) :: fft
+    type(preconditioner_t) :: preconditioner
+    type(elastic_pair_t) :: pair
+    real(wp), dimension(65, 65, 1) :: traction, closing, back
+    real(wp) :: x(65, 65), y(65, 65)
+
+    pair = elastic_pair_t(0.7_wp, 0.0_wp, 0.0_wp)
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-32, -32], [65, 65], error)
+    if (allocated(error)) return
+    call new_fft_flexibility(fft, lattice, pair, error, normal_only=.true.)
+    if (allocated(error)) return
+    call new_preconditioner(preconditioner, lattice, pair, error)
+    if (allocated(error)) return
+    ! waves of zero mean under a wide envelope
+    call lattice%coordinates(x, y)
+    traction(:, :, 1) = cos(0.9_wp*x + 0.5_wp*y)*exp(-(x**2 + y**2)/100.0_wp)
+    call fft%apply([normal], traction, [normal], closing, error)
+    if (allocated(error)) return
+    call preconditioner%apply(closing, back)
+    call check(error, reshape(back, [size(back)]), reshape(traction, [size(back)]), 0.05_wp, 'traction')
+  end subroutine test_preconditioner
+
+end module test_flexibility

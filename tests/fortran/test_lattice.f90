@@ -1,0 +1,114 @@
+!> Lattice geometry, coarse lattices and the fields between them.
+module test_lattice
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_multilevel, only: prolong, restrict_field, restrict_mask
+  use testing, only: test_t, new_test, check, check_raised, check_succeeded, check_true
+  implicit none
+  private
+
+  public :: collect_lattice
+
+  real(wp), parameter :: thr = 1.0e-14_wp
+
+contains
+
+  subroutine collect_lattice(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('equilateral', test_equilateral), &
+      new_test('coordinates', test_coordinates), &
+      new_test('bad_input', test_bad_input), &
+      new_test('coarsened', test_coarsened), &
+      new_test('prolongation', test_prolongation) &
+    ]
+  end subroutine collect_lattice
+
+  !> Three edges of equal length; the cell is sqrt(3)/2 of its square, eq. (5.1).
+  subroutine test_equilateral(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+
+    call new_lattice(lattice, equilateral_basis(3.0_wp), [0, 0], [2, 2], error)
+    if (allocated(error)) return
+    call check(error, lattice%spacing(), 3.0_wp, thr, 'longest edge')
+    if (allocated(error)) return
+    call check(error, norm2(lattice%basis(:, 2) - lattice%basis(:, 1)), 3.0_wp, thr, 'third edge')
+    if (allocated(error)) return
+    call check(error, lattice%cell_area(), 4.5_wp*sqrt(3.0_wp), 9*thr, 'cell area')
+  end subroutine test_equilateral
+
+  subroutine test_coordinates(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    real(wp) :: x(4, 3), y(4, 3)
+
+    call new_lattice(lattice, equilateral_basis(2.0_wp), [-1, -2], [4, 3], error, origin=[10.0_wp, 20.0_wp])
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    call check(error, [x(2, 3), y(2, 3)], [10.0_wp, 20.0_wp], thr, 'node (0, 0)')
+    if (allocated(error)) return
+    ! node (2, -1) = 2*(2, 0) - (1, sqrt(3))
+    call check(error, [x(4, 2), y(4, 2)], [13.0_wp, 20.0_wp - sqrt(3.0_wp)], 10*thr, 'node (2, -1)')
+  end subroutine test_coordinates
+
+  subroutine test_bad_input(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: raised
+    type(lattice_t) :: lattice
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [3, 0], raised)
+    call check_raised(error, raised, status%invalid_input, 'an empty window')
+    if (allocated(error)) return
+    call new_lattice(lattice, reshape([1.0_wp, 0.0_wp, 2.0_wp, 0.0_wp], [2, 2]), [0, 0], [3, 3], raised)
+    call check_raised(error, raised, status%invalid_input, 'parallel basis vectors')
+    if (allocated(error)) return
+    call new_lattice(lattice, reshape([0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], [2, 2]), [0, 0], [3, 3], raised)
+    call check_raised(error, raised, status%invalid_input, 'a clockwise basis')
+  end subroutine test_bad_input
+
+  !> Every even node of the window, of positive and negative index, and no other.
+  subroutine test_coarsened(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice, coarse
+    integer :: first, extent
+
+    do first = -4, 3
+      do extent = 3, 6
+        call new_lattice(lattice, equilateral_basis(1.0_wp), [first, first], [extent, extent], error)
+        if (allocated(error)) return
+        coarse = lattice%coarsened()
+        call check_true(error, 2*coarse%first(1) >= first .and. 2*(coarse%first(1) - 1) < first, 'first coarse node')
+        if (allocated(error)) return
+        associate (last => 2*(coarse%first(1) + coarse%extent(1) - 1))
+          call check_true(error, last <= first + extent - 1 .and. last + 2 > first + extent - 1, 'last coarse node')
+        end associate
+        if (allocated(error)) return
+      end do
+    end do
+    call check(error, coarse%cell_area(), 4*lattice%cell_area(), thr, 'area of a coarse cell')
+  end subroutine test_coarsened
+
+  !> A linear field survives restriction and prolongation inside the coarse window.
+  subroutine test_prolongation(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice, coarse
+    real(wp) :: x(11, 9), y(11, 9), field(11, 9), back(11, 9)
+    real(wp), allocatable :: coarse_field(:, :)
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-6, -4], [11, 9], error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    field = 1.0_wp + 2.0_wp*x - 3.0_wp*y
+    coarse = lattice%coarsened()
+    coarse_field = restrict_field(lattice, field, coarse)
+    call prolong(coarse, coarse_field, lattice, back)
+    call check(error, reshape(back, [99]), reshape(field, [99]), 100*thr, 'linear field')
+    if (allocated(error)) return
+    call check_true(error, count(restrict_mask(lattice, field > 0.0_wp, coarse)) == count(coarse_field > 0.0_wp), 'mask')
+  end subroutine test_prolongation
+
+end module test_lattice

@@ -23,6 +23,8 @@ module hc_convolution
 
   !> Bytes that one component of a column block should take, so that blocks stay in cache.
   integer, parameter :: block_bytes = 131072
+  !> Smaller windows are left to one thread: starting the others takes longer than they save.
+  integer, parameter :: worth_sharing = 16384
   !> Number of frequencies that are multiplied at a time.
   integer, parameter :: chunk = 128
 
@@ -95,12 +97,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> The first odd kernel; absent: all are even
     integer, intent(in), optional :: first_odd
-    !> Threads to use; absent or 0: as many as OpenMP would take
+    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
     integer, intent(in), optional :: n_threads
 
     integer :: stat
 
-    !$ self%n_threads = omp_get_max_threads()
+    !$ if (product(extent) >= worth_sharing) self%n_threads = omp_get_max_threads()
     if (present(n_threads)) then
       !$ if (n_threads > 0) self%n_threads = n_threads
     end if

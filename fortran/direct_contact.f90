@@ -5,7 +5,7 @@
 !> nodes not fall any more, one node at a time is exchanged (Murty's rule, with
 !> which the iteration ends for every positive definite matrix).
 module hc_direct_contact
-  use hc_precision, only: wp
+  use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -78,7 +78,7 @@ contains
   end subroutine new_direct_contact
 
   !> Solve for a normal load or an approach.
-  subroutine solve(self, control, target, tolerance, max_sweeps, state, error)
+  subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)
     class(direct_contact_t), intent(inout) :: self
     !> load_control or approach_control
     integer, intent(in) :: control
@@ -92,6 +92,8 @@ contains
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure: not enough memory, a matrix that is not positive definite
     type(error_t), allocatable, intent(out) :: error
+    !> Contact area to start from (n_col, n_row); absent: where the undeformed bodies would overlap
+    logical, intent(in), optional :: start(:, :)
 
     real(wp), allocatable :: h(:), p(:)
     logical, allocatable :: candidate(:), active(:), wrong(:)
@@ -106,7 +108,12 @@ contains
     delta = minval(h, mask=candidate)
     allocate (p(n), source=0.0_wp)
     allocate (wrong(n), source=.false.)
-    active = candidate
+    if (present(start)) then
+      active = candidate .and. reshape(start, [n])
+      if (.not. any(active)) active = candidate
+    else
+      active = first_guess(self, control, target, h, candidate)
+    end if
     if (target <= merge(0.0_wp, delta, control == load_control)) then
       active = .false.
       if (control /= load_control) delta = target
@@ -154,6 +161,45 @@ contains
     state%operator_applications = self%flexibility%applications
   end subroutine solve
 
+  !> Nodes that the undeformed bodies would overlap on; about twice the contact area of a sphere.
+  !>
+  !> Under a load the overlap is that at which a flat punch of the same area
+  !> would reach the rim of the overlap: mean initial gap + P/(2 E* a) = overlap.
+  pure function first_guess(self, control, target, h, candidate) result(active)
+    !> The problem
+    class(direct_contact_t), intent(in) :: self
+    !> load_control or approach_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Initial gap [m]
+    real(wp), intent(in) :: h(:)
+    !> Nodes that may come into contact
+    logical, intent(in) :: candidate(:)
+    logical :: active(size(h))
+    real(wp) :: low, high, overlap, radius
+    integer :: i
+
+    overlap = target
+    if (control == load_control) then
+      low = minval(h, mask=candidate)
+      high = maxval(h, mask=candidate)
+      do i = 1, 50
+        overlap = 0.5_wp*(low + high)
+        active = candidate .and. h <= overlap
+        radius = sqrt(count(active)*self%flexibility%lattice%cell_area()/pi)
+        if (sum(h, mask=active)/count(active) + target/(2.0_wp*self%flexibility%pair%effective_modulus()*radius) &
+            > overlap) then
+          low = overlap
+        else
+          high = overlap
+        end if
+      end do
+      overlap = high
+    end if
+    active = candidate .and. h <= overlap
+  end function first_guess
+
   !> Pressure that closes the gap on the active nodes: K p = approach - h.
   subroutine solve_active(self, control, target, h, active, p, delta, error)
     class(direct_contact_t), intent(in) :: self
@@ -185,7 +231,7 @@ contains
       call raise(error, status%resources, 'not enough memory for the matrix of the contact area: use method "fft"')
       return
     end if
-    !$omp parallel do
+    !$omp parallel do if (n > 1000)
     do i = 1, n
       matrix(:i, i) = self%flexibility%matrix(node(:i), node(i))
     end do

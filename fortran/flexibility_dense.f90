@@ -67,7 +67,7 @@ contains
       do onto = 1, n_component
         influence = reshape(matmul(block_weights(pair, onto, from), reshape(table, [5, size(influence)])), &
                             shape(influence))
-        !$omp parallel do private(col, source)
+        !$omp parallel do private(col, source) if (n_node > 1000)
         do row = 1, n(2)
           do col = 1, n(1)
             source = (from - 1)*n_node + (row - 1)*n(1) + col

@@ -23,6 +23,8 @@ module hc_krylov
   !> A symmetric positive definite operator with a preconditioner, on fields that
   !> are kept as vectors over all nodes.
   type, abstract :: linear_system_t
+    !> Threads that share the vector operations
+    integer :: n_threads = 1
   contains
     !> y = A x for an x that vanishes off the active nodes; y is wanted everywhere
     procedure(linear_map), deferred :: product
@@ -85,9 +87,10 @@ contains
 
     real(wp), allocatable :: r(:), z(:), d(:), ad(:), mb(:, :)
     real(wp) :: rz, rz_old, curvature, step, correction(size(constraint, 2))
-    integer :: n, i, m
+    integer :: n, i, m, n_threads
 
     n = size(x)
+    n_threads = system%n_threads
     allocate (r(n), z(n), d(n), ad(n), mb(n, size(constraint, 2)))
     do m = 1, size(constraint, 2)
       call system%precondition(constraint(:, m), mb(:, m), error)
@@ -98,24 +101,24 @@ contains
     iterations = 0
     rz_old = 0.0_wp
     do m = 1, size(multiplier)
-      multiplier(m) = dot(constraint(:, m), ax - rhs)/dot(constraint(:, m), constraint(:, m))
+      multiplier(m) = dot(constraint(:, m), ax - rhs, n_threads)/dot(constraint(:, m), constraint(:, m), n_threads)
     end do
     do
       ! The share of the constraints is taken out of the residual before it is
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
-      call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual)
+      call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
       call system%precondition(r, z, error)
       if (allocated(error)) return
-      call project(active, constraint, mb, z, correction)
+      call project(active, constraint, mb, z, correction, n_threads)
       multiplier = multiplier - correction
-      call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual)
+      call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
       if (residual <= tolerance .or. iterations >= max_iterations) exit
 
-      rz = dot(r, z)
+      rz = dot(r, z, n_threads)
       step = 0.0_wp
       if (iterations > 0) step = rz/rz_old
       rz_old = rz
-      !$omp parallel do schedule(static)
+      !$omp parallel do schedule(static) num_threads(n_threads)
       do i = 1, n
         if (iterations > 0) then
           d(i) = z(i) + step*d(i)
@@ -126,7 +129,7 @@ contains
       !$omp end parallel do
       call system%product(d, ad, error)
       if (allocated(error)) return
-      curvature = dot(d, ad)
+      curvature = dot(d, ad, n_threads)
       if (.not. curvature > 0.0_wp) then
         ! nothing is left to gain in working precision
         if (.not. rz > 0.0_wp) exit
@@ -134,7 +137,7 @@ contains
         return
       end if
       step = rz/curvature
-      !$omp parallel do schedule(static)
+      !$omp parallel do schedule(static) num_threads(n_threads)
       do i = 1, n
         x(i) = x(i) + step*d(i)
         ax(i) = ax(i) + step*ad(i)
@@ -145,7 +148,7 @@ contains
   end subroutine projected_cg
 
   !> r = rhs - A x + B m on the active nodes, zero elsewhere, and its largest element.
-  subroutine constrained_residual(active, constraint, multiplier, rhs, ax, r, largest)
+  subroutine constrained_residual(active, constraint, multiplier, rhs, ax, r, largest, n_threads)
     !> Active nodes
     logical, intent(in) :: active(:)
     !> Constraint vectors and multipliers
@@ -156,10 +159,12 @@ contains
     real(wp), intent(out) :: r(:)
     !> Its largest element
     real(wp), intent(out) :: largest
+    !> Threads to use
+    integer, intent(in) :: n_threads
     integer :: i
 
     largest = 0.0_wp
-    !$omp parallel do schedule(static) reduction(max: largest)
+    !$omp parallel do schedule(static) num_threads(n_threads) reduction(max: largest)
     do i = 1, size(r)
       r(i) = 0.0_wp
       if (.not. active(i)) cycle
@@ -170,7 +175,7 @@ contains
   end subroutine constrained_residual
 
   !> z <- z - M B (B^T M B)^-1 B^T z on the active nodes, zero elsewhere.
-  subroutine project(active, constraint, mb, z, share)
+  subroutine project(active, constraint, mb, z, share, n_threads)
     !> Active nodes
     logical, intent(in) :: active(:)
     !> B and M B
@@ -179,25 +184,27 @@ contains
     real(wp), intent(inout) :: z(:)
     !> (B^T M B)^-1 B^T z: how much of B is in the residual
     real(wp), intent(out) :: share(:)
+    !> Threads to use
+    integer, intent(in) :: n_threads
 
     real(wp) :: gram(size(mb, 2), size(mb, 2))
     integer :: i, m, k, info
 
-    !$omp parallel do schedule(static)
+    !$omp parallel do schedule(static) num_threads(n_threads)
     do i = 1, size(z)
       if (.not. active(i)) z(i) = 0.0_wp
     end do
     !$omp end parallel do
     if (size(mb, 2) == 0) return
     do m = 1, size(mb, 2)
-      share(m) = dot(constraint(:, m), z)
+      share(m) = dot(constraint(:, m), z, n_threads)
       do k = 1, size(mb, 2)
-        gram(k, m) = dot(constraint(:, k), mb(:, m))
+        gram(k, m) = dot(constraint(:, k), mb(:, m), n_threads)
       end do
     end do
     call dposv('U', size(mb, 2), 1, gram, size(mb, 2), share, size(mb, 2), info)
     do m = 1, size(mb, 2)
-      !$omp parallel do schedule(static)
+      !$omp parallel do schedule(static) num_threads(n_threads)
       do i = 1, size(z)
         z(i) = z(i) - share(m)*mb(i, m)
       end do
@@ -206,13 +213,15 @@ contains
   end subroutine project
 
   !> Scalar product, summed in fixed blocks.
-  real(wp) function dot(a, b)
+  real(wp) function dot(a, b, n_threads)
     !> Vectors of equal length
     real(wp), intent(in) :: a(:), b(:)
+    !> Threads to use
+    integer, intent(in) :: n_threads
     real(wp) :: part((size(a) + sum_block - 1)/sum_block)
     integer :: k, from, to
 
-    !$omp parallel do schedule(static) private(from, to)
+    !$omp parallel do schedule(static) num_threads(n_threads) private(from, to)
     do k = 1, size(part)
       from = (k - 1)*sum_block + 1
       to = min(k*sum_block, size(a))

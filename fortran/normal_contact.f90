@@ -107,6 +107,7 @@ contains
         call new_fft_flexibility(level%flexibility, level%lattice, pair, error, normal_only=.true., n_threads=n_threads)
         if (allocated(error)) return
         call new_preconditioner(level%preconditioner, level%lattice, pair, error, n_threads)
+        level%n_threads = level%flexibility%convolution%n_threads
         if (allocated(error)) return
       end associate
     end do
@@ -289,7 +290,7 @@ contains
     if (control == load_control) then
       factor = target/(level%lattice%cell_area()*sum(p))
     else
-      factor = max(dot(p, target - h), 0.0_wp)/dot(p, w)
+      factor = max(dot(p, target - h, level%n_threads), 0.0_wp)/dot(p, w, level%n_threads)
     end if
     p = factor*p
     w = factor*w

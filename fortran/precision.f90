@@ -4,10 +4,13 @@ module hc_precision
   implicit none
   private
 
-  public :: wp, pi
+  public :: wp, xp, pi
 
   !> Kind of every real in the library; every literal carries it.
   integer, parameter :: wp = real64
+
+  !> Kind of the few sums that cancel: thirty digits or more, or wp where there is none.
+  integer, parameter :: xp = merge(selected_real_kind(30), wp, selected_real_kind(30) > 0)
 
   !> Circle constant.
   real(wp), parameter :: pi = 3.14159265358979323846_wp

@@ -49,7 +49,7 @@ contains
     call new_convolution(self%convolution, lattice%extent, length, 1, 1, error, n_threads=n_threads)
     if (allocated(error)) return
     scale = 1.0_wp/(pair%lambda_1*product(real(length, wp)))
-    !$omp parallel do private(f, i)
+    !$omp parallel do num_threads(self%convolution%n_threads) private(f, i)
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
       do i = 1, size(f, 2)

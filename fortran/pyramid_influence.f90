@@ -143,7 +143,7 @@ contains
     integer :: n(2), i, j
 
     n = [size(table, 2)/2, size(table, 3)/2]
-    !$omp parallel do schedule(dynamic, 8) private(i)
+    !$omp parallel do schedule(dynamic, 8) private(i) if (n(2) > 60)
     do j = 0, n(2)
       do i = -n(1), n(1)
         if (j == 0 .and. i < 0) cycle

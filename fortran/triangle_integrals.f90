@@ -16,11 +16,11 @@
 !> many points at a time, and share the points out over threads.
 module hc_triangle_integrals
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, xp, pi
   use hc_error, only: error_t, status, raise
   use hc_edge_form, only: edge_form, vertex_loads, twice_area
-  use hc_edge_form_extended, only: xp, edge_form_extended => edge_form, vertex_loads_extended => vertex_loads, &
-    twice_area_extended => twice_area
+  use hc_edge_form_extended, only: edge_form_extended => edge_form, &
+    vertex_loads_extended => vertex_loads, twice_area_extended => twice_area
   implicit none
   private
 

@@ -36,6 +36,7 @@ contains
       new_test('hertz', test_hertz), &
       new_test('flat_punch', test_flat_punch), &
       new_test('methods_agree', test_methods_agree), &
+      new_test('any_start', test_any_start), &
       new_test('nothing_touches', test_nothing_touches), &
       new_test('threads', test_threads), &
       new_test('not_converged', test_not_converged), &
@@ -50,7 +51,7 @@ contains
     integer :: i
 
     a = [(real(i, wp), i=1, size(a))]
-    call check(error, dot(a, a), 10001.0_wp*10002.0_wp*20003.0_wp/6.0_wp, 1.0e-3_wp, 'sum of squares')
+    call check(error, dot(a, a, 2), 10001.0_wp*10002.0_wp*20003.0_wp/6.0_wp, 1.0e-3_wp, 'sum of squares')
   end subroutine test_dot
 
   !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
@@ -208,11 +209,11 @@ contains
     integer :: i
 
     pair = elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp)
-    do i = 1, 4
+    do i = 1, 40
       call paraboloid(12, lattice, gap, candidate, error)
       if (allocated(error)) return
       call random_number(noise)
-      gap = gap + 0.3_wp*i*noise
+      gap = gap + 0.05_wp*i*noise**3
       candidate = noise < 0.9_wp
       call new_normal_contact(contact, lattice, pair, gap, candidate, error)
       if (allocated(error)) return
@@ -231,6 +232,38 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_methods_agree
+
+  !> Nodes enter and leave: one node, its complement and a random half lead to the same contact.
+  subroutine test_any_start(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(direct_contact_t) :: direct
+    type(contact_state_t) :: state, expected
+    real(wp) :: gap(25, 25), noise(25, 25)
+    logical :: candidate(25, 25), start(25, 25)
+    integer :: i
+
+    call paraboloid(12, lattice, gap, candidate, error)
+    if (allocated(error)) return
+    call random_number(noise)
+    call new_direct_contact(direct, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap + 0.1_wp*noise, candidate, error)
+    if (allocated(error)) return
+    call direct%solve(load_control, 1.0_wp, 1.0e-10_wp, 80, expected, error)
+    if (allocated(error)) return
+    do i = 1, 3
+      start = .false.
+      start(1, 1) = .true.
+      if (i == 2) start = .not. start
+      if (i == 3) start = noise < 0.5_wp
+      call direct%solve(load_control, 1.0_wp, 1.0e-10_wp, 80, state, error, start)
+      if (allocated(error)) return
+      call check_true(error, state%converged, 'converged')
+      if (allocated(error)) return
+      call check(error, reshape(state%pressure, [625]), reshape(expected%pressure, [625]), &
+                 1.0e-10_wp*maxval(expected%pressure), 'pressure')
+      if (allocated(error)) return
+    end do
+  end subroutine test_any_start
 
   !> No load, and an approach short of first touch.
   subroutine test_nothing_touches(error)

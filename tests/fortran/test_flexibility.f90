@@ -9,6 +9,7 @@ module test_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_contact_residuals, only: normal_self_compliance
   use hc_lattice_symbol, only: normal_symbol
+  use hc_triangle_integrals, only: linear_load_displacement
   use hc_preconditioner, only: preconditioner_t, new_preconditioner
   use testing, only: test_t, new_test, check, check_raised, check_true
   implicit none
@@ -38,6 +39,7 @@ contains
     tests = [ &
       new_test('elastic_pair', test_elastic_pair), &
       new_test('bad_materials', test_bad_materials), &
+      new_test('two_half_spaces', test_two_half_spaces), &
       new_test('dense_equals_fft', test_dense_equals_fft), &
       new_test('any_lattice', test_any_lattice), &
       new_test('components', test_components), &
@@ -88,6 +90,53 @@ contains
     call new_elastic_pair(pair, material_t(rigid=.true.), material_t(rigid=.true.), raised)
     call check_raised(error, raised, status%invalid_input, 'two rigid bodies')
   end subroutine test_bad_materials
+
+  !> The operator against the two half-spaces apart, six triangles of linear traction at a time.
+  !>
+  !> Body 2 is seen in its mirrored frame, in which the tangential tractions are reversed.
+  subroutine test_two_half_spaces(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(material_t) :: body(2)
+    type(elastic_pair_t) :: pair
+    type(dense_flexibility_t) :: dense
+    real(wp) :: traction(7, 7, 3), answer(7, 7, 3), x(7, 7), y(7, 7), load(3), u(3, 2), triangle(2, 3), corner(3, 3)
+    integer :: i, b, col, row
+    integer, parameter :: around(2, 7) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1, 1, 0], [2, 7])
+
+    body = [material_t(2.0_wp, 0.25_wp), material_t(5.0_wp, 0.1_wp)]
+    call new_elastic_pair(pair, body(1), body(2), error)
+    if (allocated(error)) return
+    call new_lattice(lattice, equilateral_basis(0.5_wp), [-3, -3], [7, 7], error)
+    if (allocated(error)) return
+    call new_dense_flexibility(dense, lattice, pair, error)
+    if (allocated(error)) return
+    load = [1.0_wp, 0.7_wp, -0.4_wp]                      ! p, q_x, q_y of the node (0, 0)
+    traction = 0.0_wp
+    traction(4, 4, :) = load
+    call dense%apply(all_components, traction, all_components, answer, error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    do row = 1, 7
+      do col = 1, 7
+        u = 0.0_wp
+        do b = 1, 2
+          corner = 0.0_wp
+          corner(:, 1) = merge([load(2), load(3), load(1)], [-load(2), -load(3), load(1)], b == 1)
+          do i = 1, 6
+            triangle(:, 1) = 0.0_wp
+            triangle(:, 2) = matmul(lattice%basis, around(:, i))
+            triangle(:, 3) = matmul(lattice%basis, around(:, i + 1))
+            u(:, b) = u(:, b) + linear_load_displacement(triangle, x(col, row), y(col, row), corner, &
+                                  body(b)%young_modulus/(2 + 2*body(b)%poisson_ratio), body(b)%poisson_ratio)
+          end do
+        end do
+        call check(error, answer(col, row, :), [u(3, 1) + u(3, 2), u(1, 1) - u(1, 2), u(2, 1) - u(2, 2)], &
+                   1.0e-13_wp, 'closing of the gap and tangential displacement')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_two_half_spaces
 
   !> Both operators agree to 1e-12 on random tractions.
   subroutine test_dense_equals_fft(error)

@@ -23,7 +23,8 @@ contains
       new_test('coordinates', test_coordinates), &
       new_test('bad_input', test_bad_input), &
       new_test('coarsened', test_coarsened), &
-      new_test('prolongation', test_prolongation) &
+      new_test('prolongation', test_prolongation), &
+      new_test('prolonged_hat', test_prolonged_hat) &
     ]
   end subroutine collect_lattice
 
@@ -110,5 +111,22 @@ contains
     if (allocated(error)) return
     call check_true(error, count(restrict_mask(lattice, field > 0.0_wp, coarse)) == count(coarse_field > 0.0_wp), 'mask')
   end subroutine test_prolongation
+
+  !> A coarse pyramid has half its height at the six fine neighbors of its node.
+  subroutine test_prolonged_hat(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice, coarse
+    real(wp) :: x(9, 9), y(9, 9), hat(9, 9), coarse_hat(5, 5)
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-4, -4], [9, 9], error)
+    if (allocated(error)) return
+    coarse = lattice%coarsened()
+    coarse_hat = 0.0_wp
+    coarse_hat(3, 3) = 1.0_wp
+    call prolong(coarse, coarse_hat, lattice, hat)
+    call lattice%coordinates(x, y)
+    call check(error, reshape(hat, [81]), reshape(merge(1.0_wp, merge(0.5_wp, 0.0_wp, hypot(x, y) < 1.1_wp), &
+               hypot(x, y) < 0.1_wp), [81]), thr, 'height at the fine nodes')
+  end subroutine test_prolonged_hat
 
 end module test_lattice

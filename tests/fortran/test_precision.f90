@@ -1,7 +1,7 @@
 !> Kinds, constants and the error type.
 module test_precision
   use, intrinsic :: iso_fortran_env, only: real64
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, xp, pi
   use hc_error, only: error_t, status, raise
   use testing, only: test_t, new_test, check, check_true
   implicit none
@@ -27,6 +27,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call check(error, wp, real64, 'working precision is binary64')
+    if (allocated(error)) return
+    call check_true(error, precision(1.0_xp) >= 30 .or. (selected_real_kind(30) < 0 .and. xp == wp), &
+                    'extended precision has thirty digits where the compiler has such a kind')
   end subroutine test_kind
 
   subroutine test_pi(error)

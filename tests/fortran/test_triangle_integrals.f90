@@ -310,7 +310,7 @@ contains
 
     integer, parameter :: loads(2, 4) = reshape([0, 0, 1, 0, 0, 1, 1, 1], [2, 4])
     character(len=*), parameter :: names(4) = ['constant', 'linear x', 'linear y', 'bilinear']
-    real(wp) :: points(2, 40), a, b, c, expected(3, 3)
+    real(wp) :: points(2, 40), a, b, c, expected(3, 3), bound
     integer :: s, p, q, direction
 
     a = (1.0_wp - nu)/(2.0_wp*pi*g)
@@ -324,9 +324,10 @@ contains
             expected(:, 1) = [a*i(1, k, m) + c*i(3, k + 2, m), c*i(3, k + 1, m + 1), b*i(2, k + 1, m)]
             expected(:, 2) = [c*i(3, k + 1, m + 1), a*i(1, k, m) + c*i(3, k, m + 2), b*i(2, k, m + 1)]
             expected(:, 3) = [-b*i(2, k + 1, m), -b*i(2, k, m + 1), a*i(1, k, m)]
+            bound = round_off*a*envelope(shapes(:, :, s), points(1, p), points(2, p), 1, k, m)
             do direction = 1, 3
-              call check(error, load_displacement(shapes(:, :, s), points(1, p), points(2, p), direction, k, m, g, nu), &
-                         expected(:, direction), round_off*a*envelope(shapes(:, :, s), points(1, p), points(2, p), 1, k, m), &
+              call check(error, load_displacement(shapes(:, :, s), points(1, p), points(2, p), direction, k, m, g, &
+                                                  nu), expected(:, direction), bound, &
                          'displacement by a '//names(q)//' load')
               if (allocated(error)) return
             end do
@@ -360,7 +361,8 @@ contains
         associate (v => shapes(:, :, s), x => points(1, p), y => points(2, p))
           expected = 0.0_wp
           do d = 1, 3
-            expected = expected + (value(d) + slope(1, d)*x + slope(2, d)*y)*load_displacement(v, x, y, d, 0, 0, g, nu) &
+            expected = expected &
+                       + (value(d) + slope(1, d)*x + slope(2, d)*y)*load_displacement(v, x, y, d, 0, 0, g, nu) &
                        - slope(1, d)*load_displacement(v, x, y, d, 1, 0, g, nu) &
                        - slope(2, d)*load_displacement(v, x, y, d, 0, 1, g, nu)
           end do
@@ -476,7 +478,7 @@ contains
       case (11); call evaluate_displacement(v, x, y, 3, 0, 0, g, 0.51_wp, u, raised)
       case (12); call evaluate_displacement(v, x, y, 3, 0, 0, g, -1.0_wp, u, raised)
       case (13); call evaluate_linear_displacement(v, x, y, traction*nan, g, nu, u, raised)
-      case (14); call evaluate_linear_displacement(v, x, [0.0_wp, nan], traction, g, nu, u, raised)
+      case default; call evaluate_linear_displacement(v, x, [0.0_wp, nan], traction, g, nu, u, raised)
       end select
       call check_raised(error, raised, status%invalid_input, 'wrong argument')
       if (allocated(error)) return

@@ -33,6 +33,7 @@ module testing
     !> One test
     subroutine test_interface(error)
       import :: error_t
+      implicit none
       !> Allocated if the test has failed
       type(error_t), allocatable, intent(out) :: error
     end subroutine test_interface
@@ -40,6 +41,7 @@ module testing
     !> Lists the tests of a suite
     subroutine collect_interface(tests)
       import :: test_t
+      implicit none
       !> Tests, in the order they are run
       type(test_t), allocatable, intent(out) :: tests(:)
     end subroutine collect_interface
@@ -271,9 +273,13 @@ contains
       call fail(error, 'cannot read '//data_file(name))
       return
     end if
-    first = '#'
-    do while (first == '#' .and. stat == 0)
+    do
       read (unit, '(a)', iostat=stat) first
+      if (stat /= 0) then
+        call fail(error, 'no line of column names in '//data_file(name))
+        return
+      end if
+      if (first /= '#') exit
     end do
   end subroutine open_table
 

@@ -75,9 +75,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     if (body%rigid) return
-    if (.not. (body%young_modulus > 0.0_wp .and. ieee_is_finite(body%young_modulus))) then
-      call raise(error, status%invalid_input, 'Young''s modulus of '//name//': a positive, finite number expected')
-    else if (.not. (body%poisson_ratio > -1.0_wp .and. body%poisson_ratio <= 0.5_wp)) then
+    ! finite first: a comparison with NaN may be trapped
+    if (.not. all(ieee_is_finite([body%young_modulus, body%poisson_ratio]))) then
+      call raise(error, status%invalid_input, 'the elastic constants of '//name//': finite numbers expected')
+    else if (body%young_modulus <= 0.0_wp) then
+      call raise(error, status%invalid_input, 'Young''s modulus of '//name//': a positive number expected')
+    else if (body%poisson_ratio <= -1.0_wp .or. body%poisson_ratio > 0.5_wp) then
       call raise(error, status%invalid_input, &
                  'Poisson''s ratio of '//name//': a number above -1 and at most 0.5 expected')
     end if

@@ -1,5 +1,6 @@
 !> The flexibility operators: explicit matrix and convolution.
 module test_flexibility
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
@@ -77,11 +78,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: raised
     type(elastic_pair_t) :: pair
-    type(material_t) :: good, bad(4)
+    type(material_t) :: good, bad(5)
     integer :: i
 
     good = material_t(1.0_wp, 0.3_wp)
-    bad = [material_t(-1.0_wp, 0.3_wp), material_t(0.0_wp, 0.3_wp), material_t(1.0_wp, 0.6_wp), material_t(1.0_wp, -1.0_wp)]
+    bad = [material_t(-1.0_wp, 0.3_wp), material_t(0.0_wp, 0.3_wp), material_t(1.0_wp, 0.6_wp), material_t(1.0_wp, -1.0_wp), &
+           material_t(ieee_value(1.0_wp, ieee_quiet_nan), 0.3_wp)]
     do i = 1, size(bad)
       call new_elastic_pair(pair, good, bad(i), raised)
       call check_raised(error, raised, status%invalid_input, 'a bad material')

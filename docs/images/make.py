@@ -1,0 +1,31 @@
+"""Make the pictures of the README and the documentation: ``python docs/images/make.py``."""
+
+from pathlib import Path
+
+from hexcontact import Case, plotting, plotting_influence
+
+HERE = Path(__file__).parent
+CASES = HERE.parents[1] / "cases"
+
+
+def main() -> None:
+    """Solve the cases and draw them."""
+    spheres = Case.from_toml(CASES / "hertz_spheres.toml").run()
+    coarse = Case.from_toml(CASES / "hertz_spheres.toml", overrides={"grid.spacing": "0.1 mm"}).run()
+    cylinders = Case.from_toml(
+        CASES / "crossed_cylinders.toml",
+        overrides={"body.2.surface.angle": "45 deg", "grid.spacing": "0.05 mm"},
+    ).run()
+    figures = {
+        "hertz_spheres": plotting.overview(spheres),
+        "contact_boundary": plotting.contact_boundary(coarse),
+        "crossed_cylinders": plotting.overview(cylinders),
+        **{name.replace("-", "_"): draw() for name, draw in plotting_influence.FIGURES.items()},
+    }
+    for name, figure in figures.items():
+        figure.savefig(HERE / f"{name}.png", dpi=150)
+        print(f"written: {HERE / name}.png")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""Semi-analytical solver for the three-dimensional contact of elastic half-spaces.
+
+The names below are imported when they are first used, so that ``import hexcontact`` costs nothing.
+
+Examples
+--------
+>>> import hexcontact
+>>> result = hexcontact.Case.from_toml("hertz_spheres.toml").run()  # doctest: +SKIP
+>>> result.max_pressure.values  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
+
+if TYPE_CHECKING:
+    from . import analytic, influence, plotting
+    from .case import Case
+    from .lattice import Lattice
+    from .native import ElasticPair, FlexibilityOperator, NormalContact
+    from .result import Result, Step
+    from .store import open_result
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Case": "case",
+    "ElasticPair": "native",
+    "FlexibilityOperator": "native",
+    "Lattice": "lattice",
+    "NormalContact": "native",
+    "Result": "result",
+    "Step": "result",
+    "open_result": "store",
+}
+_MODULES = ("analytic", "influence", "plotting")
+
+__all__ = [
+    "Case",
+    "ConvergenceError",
+    "DeckError",
+    "ElasticPair",
+    "FlexibilityOperator",
+    "HexcontactError",
+    "Lattice",
+    "NormalContact",
+    "ResourceError",
+    "Result",
+    "Step",
+    "analytic",
+    "influence",
+    "open_result",
+    "plotting",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
+    if name in _HOME:
+        return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -1,0 +1,485 @@
+"""A checked contact problem in SI units: what a deck or a Python script asks for, ready to be solved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import deck as decks
+from . import grid as grids
+from . import native
+from .case_arguments import as_toml, body_keys, given, with_radians
+from .deck import Deck
+from .errors import DeckError
+from .grid import Estimate, NoContactFound
+from .lattice import Lattice
+from .load_history import LoadStep, Target, load_steps
+from .messages import MISSING, Problem, Source, deck_error
+from .native import ElasticPair
+from .surfaces import Separation, Surface, principal_curvatures
+
+if TYPE_CHECKING:
+    from .result import Result
+
+__all__ = ["Body", "Case", "LoadStep", "OutputSettings", "SolverSettings", "Target"]
+
+Array = NDArray[np.float64]
+
+# Windows of up to so many nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
+MOST_DIRECT_NODES = 200
+
+FRICTIONLESS_FIELDS = (
+    "pressure",
+    "gap",
+    "zone",
+    *(name for name in decks.FIELDS if name.startswith("displacement_")),
+)
+
+
+@dataclass(frozen=True)
+class Body:
+    """One of the two bodies.
+
+    Attributes
+    ----------
+    young_modulus : float or None
+        Young's modulus (Pa); None for a rigid body.
+    poisson_ratio : float or None
+        Poisson's ratio; None for a rigid body.
+    rigid : bool
+        Whether the body is rigid.
+    surface : Surface or None
+        Shape of its surface; None for a flat one, or if the gap of the case is given as a whole.
+    """
+
+    young_modulus: float | None = None
+    poisson_ratio: float | None = None
+    rigid: bool = False
+    surface: Surface | None = None
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """How a case is solved; see [solver] in the deck reference."""
+
+    algorithm: str = "frictionless"
+    method: str = "auto"
+    tolerance: float = 1e-8
+    coupling: str = "full"
+
+
+@dataclass(frozen=True)
+class OutputSettings:
+    """What is kept of a run; see [output] in the deck reference. No fields: all there are."""
+
+    file: Path | None = None
+    fields: tuple[str, ...] = ()
+    every: int = 1
+
+
+class Case:
+    """A checked contact problem.
+
+    Made from a deck by `from_toml` or `from_dict`, or here from arguments in SI units, which are checked in
+    the same way and complained about with the same keys.
+
+    Parameters
+    ----------
+    body_1, body_2 : Body or mapping
+        The bodies; a mapping has the keys of [body.1].
+    gap : callable or array_like, optional
+        Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m), or an array
+        (n_row, n_col) over the nodes of the window. Infinite where nothing can touch. The approach is
+        measured from gap = 0.
+    lattice : Lattice, optional
+        The window, instead of the keyword arguments of the grid.
+    spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
+        Keys of [grid].
+    normal_load, approach : float, optional
+        The only load (N) or motion (m), in one step or in `steps`.
+    steps : int, optional
+        Number of equal increments of it.
+    loads : sequence of mappings, optional
+        Entries of [[load]] instead, for anything more; twist in rad.
+    friction_coefficient : float, optional
+        Coefficient of friction; frictionless if absent.
+    algorithm, method, tolerance, coupling : optional
+        Keys of [solver].
+    fields, every : optional
+        Keys of [output].
+    title : str, optional
+        A line about the case.
+
+    Attributes
+    ----------
+    title : str
+        A line about the case.
+    body_1, body_2 : Body
+        The bodies.
+    pair : ElasticPair
+        Their compliances.
+    friction_coefficient : float
+        Coefficient of friction.
+    solver : SolverSettings
+        How it is solved.
+    load_steps : tuple of LoadStep
+        The history.
+    output : OutputSettings
+        What is kept.
+    deck_text : str
+        The case as a deck.
+    lattice : Lattice
+        The window to start with.
+    window_fixed : bool
+        Whether the size of the window was given: contact at its rim is an error then, otherwise the window
+        grows.
+
+    Raises
+    ------
+    DeckError
+        With a sentence for each thing that is wrong.
+
+    Examples
+    --------
+    >>> from hexcontact import Case
+    >>> from hexcontact.surfaces import Sphere
+    >>> steel = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    >>> case = Case(
+    ...     body_1={**steel, "surface": Sphere(radius=10e-3)},
+    ...     body_2=steel,
+    ...     nodes_in_radius=20,
+    ...     normal_load=100.0,
+    ... )
+    >>> round(case.pair.effective_modulus / 1e9, 2)
+    115.38
+    """
+
+    title: str
+    body_1: Body
+    body_2: Body
+    pair: ElasticPair
+    friction_coefficient: float
+    solver: SolverSettings
+    load_steps: tuple[LoadStep, ...]
+    output: OutputSettings
+    deck_text: str
+    lattice: Lattice
+    window_fixed: bool
+
+    def __init__(
+        self,
+        *,
+        body_1: Body | Mapping[str, Any],
+        body_2: Body | Mapping[str, Any],
+        gap: Callable[[Array, Array], ArrayLike] | ArrayLike | None = None,
+        lattice: Lattice | None = None,
+        spacing: float | None = None,
+        nodes_across: int | None = None,
+        nodes_in_radius: float | None = None,
+        extent: str | Sequence[float] | None = None,
+        window: Sequence[int] | None = None,
+        center: Sequence[float] | None = None,
+        origin: Sequence[float] | None = None,
+        normal_load: float | None = None,
+        approach: float | None = None,
+        steps: int | None = None,
+        loads: Sequence[Mapping[str, Any]] | None = None,
+        friction_coefficient: float | None = None,
+        algorithm: str | None = None,
+        method: str | None = None,
+        tolerance: float | None = None,
+        coupling: str | None = None,
+        fields: Sequence[str] | None = None,
+        every: int | None = None,
+        title: str = "",
+    ) -> None:
+        array = None if gap is None or callable(gap) else np.array(gap, dtype=float)
+        if lattice is not None:
+            spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
+        elif array is not None and window is None and array.ndim == 2:
+            window = array.shape
+        if loads is None:
+            loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
+        elif normal_load is not None or approach is not None or steps is not None:
+            raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
+        data = given(
+            title=title or None,
+            body={"1": body_keys(body_1), "2": body_keys(body_2)},
+            friction=given(coefficient=friction_coefficient) or None,
+            grid=given(
+                spacing=spacing,
+                nodes_across=nodes_across,
+                nodes_in_radius=nodes_in_radius,
+                extent=extent,
+                window=window,
+                center=center,
+                origin=origin,
+            ),
+            solver=given(algorithm=algorithm, method=method, tolerance=tolerance, coupling=coupling) or None,
+            load=[with_radians(load) for load in loads],
+            output=given(fields=fields, every=every) or None,
+        )
+        self._set_up(data, None, Source(), gap if callable(gap) else array, lattice)
+
+    @classmethod
+    def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
+        """Read a deck.
+
+        Parameters
+        ----------
+        path : str or Path
+            The deck.
+        overrides : mapping, optional
+            Values for single keys in place of the deck's: ``{"grid.spacing": "0.1 mm", "load.1.steps": 5}``.
+            Entries of arrays count from 1; None removes a key.
+
+        Raises
+        ------
+        DeckError
+            If it cannot be read, or with a sentence for each thing that is wrong with it.
+        """
+        data, text = decks.read_toml(path)
+        if not overrides:
+            return cls._made(data, text, Source(str(path), text))
+        data = decks.with_overrides(data, overrides)
+        return cls._made(data, None, Source(str(path), text, frozenset(overrides)))
+
+    @classmethod
+    def from_text(cls, text: str, name: str = "deck") -> Case:
+        """Read a deck from its text (as a result file keeps it); `name` is what messages call it."""
+        return cls._made(decks.parse_toml(text, name), text, Source(name, text))
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Case:
+        """Make a case from the tables of a deck: ``{"body": {"1": {...}, ...}, "grid": {...}, ...}``."""
+        return cls._made(data, None, Source())
+
+    @classmethod
+    def _made(cls, data: Mapping[str, Any], text: str | None, source: Source) -> Case:
+        case = cls.__new__(cls)
+        case._set_up(data, text, source, None, None)
+        return case
+
+    def _set_up(
+        self,
+        data: Mapping[str, Any],
+        text: str | None,
+        source: Source,
+        gap: Callable[[Array, Array], ArrayLike] | Array | None,
+        lattice: Lattice | None,
+    ) -> None:
+        deck = Deck.parse(data, source)
+        self.deck_text = as_toml(data, gap is not None) if text is None else text
+        self.title = deck.title
+        self.body_1, self.body_2 = _body(deck.body.body_1), _body(deck.body.body_2)
+        self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
+        algorithm, problems = _algorithm(deck)
+        self.solver = SolverSettings(
+            algorithm, deck.solver.method, deck.solver.tolerance, deck.solver.coupling
+        )
+        self.output = OutputSettings(
+            Path(deck.output.file) if deck.output.file else None, deck.output.fields or (), deck.output.every
+        )
+        mu = 0.0 if algorithm == "frictionless" else self.friction_coefficient
+        self.load_steps, of_history = load_steps(deck.load, mu)
+        problems += of_history + _field_problems(deck, algorithm)
+        self._surface_gap: Separation | None = None
+        if gap is None:
+            self._surface_gap = Separation(deck.body.body_1.surface, deck.body.body_2.surface)
+            problems += _touching_problems(self._surface_gap)
+        elif self.body_1.surface is not None or self.body_2.surface is not None:
+            problems.append(
+                Problem(("gap",), MISSING, "expected either a gap or surfaces of the bodies, not both")
+            )
+        self._given_gap = gap
+        if problems:
+            raise deck_error(problems, source)
+
+        self.pair = ElasticPair.from_materials(
+            self.body_1.young_modulus,
+            self.body_1.poisson_ratio,
+            self.body_2.young_modulus,
+            self.body_2.poisson_ratio,
+        )
+        self.window_fixed = grids.is_fixed(deck.grid) or isinstance(gap, np.ndarray)
+        self.lattice = self._size(deck.grid, source, lattice)
+
+    # --- what solving needs ---------------------------------------------------------------------------------
+
+    def initial_gap(self, lattice: Lattice) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the gap before loading, over the nodes of a window.
+
+        Parameters
+        ----------
+        lattice : Lattice
+            The window.
+
+        Returns
+        -------
+        gap : ndarray, (n_row, n_col)
+            Initial gap (m) from first touch; inf where nothing can touch.
+        candidate : ndarray of bool, (n_row, n_col)
+            False where the two bodies can never touch, as outside a punch.
+
+        Raises
+        ------
+        DeckError
+            If a gap given in Python does not fit the window or is not a number somewhere.
+        """
+        if isinstance(self._given_gap, np.ndarray):
+            gap = self._given_gap
+        else:
+            gap = self._gap_at(lattice.x, lattice.y)
+        if gap.shape != lattice.shape:
+            raise DeckError(
+                f"gap: expected an array of shape {lattice.shape} (n_row, n_col), not {gap.shape}"
+            )
+        if np.isnan(gap).any() or np.isneginf(gap).any():
+            raise DeckError("gap: expected numbers, or inf where nothing can touch, at every node")
+        return gap, np.isfinite(gap)
+
+    def grown(self, lattice: Lattice, contact: NDArray[np.bool_] | None = None) -> Lattice:
+        """Return a larger window with the same nodes, for a contact that reached the rim.
+
+        Parameters
+        ----------
+        lattice : Lattice
+            The window that became too small.
+        contact : ndarray of bool, (n_row, n_col), optional
+            The nodes in contact: only the sides that they reach grow, by a quarter each. All sides without
+            it.
+        """
+        return grids.grown(lattice) if contact is None else grids.grown(lattice, grids.rim_sides(contact))
+
+    def method_for(self, lattice: Lattice) -> str:
+        """Return the method to use on a window, "direct" or "fft"; decides what "auto" means."""
+        if self.solver.method != "auto":
+            return self.solver.method
+        return "direct" if lattice.n_row * lattice.n_col <= MOST_DIRECT_NODES else "fft"
+
+    def memory_needed(self, lattice: Lattice) -> int:
+        """Return the memory (bytes) that solving on a window takes."""
+        return native.memory_needed(self.method_for(lattice), lattice.n_row, lattice.n_col)
+
+    def run(
+        self,
+        output: str | Path | None = None,
+        overwrite: bool = False,
+        on_step: Callable[..., object] | None = None,
+        progress: Any = None,
+    ) -> Result:
+        """Solve the case; see `hexcontact.solve.run`."""
+        from . import solve
+
+        return solve.run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
+
+    def __repr__(self) -> str:
+        """Name the case, its window and its steps."""
+        rows, cols = self.lattice.shape
+        title = f"{self.title!r}, " if self.title else ""
+        return (
+            f"Case({title}{self.solver.algorithm}, {rows} x {cols} nodes, {len(self.load_steps)} load steps)"
+        )
+
+    # --- the window -----------------------------------------------------------------------------------------
+
+    def _gap_at(self, x: Array, y: Array) -> Array:
+        if self._surface_gap is not None:
+            return self._surface_gap(x, y)
+        assert callable(self._given_gap)
+        return np.asarray(self._given_gap(x, y), dtype=float)
+
+    def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:
+        """Return the window, checked against an estimate of the contact wherever there is one."""
+        touch = self._surface_gap.first_touch[:2] if self._surface_gap is not None else (0.0, 0.0)
+        center = grid.center or touch
+        if isinstance(self._given_gap, np.ndarray):
+            if grid.spacing is None or grid.window is None:
+                sentence = "an array gap needs a spacing and a window of its shape"
+                raise deck_error([Problem(("grid",), MISSING, sentence)], source)
+            lattice = lattice or grids.centered(grid.spacing, center, grid.window, grid.origin)
+            self.initial_gap(lattice)
+            return lattice
+        try:
+            estimate = self._estimate(center if self._surface_gap is None else touch, grid.origin)
+        except NoContactFound as error:
+            raise deck_error(
+                [Problem(("grid",), MISSING, f"no window can be found: {error}")], source
+            ) from None
+        lattice = lattice or grids.window(grid, center, estimate)
+        if problems := grids.check(grid, lattice, estimate):
+            raise deck_error(problems, source)
+        return lattice
+
+    def _estimate(self, center: tuple[float, float], origin: tuple[float, float]) -> Estimate:
+        """Estimate the contact at the largest load of the history, by force and by approach."""
+        largest = {
+            name: max((s.z.value for s in self.load_steps if s.z.control == control), default=0.0)
+            for name, control in (("normal_load", "force"), ("approach", "displacement"))
+        }
+        found = [
+            grids.estimate_contact(self.pair, self._gap_at, center, origin, **{name: value})
+            for name, value in largest.items()
+            if value > 0
+        ]
+        return found[0] if len(found) == 1 else found[0].joined(found[1])
+
+
+# --- from deck to case --------------------------------------------------------------------------------------
+
+
+def _body(body: decks.Body) -> Body:
+    surface = None if body.surface.shape == "flat" else body.surface
+    return Body(body.young_modulus, body.poisson_ratio, body.rigid, surface)
+
+
+def _algorithm(deck: Deck) -> tuple[str, list[Problem]]:
+    """Return the algorithm that a deck asks for, and what stands against it."""
+    given, mu = deck.solver.algorithm, deck.friction.coefficient if deck.friction else None
+    algorithm = given or ("incremental" if mu else "frictionless")
+    problems = []
+    if algorithm == "frictionless" and mu:
+        sentence = 'expected 0, since solver.algorithm = "frictionless"'
+        problems.append(Problem(("friction", "coefficient"), mu, sentence))
+    if algorithm != "frictionless" and mu is None:
+        sentence = (
+            f'missing; expected a number of at least 0 (or inf), since solver.algorithm = "{algorithm}"'
+        )
+        problems.append(Problem(("friction", "coefficient"), MISSING, sentence))
+    if algorithm != "frictionless":
+        # The one place that holds friction back.
+        key, value = (("solver", "algorithm"), given) if given else (("friction", "coefficient"), mu)
+        problems.append(Problem(key, value, "this version solves frictionless contact only"))
+    return algorithm, problems
+
+
+def _field_problems(deck: Deck, algorithm: str) -> list[Problem]:
+    """Complain about fields that a frictionless run does not yield."""
+    known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else decks.FIELDS
+    missing = [name for name in deck.output.fields or () if name not in known]
+    if not missing:
+        return []
+    sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
+    return [Problem(("output", "fields"), deck.output.fields, sentence)]
+
+
+def _touching_problems(gap: Separation) -> list[Problem]:
+    """Complain about surfaces that never touch, or that touch along a line or all over, without end."""
+    try:
+        gap.first_touch  # noqa: B018 (worked out here, kept for later)
+    except DeckError as error:
+        return [Problem(("body", "2", "surface"), MISSING, str(error))]
+    one, two = gap.surface_1.curvature, gap.surface_2.curvature
+    if one is None or two is None:
+        return []
+    smaller, larger, _ = principal_curvatures(one + two)
+    if smaller > 1e-12 * larger:
+        return []
+    where = "everywhere" if larger == 0 else "along a line"
+    sentence = f"the two surfaces touch {where}, so the contact has no end; expected a shape that bounds it"
+    return [Problem(("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), MISSING, sentence)]

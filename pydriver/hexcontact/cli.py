@@ -1,0 +1,355 @@
+"""The command ``hexcontact``.
+
+Every command imports what it needs when it runs, so that ``hexcontact --help`` comes at once.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import signal
+import sys
+import threading
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, TypeVar
+
+import typer
+
+from . import __version__
+from .errors import DeckError, HexcontactError, ResourceError
+
+if TYPE_CHECKING:
+    from .case import Case
+    from .result import Result
+    from .store import Store
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+app = typer.Typer(
+    name="hexcontact",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main() -> None:
+    """Entry point of the command."""
+    # Threads that wait spin by default, which on a busy machine takes the core from those that work.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a terminal without µ gets a question mark, not a traceback
+    app()
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    for line in message.splitlines() or [""]:
+        print(f"hexcontact: {line}", file=sys.stderr)
+    raise typer.Exit(code)
+
+
+def _guarded(command: Callable[P, R]) -> Callable[P, R]:
+    """Turn what goes wrong into a sentence and an exit code; HEXCONTACT_DEBUG=1 shows tracebacks instead."""
+
+    @functools.wraps(command)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return command(*args, **kwargs)
+        except BrokenPipeError:
+            raise
+        except KeyboardInterrupt:
+            _fail("interrupted", 130)
+        except Exception as error:
+            if os.environ.get("HEXCONTACT_DEBUG"):
+                raise
+            if isinstance(error, HexcontactError):
+                _fail("\n".join([str(error), *getattr(error, "__notes__", ())]), error.exit_code)
+            if isinstance(error, MemoryError):
+                _fail("the machine has not enough memory for this", ResourceError.exit_code)
+            if isinstance(error, OSError) and error.strerror:
+                named = f"{error.filename}: " if error.filename else ""
+                _fail(named + error.strerror, DeckError.exit_code)
+            if isinstance(error, RuntimeError | OSError) and "NetCDF" in str(error):
+                _fail(f"the result file is damaged ({error})", DeckError.exit_code)
+            raise
+
+    return wrapped
+
+
+# --- interruption ---------------------------------------------------------------------------------
+
+
+class _Terminated(BaseException):
+    """SIGTERM has come."""
+
+
+def _on_sigterm(*_: object) -> NoReturn:
+    raise _Terminated
+
+
+def _in_background(work: Callable[[], None]) -> None:
+    """Do `work` in a second thread while this one waits for it, and for signals.
+
+    The compiled core cannot be interrupted; a thread that waits can.
+    """
+    raised: list[BaseException] = []
+
+    def worker() -> None:
+        try:
+            work()
+        except BaseException as error:
+            raised.append(error)
+
+    thread = threading.Thread(target=worker, daemon=True)
+    thread.start()
+    thread.join()
+    if raised:
+        raise raised[0]
+
+
+def _leave(store: Store, code: int) -> NoReturn:
+    """Say what is kept after an interruption and end the process, whatever the core is doing."""
+    kept = store.kept if store.heads else "no load step was finished"
+    print(f"hexcontact: interrupted; {kept}", file=sys.stderr)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+# --- commands -------------------------------------------------------------------------------------
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"hexcontact {__version__}")
+        raise typer.Exit()
+
+
+@app.callback(epilog="Example: hexcontact new sphere, then hexcontact run sphere.toml --plot")
+def _hexcontact(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Contact of three-dimensional elastic bodies: pressure, contact area and approach from a deck in TOML.
+
+    Exit codes: 0 done, 2 wrong input, 3 no convergence, 4 not enough memory or disk, 130 and 143 interrupted.
+    """
+
+
+DeckFile = Annotated[Path, typer.Argument(metavar="DECK", help="The deck, a TOML file.", show_default=False)]
+ResultFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="The result, a netCDF file.", show_default=False)
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Replace a key of the deck, as grid.spacing='0.05 mm'. Repeatable."
+    ),
+]
+
+
+def _case(deck: Path, settings: list[str] | None) -> Case:
+    from .case import Case
+
+    return Case.from_toml(deck, overrides=dict(map(_setting, settings or ())))
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """Split KEY=VALUE; a value that is not TOML is text, so that units need no quotes."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise DeckError(f"--set {text}: expected KEY=VALUE, such as load.1.normal_load='20 N'")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
+
+
+@app.command(epilog="Example: hexcontact run cases/hertz_spheres.toml --plot")
+@_guarded
+def run(
+    deck: DeckFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="File to write; default: the deck's output.file, or DECK.nc here."
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an output that is there.")] = False,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the result beside the output (.png).")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    settings: Settings = None,
+) -> None:
+    """Solve a deck; each load step is safe on the disk before the next begins."""
+    from . import solve
+    from .progress import reporter
+    from .store import Store
+
+    case = _case(deck, settings)
+    target = output or case.output.file or Path(f"{deck.stem}.nc")
+    shown, histories = reporter(quiet), []
+    previous = signal.signal(signal.SIGTERM, _on_sigterm)
+    with Store(target, solve.metadata_of(case), overwrite) as store:
+        try:
+            with shown.watching(case.title or deck.stem, len(case.load_steps)):
+                _in_background(
+                    lambda: solve.record(case, store, shown, lambda step: histories.append(step.history))
+                )
+        except (KeyboardInterrupt, _Terminated) as signaled:
+            store.close()
+            _leave(store, 130 if isinstance(signaled, KeyboardInterrupt) else 143)
+        finally:
+            signal.signal(signal.SIGTERM, previous)
+    picture = _draw(_open(store.path), "overview", -1, store.path.with_suffix(".png")) if plot else None
+    if not quiet:
+        _summarize(case, histories, target, picture)
+
+
+def _summarize(case: Case, histories: list[Any], target: Path, picture: Path | None) -> None:
+    from . import summary
+
+    console, last = summary.console(), histories[-1]
+    if len(histories) > 1:
+        console.print(summary.table("History", summary.HISTORY_HEADERS, summary.history_rows(histories)))
+    console.print(summary.pairs(f"Last load step of {case.title!r}" if case.title else "Last load step",
+                                summary.step_rows(last)))  # fmt: skip
+    if rows := summary.hertz_rows(case, last):
+        console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+    console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)
+
+
+@app.command(epilog="Example: hexcontact check fretting.toml --set grid.spacing='2 um'")
+@_guarded
+def check(deck: DeckFile, settings: Settings = None) -> None:
+    """Read a deck, report everything that is wrong with it, and say what would be run."""
+    from . import summary
+
+    case = _case(deck, settings)
+    console = summary.console()
+    console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
+    console.print(f"{deck} is ready to run", soft_wrap=True)
+
+
+@app.command(epilog="Example: hexcontact new sphere")
+@_guarded
+def new(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Which starter deck.", show_default=False)
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the starter decks.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; default: NAME.toml; - prints it."),
+    ] = None,
+) -> None:
+    """Write a commented deck to start from."""
+    from . import starters
+
+    names = starters.names()
+    if listing or name is None:
+        print("\n".join(names))
+        if not listing:
+            raise DeckError("NAME is missing; expected one of the names above")
+        return
+    if name not in names:
+        from .messages import did_you_mean, listed
+
+        raise DeckError(f"NAME = {name}: expected {listed(names, 'or')}{did_you_mean(name, names)}")
+    if str(output) == "-":
+        print(starters.text(name), end="")
+        return
+    target = output or Path(f"{name}.toml")
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(starters.text(name))
+    except FileExistsError:
+        raise DeckError(f"{target} exists already; choose another name with --output") from None
+    print(f"written: {target}; now: hexcontact run {target}")
+
+
+@app.command(epilog="Example: hexcontact info hertz_spheres.nc")
+@_guarded
+def info(file: ResultFile) -> None:
+    """Say what a result holds: origin, history, residuals, the last load step against Hertz."""
+    from . import summary
+
+    result = _open(file)
+    case, console = summary.case_of(result), summary.console()
+    histories = result.history.to_dict("records")
+    console.print(summary.pairs(result.case_title, summary.file_rows(result)))
+    console.print(summary.table("History", summary.HISTORY_HEADERS, summary.history_rows(histories)))
+    console.print(summary.pairs("Last load step", summary.step_rows(histories[-1])))
+    if case is not None and (rows := summary.hertz_rows(case, histories[-1])):
+        console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+
+
+def _open(path: Path) -> Result:
+    from .store import open_result
+
+    return open_result(path)
+
+
+@app.command(epilog="Example: hexcontact plot hertz_spheres.nc --what section --output section.pdf")
+@_guarded
+def plot(
+    file: ResultFile,
+    what: Annotated[
+        str,
+        typer.Option(
+            "--what", "-w", help="overview, field, section, boundary or history; all: each in a file."
+        ),
+    ] = "overview",
+    step: Annotated[int, typer.Option("--step", "-s", help="Load step, the first is 1; -1: the last.")] = -1,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
+        ),
+    ] = None,
+) -> None:
+    """Draw a result."""
+    from .plotting import FIGURES
+
+    if what not in (known := [*FIGURES, "all"]):
+        from .messages import did_you_mean, listed
+
+        raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
+    result, first = _open(file), output or file.with_suffix(".png")
+    for name in FIGURES if what == "all" else [what]:
+        named = what == "all" or output is None
+        picture = first.with_stem(f"{first.stem}_{name}") if named else first
+        print(f"written: {_draw(result, name, step, picture)}")
+
+
+def _draw(result: Result, what: str, step: int, picture: Path) -> Path:
+    """Draw one picture of a result into a file."""
+    from .plotting import FIGURES
+
+    try:
+        figure = FIGURES[what](result) if what == "history" else FIGURES[what](result, step)
+        figure.savefig(picture, dpi=200)
+    except (IndexError, ValueError) as error:  # no such step, nothing in contact, no such kind of file
+        raise DeckError(f"cannot draw {what} of {result.path}: {error}") from error
+    return picture
+
+
+@app.command(epilog="Example: hexcontact verify")
+@_guarded
+def verify(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Which comparisons; default: all.", show_default=False),
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
+    table: Annotated[bool, typer.Option("--table", help="Print Markdown tables.")] = False,
+) -> None:
+    """Compare with published, analytic and converged solutions; exit code 1 if a comparison fails."""
+    from . import verify as comparisons
+
+    raise typer.Exit(comparisons.main(names or [], table=table, listing=listing))

@@ -1,0 +1,389 @@
+"""The deck: the whole input format as pydantic models, and reading it from TOML.
+
+A `Deck` is what the file says, in SI, with every table checked on its own. What needs the tables together
+(the load history, the size of the window, what this version solves) is worked out by `hexcontact.case`.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError
+
+from .errors import DeckError
+from .messages import Source, deck_error
+from .surfaces import Flat, Point, Surface, SurfaceKind
+from .units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE
+from .validation import Flag, Quantity, Several, Table, Text, Whole, Word, WordOr, problems_of, refuse
+
+ALGORITHMS = ("frictionless", "static", "incremental")
+METHODS = ("auto", "direct", "fft")
+FIELDS = (
+    "pressure",
+    "traction_x",
+    "traction_y",
+    "gap",
+    "zone",
+    "relative_displacement_x",
+    "relative_displacement_y",
+    "slip_increment_x",
+    "slip_increment_y",
+    "accumulated_slip",
+    "displacement_1_x",
+    "displacement_1_y",
+    "displacement_1_z",
+    "displacement_2_x",
+    "displacement_2_y",
+    "displacement_2_z",
+)
+"""Fields by step that a result can hold."""
+
+LOADS = {
+    "z": ("normal_load", "approach"),
+    "x": ("tangential_load_x", "shift_x"),
+    "y": ("tangential_load_y", "shift_y"),
+    "twist": ("torque", "twist"),
+}
+"""The two keys that drive each rigid motion: by force, by displacement."""
+
+MOST_STEPS = 100_000
+
+YoungModulus = Annotated[float, Quantity(PRESSURE, above=0)]
+PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1, at_most=0.5)]
+Length = Annotated[float, Quantity(LENGTH)]
+PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
+Force = Annotated[float, Quantity(FORCE)]
+Count = Annotated[int, Whole(1)]
+
+
+class Body(Table):
+    """One of the two bodies: elastic, or rigid."""
+
+    young_modulus: YoungModulus | None = Field(None, description="Young's modulus E; required unless rigid")
+    poisson_ratio: PoissonRatio | None = Field(None, description="Poisson's ratio ν; required unless rigid")
+    rigid: Annotated[bool, Flag()] = Field(False, description="a body that does not deform")
+    surface: Annotated[Surface, SurfaceKind()] = Field(
+        default_factory=Flat, description="the shape of its surface; flat if absent"
+    )
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Moduli go with an elastic body and only with that."""
+        for key, words in (
+            ("young_modulus", 'a pressure such as "210 GPa"'),
+            ("poisson_ratio", "a number such as 0.3"),
+        ):
+            if data.get("rigid") is True:
+                if key in data:
+                    yield key, "expected nothing, since the body is rigid"
+            elif key not in data:
+                yield key, f"missing; expected {words}, or rigid = true"
+
+
+class Bodies(Table):
+    """The two bodies: body 1 fills z > 0, body 2 fills z < 0."""
+
+    body_1: Body = Field(alias="1")
+    body_2: Body = Field(alias="2")
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """At least one of the two deforms."""
+        if all(
+            isinstance(body := data.get(key), Mapping) and body.get("rigid") is True for key in ("1", "2")
+        ):
+            yield "2", "expected one elastic body at least; both are rigid"
+
+
+class Friction(Table):
+    """Coulomb friction."""
+
+    coefficient: Annotated[float, Quantity(NUMBER, at_least=0, infinite=True)] = Field(
+        description="coefficient of friction μ; inf: no slip"
+    )
+
+
+class Grid(Table):
+    """The lattice and the window of it in which contact is looked for."""
+
+    spacing: PositiveLength | None = Field(None, description="distance l_e between neighboring nodes")
+    nodes_across: Annotated[int, Whole(5, 100_000)] | None = Field(
+        None, description="nodes per side of the window, instead of the spacing"
+    )
+    nodes_in_radius: Annotated[float, Quantity(NUMBER, at_least=1, at_most=100_000)] | None = Field(
+        None, description="spacings in the estimated contact radius √(area/π), instead of the spacing"
+    )
+    extent: Annotated[
+        str | tuple[float, float],
+        WordOr("auto", Several(Quantity(LENGTH, above=0), "lengths", '["2 mm", "2 mm"]', count=2)),
+    ] = Field(
+        "auto",
+        description="size of the rectangle about `center` that the window covers; auto: from the contact",
+    )
+    window: (
+        Annotated[tuple[int, int], Several(Whole(1, 100_000), "whole numbers", "[41, 41]", count=2)] | None
+    ) = Field(None, description="nodes of the window about `center`, [n_row, n_col], instead of `extent`")
+    center: Point | None = Field(
+        None, description="middle of the window; where the bodies touch first if absent"
+    )
+    origin: Point = Field((0.0, 0.0), description="a point of the plane that is a node")
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """One way to give the spacing, at most one to give the size."""
+        fineness = [key for key in ("spacing", "nodes_across", "nodes_in_radius") if key in data]
+        if not fineness:
+            yield "spacing", "missing; expected one of spacing, nodes_across and nodes_in_radius"
+        for key in fineness[1:]:
+            yield (
+                key,
+                f"expected only one of spacing, nodes_across and nodes_in_radius; {fineness[0]} is given too",
+            )
+        if "window" in data and data.get("extent", "auto") != "auto":
+            yield "window", "expected window or extent, not both"
+        if "window" in data and "nodes_across" in data:
+            yield "window", "expected window or nodes_across, not both"
+
+
+class Solver(Table):
+    """How the contact problem is solved."""
+
+    algorithm: Annotated[str, Word(ALGORITHMS)] | None = Field(
+        None, description="frictionless without a [friction] table, else incremental"
+    )
+    method: Annotated[str, Word(METHODS)] = Field(
+        "auto",
+        description="direct: LAPACK on the full matrix; fft: matrix-free; auto: by the size of the window",
+    )
+    tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-14, at_most=0.1)] = Field(
+        1e-8, description="bound on every residual at the end of every load step"
+    )
+    coupling: Annotated[str, Word(("full", "goodman"))] = Field(
+        "full", description="goodman: shear does not move the pressure"
+    )
+
+
+@dataclass(frozen=True)
+class Fractions(Several):
+    """Fractions of a segment, rising to 1."""
+
+    def _expected(self) -> str:
+        return f"fractions of the segment, rising to 1, such as {self.example}"
+
+    def _parse(self, value: object) -> tuple[float, ...]:
+        fractions = super()._parse(value)
+        if fractions[-1] != 1.0 or any(b <= a for a, b in pairwise(fractions)):
+            refuse(f"expected {self.expected}")
+        return fractions
+
+
+class Segment(Table):
+    """A stretch of the load history: every load ramps from where it stands to the value given here."""
+
+    normal_load: Annotated[float, Quantity(FORCE, at_least=0)] | None = Field(
+        None, description="normal load P"
+    )
+    tangential_load_x: Force | None = Field(None, description="tangential load on body 1 along x")
+    tangential_load_y: Force | None = Field(None, description="tangential load on body 1 along y")
+    torque: Annotated[float, Quantity(TORQUE)] | None = Field(
+        None, description="moment about z through x = y = 0; frees the twist"
+    )
+    approach: Length | None = Field(None, description="approach of the bodies, instead of normal_load")
+    shift_x: Length | None = Field(
+        None, description="tangential motion of body 2, instead of tangential_load_x"
+    )
+    shift_y: Length | None = Field(
+        None, description="tangential motion of body 2, instead of tangential_load_y"
+    )
+    twist: Annotated[float, Quantity(ANGLE)] | None = Field(
+        None, description="rotation about z, instead of torque"
+    )
+    steps: Annotated[int, Whole(1, MOST_STEPS)] | None = Field(
+        None, description="number of load steps; 1, or as many as there are `values`"
+    )
+    ramp: Annotated[str, Word(("linear", "cubic"))] = Field(
+        "linear", description="cubic: the cube root of normal_load grows evenly, all else linearly"
+    )
+    values: (
+        Annotated[tuple[float, ...], Fractions(Quantity(NUMBER, above=0, at_most=1), "", "[0.1, 0.4, 1]")]
+        | None
+    ) = Field(None, description="fraction of the segment done at the end of each step, instead of `ramp`")
+    label: Annotated[str, Text()] = Field("", description="name of the segment in the result")
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Each motion has one control, each segment one kind of ramp."""
+        pairs = LOADS.values()
+        if "path" not in data and not any(key in data for pair in pairs for key in pair):
+            yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
+        for force, displacement in pairs:
+            if force in data and displacement in data:
+                yield displacement, f"expected {force} or {displacement}, not both"
+        if data.get("ramp") == "cubic" and "normal_load" not in data:
+            yield "ramp", "a cubic ramp needs normal_load in the same segment"
+        if "values" in data and "ramp" in data:
+            yield "ramp", "expected ramp or values, not both"
+        values, steps = data.get("values"), data.get("steps")
+        if isinstance(values, list | tuple) and steps is not None and steps != len(values):
+            yield "steps", f"expected {len(values)}, as many as there are values (or no steps at all)"
+
+
+class Load(Segment):
+    """An entry of [[load]]: a segment, or a path of segments that is repeated."""
+
+    repeat: Annotated[int, Whole(1, MOST_STEPS)] | None = Field(
+        None, description="how often `path` is run; 1 if absent"
+    )
+    path: list[Segment] | None = Field(None, min_length=1, description="segments to run in turn")
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Let a path stand alone."""
+        yield from super().conflicts(data)
+        if "path" in data:
+            for key in Segment.known_keys():
+                if key in data and key != "label":
+                    yield key, "expected inside the path, not beside it"
+        elif "repeat" in data:
+            yield "repeat", "needs a path of segments to repeat"
+
+
+class Output(Table):
+    """What is written, and where."""
+
+    file: Annotated[str, Text()] | None = Field(None, description="netCDF file of the result")
+    fields: (
+        Annotated[tuple[str, ...], Several(Word(FIELDS), "field names", '["pressure", "gap", "zone"]')] | None
+    ) = Field(None, description="fields to keep; all that the algorithm yields if absent")
+    every: Count = Field(
+        1, description="keep the fields of every n-th step (the history always holds all steps)"
+    )
+
+
+class Deck(Table):
+    """A whole deck."""
+
+    title: Annotated[str, Text()] = Field("", description="a line about the case")
+    body: Bodies
+    friction: Friction | None = None
+    grid: Grid
+    solver: Solver = Field(default_factory=Solver)
+    load: list[Load] = Field(min_length=1)
+    output: Output = Field(default_factory=Output)
+
+    @classmethod
+    def parse(cls, data: Mapping[str, Any], source: Source) -> Deck:
+        """Check a deck that was read into dictionaries.
+
+        Raises
+        ------
+        DeckError
+            With a sentence for each thing that is wrong.
+        """
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise deck_error(problems_of(error), source) from None
+
+
+def read_toml(path: str | Path) -> tuple[dict[str, Any], str]:
+    """Read a deck file into dictionaries, without checking what it says.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file in UTF-8.
+
+    Returns
+    -------
+    data : dict
+        The tables.
+    text : str
+        The file as it is.
+
+    Raises
+    ------
+    DeckError
+        If there is no such file, it cannot be read, or it is not TOML.
+    """
+    try:
+        text = Path(path).read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise DeckError(f"{path}: no such file; expected a deck (a TOML file)") from None
+    except IsADirectoryError:
+        raise DeckError(f"{path}: is a folder; expected a deck (a TOML file)") from None
+    except UnicodeDecodeError as error:
+        raise DeckError(
+            f"{path}: is not UTF-8 text (byte {error.start}); expected a deck (a TOML file)"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DeckError(f"{path}: cannot be read ({reason}); expected a deck (a TOML file)") from None
+    return parse_toml(text, str(path)), text
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Parse TOML; `name` is what an error message calls it.
+
+    Raises
+    ------
+    DeckError
+        With the line and what is wrong there.
+    """
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        message = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        place = re.search(r" \(at line (\d+), column (\d+)\)$", message)
+        if place is None:
+            raise DeckError(f"{name}: is not TOML: {message}") from None
+        where, what = f"{name}:{place[1]}", message[: place.start()]
+        raise DeckError(f"{where}: is not TOML: {what} at column {place[2]}") from None
+
+
+def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a copy of a deck with single keys replaced.
+
+    Parameters
+    ----------
+    data : mapping
+        The deck as dictionaries.
+    overrides : mapping
+        New values by dotted key; entries of arrays count from 1 ("load.2.steps"). None removes a key.
+
+    Raises
+    ------
+    DeckError
+        If a key runs through something that is no table, or an entry that is not there.
+    """
+    result = copy.deepcopy(dict(data))
+    for dotted_key, value in overrides.items():
+        *parents, last = dotted_key.split(".")
+        here: Any = result
+        for part in parents:
+            here = here.setdefault(part, {}) if isinstance(here, dict) else _entry(here, part, dotted_key)
+        if isinstance(here, dict):
+            if value is None:
+                here.pop(last, None)
+            else:
+                here[last] = value
+        else:
+            _entry(here, last, dotted_key)
+            here[int(last) - 1] = value
+    return result
+
+
+def _entry(array: Any, number: str, key: str) -> Any:
+    """Return the entry of an array that a dotted key speaks of."""
+    if not isinstance(array, list):
+        raise DeckError(f"{key}: expected a key of a table, but {number} would be inside a plain value")
+    if not number.isdecimal() or not 1 <= int(number) <= len(array):
+        raise DeckError(f"{key}: expected an entry from 1 to {len(array)}, not {number}")
+    return array[int(number) - 1]

@@ -1,0 +1,209 @@
+"""The load history: the segments of a deck unrolled into load steps with a target for each rigid motion.
+
+Where nothing is said, the tangential loads are held at zero by force and the twist at zero by displacement; a
+load or motion that a segment does not name keeps its control and its value. See "control" in the deck
+reference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from .deck import LOADS, MOST_STEPS, Load, Segment
+from .messages import MISSING, Problem
+
+Control = Literal["force", "displacement"]
+Motion = Literal["z", "x", "y", "twist"]
+MOTIONS: tuple[Motion, ...] = ("z", "x", "y", "twist")
+
+
+@dataclass(frozen=True)
+class Target:
+    """What one rigid motion is driven to in one load step.
+
+    Attributes
+    ----------
+    control : "force" or "displacement"
+        Which of the conjugate pair is prescribed: normal load or approach, tangential load or shift, torque
+        or twist.
+    value : float
+        The prescribed value (N, N m, m or rad), or the known part of it.
+    from_start : float
+        Share of the value that this quantity had when the segment began. It is not zero only while a segment
+        of several steps takes over from the other control, since that value is then a result, not an input.
+    """
+
+    control: Control
+    value: float
+    from_start: float = 0.0
+
+    def at(self, start: float) -> float:
+        """Return the value to prescribe, given what the quantity was when the segment began."""
+        return self.value + self.from_start * start
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """One load step.
+
+    Attributes
+    ----------
+    index : int
+        Counts from 0 over the whole history.
+    segment : int
+        Counts from 0; each turn of a repeated path is a segment of its own.
+    label : str
+        Name of the segment, may be empty.
+    z, x, y, twist : Target
+        What drives the normal motion, the two tangential ones and the rotation about z.
+    """
+
+    index: int
+    segment: int
+    label: str
+    z: Target
+    x: Target
+    y: Target
+    twist: Target
+
+
+class _Stretch(NamedTuple):
+    """A segment as it is run: its key in the deck, and its label."""
+
+    key: tuple[str | int, ...]
+    segment: Segment
+    label: str
+
+
+START = {
+    "z": Target("force", 0.0),
+    "x": Target("force", 0.0),
+    "y": Target("force", 0.0),
+    "twist": Target("displacement", 0.0),
+}
+
+
+def load_steps(
+    loads: Sequence[Load], friction_coefficient: float
+) -> tuple[tuple[LoadStep, ...], list[Problem]]:
+    """Unroll the [[load]] segments.
+
+    Parameters
+    ----------
+    loads : sequence of Load
+        The segments, each valid on its own.
+    friction_coefficient : float
+        Coefficient of friction; inf allowed.
+
+    Returns
+    -------
+    steps : tuple of LoadStep
+        The history; empty if it would be longer than `MOST_STEPS`.
+    problems : list of Problem
+        What is wrong with the history as a whole: loads that never press, that no friction carries, or a ramp
+        whose start is not known.
+    """
+    count = sum(_count(stretch.segment) * turns for turns, path in _paths(loads) for stretch in path)
+    if count > MOST_STEPS:
+        sentence = f"expected at most {MOST_STEPS} load steps in all, not {count}"
+        return (), [Problem(("load",), MISSING, sentence)]
+
+    steps: list[LoadStep] = []
+    problems: list[Problem] = []
+    now = dict(START)
+    for number, (key, segment, label) in enumerate(_in_turn(loads)):
+        start, virgin = now, number == 0
+        if segment.ramp == "cubic" and start["z"].control != "force":
+            sentence = "expected linear, since the segment before was driven by approach"
+            problems.append(Problem((*key, "ramp"), "cubic", sentence))
+        for fraction in _fractions(segment):
+            now = {motion: _ramp(segment, motion, start[motion], fraction, virgin) for motion in MOTIONS}
+            steps.append(LoadStep(len(steps), number, label, **now))
+            problems += _overload(key, segment, steps[-1], friction_coefficient)
+
+    if all(step.z.value <= 0 for step in steps):
+        first = loads[0].normal_load
+        key, value = (("load", 0, "normal_load"), first) if first is not None else (("load",), MISSING)
+        sentence = "expected a normal load or an approach above zero somewhere in the history"
+        problems.append(Problem(key, value, sentence))
+    # The first complaint about a key is enough: its segment has many steps, and may be repeated.
+    return tuple(steps), list({problem.key: problem for problem in reversed(problems)}.values())[::-1]
+
+
+def _paths(loads: Sequence[Load]) -> Iterator[tuple[int, list[_Stretch]]]:
+    """Yield, for each entry of [[load]], how often it is run and the segments of one turn."""
+    for number, load in enumerate(loads):
+        if load.path is None:
+            yield 1, [_Stretch(("load", number), load, load.label)]
+        else:
+            yield (
+                load.repeat or 1,
+                [
+                    _Stretch(("load", number, "path", place), segment, segment.label or load.label)
+                    for place, segment in enumerate(load.path)
+                ],
+            )
+
+
+def _in_turn(loads: Sequence[Load]) -> Iterator[_Stretch]:
+    for turns, path in _paths(loads):
+        for _ in range(turns):
+            yield from path
+
+
+def _count(segment: Segment) -> int:
+    return len(segment.values) if segment.values else segment.steps or 1
+
+
+def _fractions(segment: Segment) -> Sequence[float]:
+    """Return how much of a segment is done after each of its steps; the last is exactly 1."""
+    if segment.values:
+        return segment.values
+    count = _count(segment)
+    return [step / count for step in range(1, count + 1)]
+
+
+def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virgin: bool) -> Target:
+    """Return the target of a motion at a fraction of a segment; `virgin`: all is zero when it begins."""
+    force, displacement = (getattr(segment, key) for key in LOADS[motion])
+    if force is None and displacement is None:
+        return start
+    goal = Target("displacement", displacement) if force is None else Target("force", force)
+    if fraction == 1.0:
+        return goal
+    if start.control != goal.control and not virgin:
+        return Target(goal.control, fraction * goal.value, 1.0 - fraction)
+    begin = start.value if start.control == goal.control else 0.0
+    if motion == "z" and segment.ramp == "cubic":
+        root = math.cbrt(begin) + fraction * (math.cbrt(goal.value) - math.cbrt(begin))
+        return Target(goal.control, root**3)
+    return Target(goal.control, begin + fraction * (goal.value - begin))
+
+
+def _overload(key: tuple[str | int, ...], segment: Segment, step: LoadStep, mu: float) -> Iterator[Problem]:
+    """Yield the tangential loads of a step that friction cannot carry, as far as the deck alone tells."""
+    tangential: tuple[tuple[Motion, Target], ...] = ("x", step.x), ("y", step.y), ("twist", step.twist)
+    if mu == 0:
+        for motion, target in tangential:
+            name = LOADS[motion][0 if target.control == "force" else 1]
+            given = getattr(segment, name)
+            if target.value != 0 and given is not None:
+                yield Problem((*key, name), given, "expected 0, since the contact is frictionless")
+        return
+    if step.z.control != "force" or any(target.from_start for _, target in (("z", step.z), *tangential)):
+        return
+    loads = {motion: target.value if target.control == "force" else 0.0 for motion, target in tangential}
+    bound = mu * step.z.value if step.z.value > 0 else 0.0
+    force = math.hypot(loads["x"], loads["y"])
+    if force > bound * (1 + 1e-12) or (bound == 0 and loads["twist"] != 0):
+        blamed = ("tangential_load_x", "tangential_load_y", "torque", "normal_load")
+        name = next((name for name in blamed if getattr(segment, name) is not None), "steps")
+        given = getattr(segment, name)
+        sentence = (
+            f"gross sliding: the tangential load of {force:g} N in load step {step.index + 1} is more than "
+            f"friction.coefficient x normal_load = {bound:g} N"
+        )
+        yield Problem((*key, name), MISSING if given is None else given, sentence)

@@ -1,0 +1,84 @@
+"""How much memory this process may still take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from .errors import ResourceError
+
+GB = 1e9
+
+
+def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/proc/self/cgroup")) -> int:
+    """Return the memory in bytes that can be taken before the machine, or a limit on this process, says no.
+
+    Parameters
+    ----------
+    cgroups : Path
+        Where the control groups are mounted (batch systems and containers limit memory by them).
+    process : Path
+        File that says which groups this process belongs to.
+    """
+    import psutil
+
+    return min([int(psutil.virtual_memory().available), *_left_in_groups(cgroups, process)])
+
+
+def require(needed: int, what: str, advice: str) -> None:
+    """Refuse what does not fit into memory.
+
+    Parameters
+    ----------
+    needed : int
+        Memory in bytes.
+    what : str
+        What needs it, with its size: ``"a window of 2048 x 2048 nodes"``.
+    advice : str
+        What the user can do about it.
+
+    Raises
+    ------
+    ResourceError
+        If less than that is available.
+    """
+    there = available()
+    if needed > there:
+        raise ResourceError(
+            f"{what} needs {needed / GB:.3g} GB of memory and {there / GB:.3g} GB are available; {advice}"
+        )
+
+
+def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
+    """Yield what each control group (version 1 or 2) that limits this process leaves."""
+    try:
+        lines = process.read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, controllers, group = line.split(":", 2)
+        if controllers == "":
+            root, limit, usage, cache = cgroups, "memory.max", "memory.current", "inactive_file"
+        elif "memory" in controllers.split(","):
+            root, limit, usage = cgroups / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"
+            cache = "total_inactive_file"
+        else:
+            continue
+        # A container may see its own group as the root: groups that are not there are passed over.
+        own = root / group.lstrip("/")
+        for folder in (own, *own.parents):
+            if (left := _left_in_group(folder, limit, usage, cache)) is not None:
+                yield left
+            if folder == root:
+                break
+
+
+def _left_in_group(folder: Path, limit: str, usage: str, cache: str) -> int | None:
+    """Return limit less usage; the file cache that the kernel would give back does not count as used."""
+    try:
+        allowed = int((folder / limit).read_text())  # "max" is no limit
+        used = int((folder / usage).read_text())
+        statistics = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
+        return max(0, allowed - used + int(statistics.get(cache, 0)))
+    except (OSError, ValueError):
+        return None

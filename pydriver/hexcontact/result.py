@@ -1,0 +1,541 @@
+"""The result of a run: what each load step leaves, and how it is laid out in a file.
+
+Every quantity is defined once, in `VARIABLES`: its dimensions, unit, meaning and what stands
+where a step has no value. `Layout` turns a run into dimensions, coordinates and attributes
+(CF-1.11); `assemble` fills an `xarray.Dataset` with it, `hexcontact.store` a netCDF file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import math
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
+    import xarray
+
+    from .lattice import Lattice
+
+SCHEMA_VERSION = 1
+CONVENTIONS = "CF-1.11"
+
+NAN = float("nan")
+NOT_KEPT = -1  # zone of a step whose fields the deck chose not to keep (output.every)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One quantity of the result: what a file says about it.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        Some of ``step``, ``row``, ``col``.
+    units : str
+        SI unit, ``"1"`` for a pure number, empty for text.
+    long_name : str
+        What it is, in words.
+    padding : float or int
+        Value at nodes outside the window that a step was solved on.
+    dtype : str
+        numpy type in the file; ``"str"`` for text.
+    flags : mapping of int to str
+        Meaning of each value, for a quantity that is a code.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    padding: float | int = NAN
+    dtype: str = "f8"
+    flags: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def is_field(self) -> bool:
+        """Whether there is a value at every node in every step."""
+        return self.dims == ("step", "row", "col")
+
+    @property
+    def missing(self) -> float | int:
+        """Value that says "not kept"."""
+        return NAN if self.dtype == "f8" else NOT_KEPT
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """CF attributes."""
+        attributes: dict[str, Any] = {"long_name": self.long_name}
+        if self.units:
+            attributes["units"] = self.units
+        if self.flags:
+            attributes["flag_values"] = np.array(list(self.flags), dtype=self.dtype)
+            attributes["flag_meanings"] = " ".join(self.flags.values())
+        return attributes
+
+
+def _node(units: str, long_name: str, **more: Any) -> Variable:
+    return Variable(("step", "row", "col"), units, long_name, **more)
+
+
+def _scalar(units: str, long_name: str, **more: Any) -> Variable:
+    return Variable(("step",), units, long_name, **more)
+
+
+_ZONES = {NOT_KEPT: "not_kept", 0: "separated", 1: "stick", 2: "slip"}
+_PLANE = ("row", "col")
+
+VARIABLES: dict[str, Variable] = {
+    # coordinates
+    "step": Variable(("step",), "1", "number of the load step, the first is 1", dtype="i4"),
+    "row": Variable(("row",), "1", "lattice index along the second basis vector", dtype="i4"),
+    "col": Variable(("col",), "1", "lattice index along the first basis vector", dtype="i4"),
+    "x": Variable(_PLANE, "m", "x coordinate of the node"),
+    "y": Variable(_PLANE, "m", "y coordinate of the node"),
+    # nodes
+    "initial_gap": Variable(_PLANE, "m", "gap of the undeformed surfaces at first touch"),
+    "pressure": _node("Pa", "contact pressure", padding=0.0),
+    "traction_x": _node("Pa", "shear traction on body 1 along x", padding=0.0),
+    "traction_y": _node("Pa", "shear traction on body 1 along y", padding=0.0),
+    "gap": _node("m", "gap between the deformed surfaces"),
+    "zone": _node("1", "contact zone of the node", padding=0, dtype="i1", flags=_ZONES),
+    "relative_displacement_x": _node(
+        "m", "displacement of body 1 relative to body 2 along x, less the shift"
+    ),
+    "relative_displacement_y": _node(
+        "m", "displacement of body 1 relative to body 2 along y, less the shift"
+    ),
+    "slip_increment_x": _node("m", "slip during the step along x", padding=0.0),
+    "slip_increment_y": _node("m", "slip during the step along y", padding=0.0),
+    "accumulated_slip": _node("m", "length of the slip path so far", padding=0.0),
+    "displacement_1_x": _node("m", "surface displacement of body 1 along x"),
+    "displacement_1_y": _node("m", "surface displacement of body 1 along y"),
+    "displacement_1_z": _node("m", "surface displacement of body 1 into body 1"),
+    "displacement_2_x": _node("m", "surface displacement of body 2 along x"),
+    "displacement_2_y": _node("m", "surface displacement of body 2 along y"),
+    "displacement_2_z": _node("m", "surface displacement of body 2 into body 2"),
+    # history
+    "normal_load": _scalar("N", "normal load pressing the bodies together"),
+    "tangential_load_x": _scalar("N", "tangential load on body 1 along x"),
+    "tangential_load_y": _scalar("N", "tangential load on body 1 along y"),
+    "torque": _scalar("N m", "torque on body 1 about z"),
+    "approach": _scalar("m", "normal approach of the remote parts of the bodies"),
+    "shift_x": _scalar("m", "shift of body 2 relative to body 1 far away along x"),
+    "shift_y": _scalar("m", "shift of body 2 relative to body 1 far away along y"),
+    "twist": _scalar("rad", "rotation of body 2 relative to body 1 far away about z"),
+    "contact_area": _scalar("m2", "contact area: cells of the nodes in contact"),
+    "stick_area": _scalar("m2", "stick area: cells of the sticking nodes"),
+    "contact_radius": _scalar("m", "radius of the disc as large as the contact area"),
+    "contact_radius_fit": _scalar("m", "radius at which the pressure of a circular contact vanishes"),
+    "stick_radius": _scalar("m", "radius of the disc as large as the stick area"),
+    "stick_center_x": _scalar("m", "x coordinate of the centroid of the stick area"),
+    "stick_center_y": _scalar("m", "y coordinate of the centroid of the stick area"),
+    "max_pressure": _scalar("Pa", "largest contact pressure of a node"),
+    "max_traction": _scalar("Pa", "largest shear traction of a node"),
+    "dissipated_energy": _scalar("J", "energy dissipated by friction so far"),
+    "elastic_energy": _scalar("J", "elastic energy stored in both bodies"),
+    "sweeps": _scalar("1", "iterations of the solver", dtype="i4"),
+    "operator_applications": _scalar("1", "applications of the full flexibility operator"),
+    "seconds": _scalar("s", "wall time of the step"),
+    "residual_normal": _scalar("1", "residual of the normal contact conditions, R_n"),
+    "residual_tangential": _scalar("1", "residual of the friction conditions, R_t"),
+    "residual_force": _scalar("1", "residual of the normal load, R_P"),
+    "residual_shear_force": _scalar("1", "residual of the tangential load, R_Q"),
+    "residual_torque": _scalar("1", "residual of the torque, R_M"),
+    "segment": _scalar("1", "segment of the load history, the first is 1", dtype="i4"),
+    "label": _scalar("", "label of the segment", dtype="str"),
+}
+
+FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.is_field)
+_COORDINATES = ("step", "row", "col", "x", "y")
+_ATTRIBUTES = (  # all but those that describe the case
+    *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
+    *("lattice_spacing", "lattice_basis", "lattice_origin"),
+    *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
+)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A finished load step.
+
+    Attributes
+    ----------
+    index : int
+        Position in the whole history, from 0.
+    lattice : Lattice
+        Window it was solved on.
+    fields : mapping of str to ndarray
+        Arrays of shape (n_row, n_col), SI; names of `VARIABLES`. ``initial_gap`` among them.
+    history : mapping of str to number or text
+        Values by step; names of `VARIABLES`.
+    """
+
+    index: int
+    lattice: Lattice
+    fields: Mapping[str, NDArray[Any]]
+    history: Mapping[str, float | int | str]
+
+    @property
+    def number(self) -> int:
+        """Number of the step as users count, from 1."""
+        return self.index + 1
+
+    @property
+    def head(self) -> Step:
+        """The same step without the values of its fields: small enough to keep."""
+        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, np.empty(0)))
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """What a result says about the run it comes from.
+
+    Attributes
+    ----------
+    title : str
+        Title of the case.
+    deck : str
+        The whole deck as text; empty for a case that was built in Python.
+    fields : tuple of str
+        Fields the output keeps; empty: all that there are.
+    every : int
+        The output keeps the fields of every so manieth step, and of the last one.
+    planned_steps : int
+        Load steps the whole run has.
+    parameters : mapping of str to number or text
+        What else describes the case: materials, tolerance, ...
+    run : str
+        A name of this run that no other run has.
+    created : str
+        Start of the run, UTC.
+    """
+
+    title: str = ""
+    deck: str = ""
+    fields: tuple[str, ...] = ()
+    every: int = 1
+    planned_steps: int = 0
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    run: str = field(default_factory=lambda: uuid.uuid4().hex)
+    created: str = field(default_factory=_now)
+
+    def attributes(self) -> dict[str, Any]:
+        """Global attributes of a file."""
+        own = {
+            "title": self.title,
+            "output_fields": " ".join(self.fields),
+            "output_every": np.int32(self.every),
+            "planned_steps": np.int32(self.planned_steps),
+            "run": self.run,
+            "created": self.created,
+            "deck": self.deck,
+        }
+        return {**self.parameters, **own}
+
+    @classmethod
+    def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
+        """Read them back.
+
+        Raises
+        ------
+        KeyError, ValueError
+            If one is missing or not what it should be.
+        """
+        return cls(
+            title=str(attributes["title"]),
+            deck=str(attributes["deck"]),
+            fields=tuple(str(attributes["output_fields"]).split()),
+            every=int(attributes["output_every"]),
+            planned_steps=int(attributes["planned_steps"]),
+            parameters={name: value for name, value in attributes.items() if name not in _ATTRIBUTES},
+            run=str(attributes["run"]),
+            created=str(attributes["created"]),
+        )
+
+
+class Layout:
+    """Dimensions, coordinates, variables and attributes of a result.
+
+    Parameters
+    ----------
+    metadata : Metadata
+        Where the result comes from, and which fields it keeps.
+    steps : sequence of Step
+        All its steps (heads are enough), in order.
+    everything : bool
+        Keep all fields of all steps, whatever `metadata` chooses.
+    """
+
+    def __init__(self, metadata: Metadata, steps: Sequence[Step], everything: bool = False) -> None:
+        if not steps:
+            raise ValueError("a result needs at least one finished step")
+        self.metadata = metadata
+        self.steps = steps
+        self.window = _union([step.lattice for step in steps])
+        self.every = 1 if everything else metadata.every
+        present = {name for step in steps for name in (*step.fields, *step.history)}
+        if unknown := present - VARIABLES.keys():
+            raise ValueError(f"the result has no quantity named {', '.join(sorted(unknown))}")
+        if metadata.fields and not everything:
+            present -= set(FIELDS) - set(metadata.fields)
+        self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
+        self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
+
+    def coordinates(self) -> dict[str, NDArray[Any]]:
+        """Values of the coordinates."""
+        return {
+            "step": np.array([step.number for step in self.steps], dtype="i4"),
+            "row": np.asarray(self.window.rows, dtype="i4"),
+            "col": np.asarray(self.window.cols, dtype="i4"),
+            "x": np.asarray(self.window.x),
+            "y": np.asarray(self.window.y),
+        }
+
+    def attributes(self, complete: bool) -> dict[str, Any]:
+        """Global attributes; `complete` says whether all planned steps are there."""
+        from . import __version__
+
+        window = self.window
+        return {
+            "Conventions": CONVENTIONS,
+            "source": f"hexcontact {__version__}",
+            "history": f"{self.metadata.created} started by hexcontact {__version__}",
+            "hexcontact_version": __version__,
+            "schema_version": np.int32(SCHEMA_VERSION),
+            "complete": np.int32(complete),
+            "lattice_spacing": float(window.spacing),
+            "lattice_basis": np.asarray(window.basis, dtype=float).ravel(),
+            "lattice_origin": np.asarray(window.origin, dtype=float),
+            **self.metadata.attributes(),
+        }
+
+    def keeps(self, position: int) -> bool:
+        """Whether the fields of the step at `position` are kept."""
+        last = position == len(self.steps) - 1
+        return last or self.steps[position].number % self.every == 0
+
+    def value(self, name: str, position: int, step: Step) -> Any:
+        """Value of a quantity in one step: a scalar, or a field padded to the whole window."""
+        variable = self.variables[name]
+        if variable.is_field:
+            if self.keeps(position) and name in step.fields:
+                return self.padded(name, step)
+            return np.full(self.window.shape, variable.missing, dtype=variable.dtype)
+        return step.history.get(name, "" if variable.dtype == "str" else variable.missing)
+
+    def padded(self, name: str, step: Step) -> NDArray[Any]:
+        """Return a field of `step` on the window of the whole result."""
+        variable = VARIABLES[name]
+        values = np.asarray(step.fields[name], dtype=variable.dtype)
+        if values.shape != step.lattice.shape:
+            raise ValueError(
+                f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
+            )
+        if step.lattice == self.window:
+            return values
+        return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
+
+    def initial_gap(self, known: NDArray[Any] | None, step: Step) -> NDArray[Any]:
+        """Return the initial gap on the whole window: what is `known` so far, completed by `step`."""
+        values = self.padded("initial_gap", step)
+        return values if known is None else np.where(np.isnan(known), values, known)
+
+
+def _union(windows: Sequence[Lattice]) -> Lattice:
+    """Return the smallest window that holds all `windows` of one lattice."""
+    first = windows[0]
+    if any((w.spacing, w.origin) != (first.spacing, first.origin) for w in windows):
+        raise ValueError("the steps of a result share one lattice: spacing and origin must not change")
+    row_first = min(w.row_first for w in windows)
+    col_first = min(w.col_first for w in windows)
+    return dataclasses.replace(
+        first,
+        row_first=row_first,
+        col_first=col_first,
+        n_row=max(w.row_first + w.n_row for w in windows) - row_first,
+        n_col=max(w.col_first + w.n_col for w in windows) - col_first,
+    )
+
+
+def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[Any]) -> Lattice:
+    """Return the lattice window that the attributes and index coordinates of a file describe."""
+    from .lattice import Lattice
+
+    x0, y0 = np.asarray(attributes["lattice_origin"], dtype=float)
+    return Lattice(
+        spacing=float(attributes["lattice_spacing"]),
+        row_first=int(rows[0]),
+        col_first=int(cols[0]),
+        n_row=len(rows),
+        n_col=len(cols),
+        origin=(float(x0), float(y0)),
+    )
+
+
+def assemble(metadata: Metadata, steps: Iterable[Step], complete: bool = True) -> xarray.Dataset:
+    """Put the steps of a run together.
+
+    Parameters
+    ----------
+    metadata : Metadata
+        Where the steps come from.
+    steps : iterable of Step
+        The finished steps in order; gone through twice, so not a generator.
+    complete : bool
+        Whether these are all steps of the run.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``step``, ``row``, ``col``; the layout is described in docs/netcdf.md.
+    """
+    import xarray
+
+    layout = Layout(metadata, [step.head for step in steps])
+    values: dict[str, Any] = {
+        name: np.empty([layout.sizes[dim] for dim in v.dims], dtype=object if v.dtype == "str" else v.dtype)
+        for name, v in layout.variables.items()
+        if name != "initial_gap"
+    }
+    gap = None
+    for position, step in enumerate(steps):
+        for name, array in values.items():
+            array[position] = layout.value(name, position, step)
+        if "initial_gap" in step.fields:
+            gap = layout.initial_gap(gap, step)
+    if gap is not None:
+        values["initial_gap"] = gap
+    values |= layout.coordinates()
+    variables = {
+        name: xarray.Variable(v.dims, values[name], v.attributes)
+        for name, v in VARIABLES.items()
+        if name in values
+    }
+    coordinates = {name: variables.pop(name) for name in _COORDINATES}
+    return xarray.Dataset(variables, coords=coordinates, attrs=layout.attributes(complete))
+
+
+class Result:
+    """A result by the names of its quantities.
+
+    ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; everything else
+    that xarray can do is there through ``result.dataset``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As `assemble` makes it or `hexcontact.open_result` reads it.
+    path : str
+        File it was read from; empty if there is none.
+    """
+
+    def __init__(self, dataset: xarray.Dataset, path: str = "") -> None:
+        self.dataset = dataset
+        self.path = path
+
+    def __getattr__(self, name: str) -> xarray.DataArray:
+        """Return a quantity."""
+        if name.startswith("_") or name in ("dataset", "path"):
+            raise AttributeError(name)
+        if name in self.dataset.variables:
+            return self.dataset[name]
+        what = "not in this result" if name in VARIABLES else "no quantity of a result"
+        raise AttributeError(f"{name} is {what}; there are {', '.join(map(str, self.dataset.variables))}")
+
+    def __getitem__(self, name: str) -> xarray.DataArray:
+        """Return a quantity."""
+        try:
+            return getattr(self, name)
+        except AttributeError as error:
+            raise KeyError(str(error)) from None
+
+    def __dir__(self) -> list[str]:
+        """Name the quantities too."""
+        return [*super().__dir__(), *map(str, self.dataset.variables)]
+
+    def __len__(self) -> int:
+        """Return the number of load steps."""
+        return int(self.dataset.sizes["step"])
+
+    @property
+    def case_title(self) -> str:
+        """Title of the case."""
+        return str(self.dataset.attrs.get("title", ""))
+
+    @property
+    def deck(self) -> str:
+        """The deck as text; empty for a case that was built in Python."""
+        return str(self.dataset.attrs.get("deck", ""))
+
+    @property
+    def complete(self) -> bool:
+        """Whether all planned load steps are there."""
+        return bool(self.dataset.attrs.get("complete", True))
+
+    @property
+    def lattice(self) -> Lattice:
+        """The lattice window that the result covers."""
+        return window_of(self.dataset.attrs, self.dataset["row"].values, self.dataset["col"].values)
+
+    def step(self, number: int) -> xarray.Dataset:
+        """Return one load step.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, the first is 1; -1 is the last one.
+
+        Raises
+        ------
+        IndexError
+            If there is no such step.
+        """
+        numbers = self.dataset["step"].values
+        if -len(self) <= number < 0:
+            return self.dataset.isel(step=number)
+        if number in numbers:
+            return self.dataset.sel(step=number)
+        raise IndexError(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
+
+    @property
+    def history(self) -> pandas.DataFrame:
+        """Table of everything that has one value by step."""
+        names = [str(name) for name in self.dataset.data_vars if self.dataset[name].dims == ("step",)]
+        return self.dataset[names].to_dataframe()
+
+    def close(self) -> None:
+        """Let go of the file; only needed before the file is moved or deleted on some systems."""
+        self.dataset.close()
+
+    def __repr__(self) -> str:
+        """Say in a few lines what is there."""
+        sizes, attributes = self.dataset.sizes, self.dataset.attrs
+        planned = attributes.get("planned_steps") or "?"
+        steps = f"{len(self)} load step{'s' * (len(self) != 1)}"
+        spacing = attributes.get("lattice_spacing", NAN)
+        lines = [
+            f"Result of {self.case_title!r}" + (f", {self.path}" if self.path else ""),
+            f"  {steps if self.complete else f'{steps} of {planned} (unfinished run)'}"
+            f", {sizes['row']} x {sizes['col']} nodes, spacing {spacing:.6g} m",
+        ]
+        last = self.dataset.isel(step=-1)
+        for name in ("normal_load", "approach", "contact_radius", "max_pressure", "residual_normal"):
+            if name in self.dataset and not math.isnan(value := float(last[name])):
+                lines.append(f"  {name:<16} {value:.6g} {VARIABLES[name].units.replace('1', '')}".rstrip())
+        fields = [name for name in FIELDS if name in self.dataset]
+        lines.append(f"  fields: {', '.join(fields)}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return self.dataset._repr_html_()

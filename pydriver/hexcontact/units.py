@@ -1,0 +1,189 @@
+"""Physical quantities in decks, to floats in SI: ``"3.5 um"``, ``"432 GPa"``, ``"30 deg"``, bare numbers.
+
+The plain metric units are scaled here, exactly, by moving the decimal point; everything else (and every
+complaint about a unit) is left to pint, which is imported only then because it takes a third of a second.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pint
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """What a number measures.
+
+    Attributes
+    ----------
+    name : str
+        With its article, as error messages say it: "a length".
+    unit : str
+        The SI unit, spelt for pint; "" for a pure number.
+    example : str
+        A value a user could have written, quotes included.
+    bare : bool
+        Whether a number without a unit is taken as SI.
+    """
+
+    name: str
+    unit: str
+    example: str
+    bare: bool = True
+
+
+LENGTH = Dimension("a length", "m", '"1 mm"')
+PRESSURE = Dimension("a pressure", "Pa", '"210 GPa"')
+FORCE = Dimension("a force", "N", '"10 N"')
+TORQUE = Dimension("a torque", "N m", '"2 N mm"')
+ANGLE = Dimension("an angle with its unit", "rad", '"30 deg"', bare=False)
+NUMBER = Dimension("a number", "", "0.3")
+
+# Decimal exponents of the units that nearly every deck gets by with, by the SI unit of their dimension.
+_METRIC = {
+    "m": {"nm": -9, "um": -6, "µm": -6, "mm": -3, "cm": -2, "m": 0},
+    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
+    "N": {"mN": -3, "N": 0, "kN": 3, "MN": 6},
+}
+
+_ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>.*?)\s*", re.ASCII
+)
+
+# Products, quotients and small powers of named units. Anything richer is not a unit, and pint would evaluate
+# it.
+_NAME = r"[^\W\d_]+|[%°]|[^\W\d_]*°"
+_FACTOR = rf"(?:{_NAME})(?:\s*(?:\*\*|\^)\s*-?\d{{1,2}}(?:\.\d{{1,4}})?)?"
+_UNIT = re.compile(rf"(?:1\s*/\s*)?{_FACTOR}(?:\s*[*/·]\s*{_FACTOR}|\s+{_FACTOR})*")
+_LONGEST_UNIT = 60
+
+
+class UnitError(ValueError):
+    """A quantity that cannot be read; the message is the part after "expected ..."."""
+
+
+def to_si(value: object, dimension: Dimension) -> float:
+    """Turn a deck value into a float in SI units.
+
+    Parameters
+    ----------
+    value : object
+        A number (taken as SI), or text made of a number and a unit.
+    dimension : Dimension
+        What the value has to measure.
+
+    Returns
+    -------
+    float
+        The value in ``dimension.unit``; may be infinite or NaN if a number said so.
+
+    Raises
+    ------
+    UnitError
+        If the value is not a quantity of that dimension. The message says why in a few words, or is empty
+        where there is nothing to say beyond what was expected.
+    """
+    if isinstance(value, str):
+        return _from_text(value, dimension)
+    if isinstance(value, bool) or not hasattr(value, "__float__"):
+        raise UnitError("")
+    if not dimension.bare:
+        raise UnitError("")
+    try:
+        return float(value)
+    except (OverflowError, TypeError, ValueError):
+        raise UnitError("") from None
+
+
+def _from_text(text: str, dimension: Dimension) -> float:
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise UnitError("")
+    number, unit = match["number"], match["unit"]
+    if not unit:
+        reason = "" if not dimension.bare else "a quoted value needs its unit"
+        raise UnitError("write the number without quotes" if dimension is NUMBER else reason)
+    if abs(float(number)) == float("inf"):
+        raise UnitError("")
+    if dimension is ANGLE and unit in _ANGLES:
+        return float(number) * _ANGLES[unit]
+    exponent = _METRIC.get(dimension.unit, {}).get(unit)
+    if exponent is not None:
+        return float(Decimal(number).scaleb(exponent))
+    return _by_pint(float(number), unit, dimension)
+
+
+def _by_pint(number: float, unit: str, dimension: Dimension) -> float:
+    unknown = UnitError(f'"{unit}" is not a known unit')
+    if len(unit) > _LONGEST_UNIT or _UNIT.fullmatch(unit) is None:
+        raise unknown
+    registry = _registry()
+    try:
+        quantity = registry.Quantity(number, unit).to_base_units()
+    except Exception:  # pint raises a dozen unrelated types for text that is no unit
+        raise unknown from None
+    # Comparing base units, not dimensionalities, keeps radians apart from pure numbers.
+    target = registry.Quantity(1.0, dimension.unit).to_base_units()
+    if not _same(quantity.units, target.units):
+        raise UnitError(f'"{unit}" is {_describe(quantity)}')
+    return float(quantity.magnitude / target.magnitude)
+
+
+def _same(units: Any, other: Any) -> bool:
+    """Whether two base units agree, allowing for rounding in powers such as m^-1.5."""
+    left, right = dict(units._units), dict(other._units)
+    return left.keys() == right.keys() and all(abs(left[k] - right[k]) < 1e-9 for k in left)
+
+
+def _describe(quantity: Any) -> str:
+    """Name what a quantity in base units measures: "a mass", "an area", or its units."""
+    for name, unit in _NAMED_UNITS.items():
+        if _same(quantity.units, _registry().Quantity(1.0, unit).to_base_units().units):
+            return name
+    return f"a quantity in {quantity.units:~P}"
+
+
+_NAMED_UNITS = {
+    "a length": "m",
+    "an area": "m^2",
+    "a volume": "m^3",
+    "a mass": "kg",
+    "a time": "s",
+    "a frequency": "Hz",
+    "a velocity": "m/s",
+    "an acceleration": "m/s^2",
+    "a density": "kg/m^3",
+    "a force": "N",
+    "a pressure": "Pa",
+    "a torque or an energy": "N m",
+    "a power": "W",
+    "a line load or a stiffness": "N/m",
+    "an angle": "rad",
+    "a temperature": "K",
+    "an electric current": "A",
+    "a pure number": "",
+}
+
+
+def readable(length: float) -> str:
+    """Write a length (m) to three digits in the unit that suits it, for messages: "0.182 mm"."""
+    for exponent, unit in ((0, "m"), (-3, "mm"), (-6, "um")):
+        if abs(length) >= 0.1 * 10.0**exponent:
+            return f"{length * 10.0**-exponent:.3g} {unit}"
+    return f"{length * 1e9:.3g} nm"
+
+
+@functools.cache
+def _registry() -> pint.UnitRegistry[float]:
+    import pint
+
+    return pint.UnitRegistry()

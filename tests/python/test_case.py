@@ -1,0 +1,591 @@
+"""Cases: from decks and from Python, the window they choose, and what they refuse."""
+
+import math
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hexcontact import grid as grids
+from hexcontact import starters
+from hexcontact.case import Body, Case
+from hexcontact.errors import DeckError
+from hexcontact.lattice import Lattice
+from hexcontact.native import NormalContact, NormalSolution
+from hexcontact.surfaces import Paraboloid, Punch, Sphere
+
+CASES = Path(__file__).parents[2] / "cases"
+STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+BALL = {**STEEL, "surface": Sphere(radius=0.01)}
+
+DECK = """\
+[body.1]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+surface = { shape = "sphere", radius = "10 mm", offset = ["0 mm", "0 mm"] }
+
+[body.2]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+
+[grid]
+nodes_across = 21
+
+[[load]]
+normal_load = "100 N"
+steps = 2
+"""
+
+
+def sphere_on_flat(**keys: Any) -> Case:
+    return Case(**{"body_1": BALL, "body_2": STEEL, "normal_load": 100.0, **keys})
+
+
+def hertz_radius(case: Case, radius: float, load: float) -> float:
+    return (3 * load * radius / (4 * case.pair.effective_modulus)) ** (1 / 3)
+
+
+def complaint(**keys: Any) -> str:
+    with pytest.raises(DeckError) as error:
+        sphere_on_flat(**keys)
+    return str(error.value)
+
+
+def solved(case: Case) -> NormalSolution:
+    """Solve the last load step of a case, which is the one with the largest load here."""
+    gap, candidate = case.initial_gap(case.lattice)
+    contact = NormalContact(case.lattice, case.pair, gap, candidate, case.method_for(case.lattice))  # type: ignore[arg-type]
+    target = case.load_steps[-1].z
+    if target.control == "force":
+        return contact.solve(normal_load=target.value)
+    return contact.solve(approach=target.value)
+
+
+def on_rim(field: NDArray[Any]) -> bool:
+    return any(grids.rim_sides(field > 0))
+
+
+# --- decks -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
+def test_the_decks_of_the_cases_are_right(path: Path) -> None:
+    case = Case.from_toml(path)
+    assert case.deck_text == path.read_text(encoding="utf-8")
+    assert case.title
+    assert case.load_steps
+
+
+@pytest.mark.parametrize("name", starters.names())
+def test_the_starter_decks_are_right_and_solve(name: str) -> None:
+    case = Case.from_text(starters.text(name), name)
+    solution = solved(case)
+    assert solution.converged
+    assert not on_rim(solution.zone)
+
+
+def test_the_readme_of_the_cases_names_them_all() -> None:
+    text = (CASES / "README.md").read_text(encoding="utf-8")
+    for path in CASES.glob("*.toml"):
+        assert f"`{path.name}`" in text
+
+
+def test_published_data_follow_from_the_decks() -> None:
+    # Table 9.1, to all digits given: E* = 107.7053 GPa, p0 = 854.3278 MPa, a = 0.7475813 mm, delta = 9.31463 um
+    case = Case.from_toml(CASES / "hertz_spheres.toml")
+    radius, load = 0.06, case.load_steps[0].z.value
+    a = hertz_radius(case, radius, load)
+    assert f"{case.pair.effective_modulus / 1e9:.4f}" == "107.7053"
+    assert f"{3 * load / (2 * math.pi * a**2) / 1e6:.4f}" == "854.3278"
+    assert f"{a * 1e3:.7f}" == "0.7475813"
+    assert f"{a**2 / radius * 1e6:.5f}" == "9.31463"
+    gap, _ = case.initial_gap(Lattice(a, 0, 1, 1, 1))
+    assert float(gap[0, 0]) == pytest.approx(a**2 / (2 * radius), rel=1e-14)
+
+
+@pytest.mark.parametrize(("nodes", "spacing"), [(11, 0.2), (21, 0.1), (31, 0.075), (41, 0.05), (51, 0.04)])
+def test_meshes_of_table_9_2(nodes: int, spacing: float) -> None:
+    case = Case.from_toml(
+        CASES / "hertz_table_9_2.toml",
+        overrides={"grid.window": [nodes, nodes], "grid.spacing": f"{spacing} mm"},
+    )
+    half = nodes // 2
+    assert case.lattice == Lattice(spacing * 1e-3, -half, -half, nodes, nodes)
+    assert case.window_fixed
+
+
+def test_overrides_are_part_of_the_deck_that_the_case_keeps(tmp_path: Path) -> None:
+    path = tmp_path / "deck.toml"
+    path.write_text(DECK, encoding="utf-8")
+    case = Case.from_toml(path, {"grid.nodes_across": None, "grid.spacing": "0.02 mm", "load.1.steps": 7})
+    assert len(case.load_steps) == 7
+    again = Case.from_text(case.deck_text)
+    assert (again.lattice, again.load_steps) == (case.lattice, case.load_steps)
+    with pytest.raises(DeckError, match=r"^override: grid.spacing = -1: expected a length"):
+        Case.from_toml(path, {"grid.nodes_across": None, "grid.spacing": -1})
+
+
+def test_what_this_version_does_not_solve_is_refused_in_one_sentence() -> None:
+    friction = "\n[friction]\ncoefficient = 0.3\n"
+    for text, sentence in [
+        (
+            DECK + friction,
+            "deck:18: friction.coefficient = 0.3: this version solves frictionless contact only",
+        ),
+        (
+            DECK + friction + '[solver]\nalgorithm = "static"\n',
+            'deck:20: solver.algorithm = "static": this version solves frictionless contact only',
+        ),
+        (
+            DECK + friction + '[solver]\nalgorithm = "frictionless"\n',
+            'deck:18: friction.coefficient = 0.3: expected 0, since solver.algorithm = "frictionless"',
+        ),
+    ]:
+        with pytest.raises(DeckError) as error:
+            Case.from_text(text)
+        assert str(error.value) == sentence
+    assert Case.from_text(DECK + "\n[friction]\ncoefficient = 0\n").solver.algorithm == "frictionless"
+    with pytest.raises(
+        DeckError, match=r'friction.coefficient: missing; .* since solver.algorithm = "static"'
+    ):
+        Case.from_text(DECK + '\n[solver]\nalgorithm = "static"\n')
+
+
+def test_fields_that_a_frictionless_run_does_not_have_are_refused() -> None:
+    assert "output.fields" in complaint(nodes_across=21, fields=["pressure", "traction_x"])
+    assert "has no traction_x; it has pressure, gap, zone" in complaint(
+        nodes_across=21, fields=["traction_x"]
+    )
+    assert sphere_on_flat(nodes_across=21, fields=["gap", "displacement_1_z"]).output.fields == (
+        "gap",
+        "displacement_1_z",
+    )
+
+
+# --- Python ------------------------------------------------------------------------------------------------
+
+
+def test_arguments_and_deck_make_the_same_case() -> None:
+    from_deck = Case.from_text(DECK)
+    case = sphere_on_flat(nodes_across=21, steps=2)
+    assert (case.pair, case.load_steps, case.lattice) == (
+        from_deck.pair,
+        from_deck.load_steps,
+        from_deck.lattice,
+    )
+    np.testing.assert_array_equal(case.initial_gap(case.lattice)[0], from_deck.initial_gap(case.lattice)[0])
+    bodies = {"body_1": Body(210e9, 0.3, surface=Sphere(radius=0.01)), "body_2": Body(210e9, 0.3)}
+    assert sphere_on_flat(nodes_across=np.int64(21), **bodies).lattice == case.lattice
+    assert sphere_on_flat(nodes_across=21, body_2=Body(rigid=True)).body_2.rigid
+    assert repr(case) == "Case(frictionless, 21 x 21 nodes, 2 load steps)"
+
+
+def test_a_case_from_python_is_a_deck_too() -> None:
+    case = sphere_on_flat(
+        title="ellipse",
+        body_2={
+            **STEEL,
+            "surface": Paraboloid(radius_x=0.02, radius_y=0.03, angle="20 deg", offset=[1e-5, 0]),
+        },
+        nodes_in_radius=np.float64(8),
+        normal_load=None,
+        loads=[
+            {"normal_load": 50.0, "twist": 0.0},
+            {"repeat": 2, "path": [{"normal_load": np.float32(100)}]},
+        ],
+        tolerance=1e-6,
+    )
+    again = Case.from_text(case.deck_text)
+    for name in (
+        "title",
+        "body_1",
+        "body_2",
+        "pair",
+        "solver",
+        "load_steps",
+        "output",
+        "lattice",
+        "deck_text",
+    ):
+        assert getattr(again, name) == getattr(case, name), name
+    assert Case.from_dict(
+        {"body": {"1": BALL, "2": STEEL}, "grid": {"spacing": 1e-5}, "load": [{"approach": 1e-6}]}
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ({"spacing": -1.0}, 'grid.spacing = -1.0: expected a length above 0 such as "1 mm"'),
+        ({"spacing": math.nan}, 'grid.spacing = nan: expected a length above 0 such as "1 mm"'),
+        ({"nodes_across": 41, "normal_load": -1}, "load.1.normal_load = -1: expected a force of at least 0"),
+        (
+            {"nodes_across": 41, "normal_load": 0},
+            "load.1.normal_load = 0.0: expected a normal load or an approach",
+        ),
+        ({"nodes_across": 41, "normal_load": None}, "load.1: expected at least one of normal_load"),
+        (
+            {"nodes_across": 41, "loads": []},
+            "loads: expected either loads, or normal_load or approach with steps",
+        ),
+        ({"nodes_across": 41, "normal_load": None, "loads": [3]}, "load.1 = 3: expected a table of keys"),
+        (
+            {"nodes_across": 41, "body_1": {**BALL, "poisson_ratio": 0.6}},
+            "body.1.poisson_ratio = 0.6: expected",
+        ),
+        ({"nodes_across": 41, "body_1": 3}, "body.1 = 3: expected a table of keys"),
+        ({"nodes_across": 41, "body_1": STEEL}, "body.2.surface: the two surfaces touch everywhere"),
+        (
+            {"nodes_across": 41, "body_1": {**STEEL, "surface": {"shape": "cylinder", "radius": 1}}},
+            "body.1.surface: the two surfaces touch along a line, so the contact has no end",
+        ),
+        (
+            {
+                "nodes_across": 41,
+                "body_1": {**STEEL, "surface": Punch(radius=1e-3)},
+                "body_2": {**STEEL, "surface": Punch(radius=1e-3, offset=[3e-3, 0])},
+            },
+            "body.2.surface: the two surfaces nowhere face each other",
+        ),
+        ({"spacing": 1e-5, "gap": abs}, "gap: expected either a gap or surfaces of the bodies, not both"),
+        (
+            {"spacing": 1e-5, "body_1": STEEL, "gap": np.ones(3)},
+            "grid: an array gap needs a spacing and a window",
+        ),
+        (
+            {"nodes_in_radius": 5, "body_1": STEEL, "gap": np.ones((3, 3))},
+            "grid: an array gap needs a spacing",
+        ),
+        (
+            {"spacing": 1e-5, "window": [4, 4], "body_1": STEEL, "gap": np.ones((3, 3))},
+            "gap: expected an array of",
+        ),
+        ({"spacing": 1e-5, "body_1": STEEL, "gap": np.full((3, 3), np.nan)}, "gap: expected numbers, or inf"),
+        (
+            {"spacing": 1e-5, "body_1": STEEL, "gap": np.full((3, 3), -np.inf)},
+            "gap: expected numbers, or inf",
+        ),
+    ],
+)
+def test_arguments_get_the_sentences_of_decks(keys: dict[str, Any], sentence: str) -> None:
+    assert complaint(**keys).startswith(sentence)
+
+
+def bowl(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the gap of `BALL` on a flat, with a hole in the middle."""
+    return np.where(np.hypot(x, y) < 5e-5, np.inf, (x**2 + y**2) / 0.02)
+
+
+def test_a_gap_may_be_a_function_or_an_array() -> None:
+    by_function = sphere_on_flat(body_1=STEEL, gap=bowl, nodes_across=31)
+    assert not by_function.window_fixed
+    gap, candidate = by_function.initial_gap(by_function.lattice)
+    assert not candidate[15, 15]
+    assert candidate[0, 0]
+
+    by_array = sphere_on_flat(body_1=STEEL, gap=gap, lattice=by_function.lattice)
+    assert by_array.window_fixed
+    assert by_array.lattice == by_function.lattice
+    np.testing.assert_array_equal(by_array.initial_gap(by_array.lattice)[0], gap)
+    without_lattice = sphere_on_flat(body_1=STEEL, gap=gap.tolist(), spacing=by_function.lattice.spacing)
+    assert without_lattice.lattice == by_function.lattice
+    first, second = solved(by_function), solved(by_array)
+    np.testing.assert_array_equal(first.pressure, second.pressure)
+    assert first.pressure[15, 15] == 0
+
+    for case in (by_function, by_array):
+        with pytest.raises(DeckError, match="the gap of this case was given in Python"):
+            Case.from_text(case.deck_text)
+
+
+def test_cases_survive_pickling() -> None:
+    for case in (
+        sphere_on_flat(nodes_across=21),
+        sphere_on_flat(body_1=STEEL, gap=bowl, nodes_across=21),
+        sphere_on_flat(body_1=STEEL, gap=np.ones((5, 5)), spacing=1e-5),
+    ):
+        copy = pickle.loads(pickle.dumps(case))
+        assert (copy.lattice, copy.load_steps, copy.deck_text) == (
+            case.lattice,
+            case.load_steps,
+            case.deck_text,
+        )
+        np.testing.assert_array_equal(copy.initial_gap(copy.lattice)[0], case.initial_gap(case.lattice)[0])
+
+
+# --- the window --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("keys", [{"nodes_in_radius": 20}, {"nodes_across": 41}, {"spacing": 1e-5}])
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (1.3e-3, -0.7e-3)])
+def test_an_automatic_window_holds_the_contact_with_little_to_spare(
+    keys: dict[str, Any], offset: tuple[float, float]
+) -> None:
+    case = sphere_on_flat(body_1={**STEEL, "surface": Sphere(radius=0.01, offset=offset)}, **keys)
+    assert not case.window_fixed
+    a = hertz_radius(case, 0.01, 100.0)
+    if "nodes_in_radius" in keys:
+        # the coarse estimate is good to a few per cent
+        assert a / case.lattice.spacing == pytest.approx(20, rel=0.05)
+    if "nodes_across" in keys:
+        assert case.lattice.shape == (41, 41)
+    solution = solved(case)
+    assert not on_rim(solution.zone)
+    assert (
+        np.hypot(case.lattice.x - offset[0], case.lattice.y - offset[1])[solution.zone > 0].max() < 1.05 * a
+    )
+    # the smallest rhombus about a disc is 2 a/sin(60 degrees) wide
+    needed = 2 * a / math.sin(math.pi / 3) / case.lattice.spacing + 1
+    assert max(case.lattice.shape) <= 1.2 * needed + 6
+
+
+@pytest.mark.parametrize("loads", [[{"approach": 2e-6}], [{"approach": 1e-6}, {"normal_load": 100.0}]])
+def test_the_window_is_made_for_the_largest_load_of_any_kind(loads: list[dict[str, Any]]) -> None:
+    case = sphere_on_flat(normal_load=None, loads=[*loads, {"normal_load": 1.0}], nodes_in_radius=10)
+    radius = max(
+        math.sqrt(0.01 * step.z.value)
+        if step.z.control == "displacement"
+        else hertz_radius(case, 0.01, step.z.value)
+        for step in case.load_steps
+    )
+    assert radius / case.lattice.spacing == pytest.approx(10, rel=0.06)
+
+
+def test_a_rectangular_extent_is_covered() -> None:
+    case = sphere_on_flat(spacing=1e-5, extent=[1.2e-3, 0.6e-3], center=[1e-4, 0])
+    assert case.window_fixed
+    assert case.lattice == Lattice.covering(1e-5, (1e-4, 0.0), 1.2e-3, 0.6e-3)
+    for keys in (
+        {"nodes_across": 61},
+        {"nodes_across": 60},
+        {"nodes_across": 60, "center": [1.23e-4, 0.5e-5]},
+    ):
+        lattice = sphere_on_flat(extent=[1.2e-3, 0.6e-3], **keys).lattice
+        assert lattice.shape == (keys["nodes_across"],) * 2
+        center = keys.get("center", (0.0, 0.0))
+        needed = Lattice.covering(lattice.spacing, center, 1.2e-3, 0.6e-3)
+        assert lattice.row_first <= needed.row_first
+        assert lattice.col_first <= needed.col_first
+        assert lattice.row_first + lattice.n_row >= needed.row_first + needed.n_row
+        assert lattice.col_first + lattice.n_col >= needed.col_first + needed.n_col
+        finer = Lattice.covering(lattice.spacing * 0.96, center, 1.2e-3, 0.6e-3)
+        assert max(finer.shape) > lattice.n_col - 1  # no finer spacing would have done
+
+
+@pytest.mark.parametrize(("shape", "first"), [([61, 63], (-30, -31)), ([60, 62], (-30, -31))])
+def test_a_given_window_is_centered(shape: list[int], first: tuple[int, int]) -> None:
+    lattice = sphere_on_flat(spacing=1e-5, window=shape).lattice
+    assert (lattice.row_first, lattice.col_first) == first
+    assert lattice.shape == tuple(shape)
+    moved = sphere_on_flat(spacing=1e-5, window=shape, center=[-3.2e-5, 0.2e-5], origin=[0.5e-5, 0]).lattice
+    assert (moved.row_first, moved.col_first) == (first[0], first[1] - 4)
+    assert moved.origin == (0.5e-5, 0.0)
+
+
+def test_windows_that_do_not_fit_the_contact_are_refused() -> None:
+    for keys, sentence in [
+        ({"spacing": 1e-3}, "grid.spacing = 0.001: the spacing of 1 mm is larger than the contact"),
+        ({"spacing": 1e-3, "window": [41, 41]}, "grid.spacing = 0.001: the spacing of 1 mm is larger"),
+        (
+            {"nodes_across": 5, "extent": [0.01, 0.01]},
+            "grid.nodes_across = 5: the spacing of 3.94 mm is larger",
+        ),
+        ({"spacing": 1e-5, "window": [5, 5]}, "grid.window = [5, 5]: the window is smaller than the contact"),
+        ({"spacing": 1e-5, "extent": [1e-4, 1e-4]}, "grid.extent = [0.0001, 0.0001]: the window is smaller"),
+        (
+            {"spacing": 1e-5, "window": [51, 51], "center": [1e-3, 0]},
+            "grid.window = [51, 51]: the window is smaller",
+        ),
+        ({"spacing": 1e-10}, "grid.spacing = 1e-10: expected at most 100000 nodes along a side"),
+    ]:
+        assert complaint(**keys).startswith(sentence)
+    assert "expected at least [4" in complaint(spacing=1e-5, window=[5, 5])
+
+
+def test_a_contact_without_end_is_refused() -> None:
+    def groove(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        return x**2 + 0 * y
+
+    def nothing(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 0 * x
+
+    for gap in (groove, nothing):
+        assert complaint(body_1=STEEL, gap=gap, nodes_across=21).startswith(
+            "grid: no window can be found: the"
+        )
+
+
+def test_growing_keeps_the_nodes() -> None:
+    case = sphere_on_flat(nodes_across=21)
+    lattice = case.lattice
+    larger = case.grown(lattice)
+    assert (larger.spacing, larger.origin) == (lattice.spacing, lattice.origin)
+    assert larger.shape == (33, 33)
+    assert (larger.row_first, larger.col_first) == (lattice.row_first - 6, lattice.col_first - 6)
+    contact = np.zeros(lattice.shape, dtype=bool)
+    contact[0, 5] = contact[7, -1] = True
+    larger = case.grown(lattice, contact)
+    assert larger.shape == (27, 27)
+    assert (larger.row_first, larger.col_first) == (lattice.row_first - 6, lattice.col_first)
+
+
+def test_the_method_is_chosen_by_the_size() -> None:
+    case = sphere_on_flat(nodes_across=41)
+    assert case.method_for(Lattice(1e-5, 0, 0, 10, 10)) == "direct"
+    assert case.method_for(case.lattice) == "fft"
+    assert sphere_on_flat(nodes_across=41, method="direct").method_for(case.lattice) == "direct"
+    assert case.memory_needed(case.lattice) < sphere_on_flat(nodes_across=41, method="direct").memory_needed(
+        case.lattice
+    )
+
+
+# Contacts of all sizes, as ratios so that they stay physical: radius of the sphere, a/R, E.
+@settings(deadline=None, max_examples=25)
+@given(
+    st.floats(-7, 3),
+    st.floats(-6, -1),
+    st.floats(3, 12),
+    st.floats(0.05, 1.0),
+    st.floats(-90, 90),
+    st.booleans(),
+)
+def test_the_estimate_is_right_for_any_hertzian_contact(
+    log_radius: float, log_ratio: float, log_modulus: float, aspect: float, angle: float, by_load: bool
+) -> None:
+    radius, modulus = 10.0**log_radius, 10.0**log_modulus
+    surface = Paraboloid(radius_x=radius, radius_y=aspect * radius, angle=f"{angle} deg")
+    a = 10.0**log_ratio * math.sqrt(aspect) * radius
+    # of a sphere with the same Gaussian curvature; an ellipse is not far from it
+    load = 4 * modulus / (1 - 0.3**2) * a**3 / (3 * math.sqrt(aspect) * radius)
+    body = {"young_modulus": modulus, "poisson_ratio": 0.3, "surface": surface}
+    target = {"normal_load": load} if by_load else {"approach": a**2 / (math.sqrt(aspect) * radius)}
+    case = Case(body_1=body, body_2={"rigid": True}, nodes_in_radius=10, **target)
+    solution = solved(case)
+    assert solution.converged
+    assert not on_rim(solution.zone)
+    area = case.lattice.cell_area * np.count_nonzero(solution.zone)
+    # an estimate from some 200 nodes in contact
+    assert math.sqrt(area / math.pi) / case.lattice.spacing == pytest.approx(10, rel=0.08)
+
+
+# --- nothing but a DeckError -------------------------------------------------------------------------------
+
+NASTY = st.sampled_from(
+    [
+        "nan",
+        "inf",
+        "-inf",
+        "-1",
+        "0",
+        "1e308",
+        "5e-324",
+        "1e400",
+        "true",
+        '""',
+        '"3 kg"',
+        '"1e999 mm"',
+        "[]",
+        "{}",
+        "[[]]",
+    ]
+    + [
+        '"1 mm"',
+        '"5 deg"',
+        '"\u0000"',
+        "2026-01-01",
+        "99999999999999999999",
+        "[nan, 1]",
+        '{ shape = "cone" }',
+        "'x'",
+    ]
+    + [
+        '"rigid"',
+        "[1, 2, 3]",
+        "0x7fffffff",
+        '"1 mm^99"',
+        "[41, 41]",
+        '["1 mm", 2]',
+        '"frictionless"',
+        "1e-30",
+        "1e30",
+    ]
+)
+KEYS = st.sampled_from(
+    [
+        "young_modulus",
+        "poisson_ratio",
+        "surface",
+        "rigid",
+        "nodes_across",
+        "spacing",
+        "window",
+        "extent",
+        "center",
+    ]
+    + [
+        "normal_load",
+        "approach",
+        "steps",
+        "values",
+        "path",
+        "repeat",
+        "ramp",
+        "shape",
+        "radius",
+        "offset",
+        "angle",
+    ]
+    + [
+        "nodes_in_radius",
+        "origin",
+        "title",
+        "tolerance",
+        "torque",
+        "twist",
+        "label",
+        "exponent",
+        "coefficient",
+    ]
+)
+TEXTS = [DECK, *(starters.text(name) for name in starters.names())]
+
+
+@st.composite
+def mutated_decks(draw: st.DrawFn) -> str:
+    lines = draw(st.sampled_from(TEXTS)).splitlines()
+    for _ in range(draw(st.integers(1, 4))):
+        place = draw(st.integers(0, len(lines) - 1))
+        kind = draw(st.sampled_from(["value", "key", "drop", "double", "insert", "cut", "swap"]))
+        if kind == "value" and "=" in lines[place]:
+            lines[place] = lines[place].split("=")[0] + "= " + draw(NASTY)
+        elif kind == "key" and "=" in lines[place]:
+            lines[place] = draw(KEYS) + " =" + lines[place].split("=", 1)[1]
+        elif kind == "drop" and len(lines) > 1:
+            del lines[place]
+        elif kind == "double":
+            lines.insert(place, lines[place])
+        elif kind == "insert":
+            lines.insert(place, f"{draw(KEYS)} = {draw(NASTY)}")
+        elif kind == "cut":
+            lines[place] = lines[place][: draw(st.integers(0, len(lines[place])))]
+        elif kind == "swap":
+            other = draw(st.integers(0, len(lines) - 1))
+            lines[place], lines[other] = lines[other], lines[place]
+    return "\n".join(lines)
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
+@given(mutated_decks())
+def test_a_mutated_deck_is_a_case_or_a_deck_error(text: str) -> None:
+    try:
+        case = Case.from_text(text)
+    except DeckError as error:
+        assume(False) if not str(error) else None
+        return
+    assert case.lattice.size > 0
+    assert case.load_steps

@@ -1,0 +1,623 @@
+"""Decks: what they say, what is wrong with the wrong ones, and the load history they stand for."""
+
+import math
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from hexcontact import deck as decks
+from hexcontact.deck import Deck, Load, read_toml, with_overrides
+from hexcontact.errors import DeckError
+from hexcontact.load_history import LoadStep, Target, load_steps
+from hexcontact.messages import Source, line_of, shown
+from hexcontact.surfaces import Flat, Sphere
+
+ROOT = Path(__file__).parents[2]
+
+GOOD = """\
+title = "Sphere on flat"
+
+[body.1]
+young_modulus = "432 GPa"
+poisson_ratio = 0.32
+surface = { shape = "sphere", radius = "1 mm" }
+
+[body.2]
+young_modulus = 72e9
+poisson_ratio = 0.32
+
+[friction]
+coefficient = inf
+
+[grid]
+spacing = "3.5 um"
+extent = ["0.2 mm", "0.2 mm"]
+
+[solver]
+algorithm = "incremental"
+method = "fft"
+
+[[load]]
+normal_load = "31.5 N"
+steps = 10
+ramp = "cubic"
+label = "press"
+
+[[load]]
+tangential_load_x = "3 N"
+twist = "0.1 deg"
+steps = 30
+
+[output]
+file = "fretting.nc"
+fields = ["pressure", "traction_x"]
+every = 5
+"""
+
+
+def parse(text: str) -> Deck:
+    return Deck.parse(tomllib.loads(text), Source("deck.toml", text))
+
+
+def changed(old: str, new: str) -> str:
+    assert old in GOOD
+    return GOOD.replace(old, new, 1)
+
+
+def complaint(text: str) -> str:
+    with pytest.raises(DeckError) as error:
+        parse(text)
+    assert error.value.exit_code == 2
+    return str(error.value)
+
+
+def test_a_deck_in_si() -> None:
+    deck = parse(GOOD)
+    assert deck.title == "Sphere on flat"
+    assert deck.body.body_1.young_modulus == 432e9
+    assert deck.body.body_1.surface == Sphere(radius=1e-3)
+    assert deck.body.body_2.young_modulus == 72e9
+    assert deck.body.body_2.surface == Flat()
+    assert deck.friction is not None
+    assert deck.friction.coefficient == math.inf
+    assert (deck.grid.spacing, deck.grid.extent) == (3.5e-6, (2e-4, 2e-4))
+    assert (deck.grid.origin, deck.grid.center) == ((0.0, 0.0), None)
+    assert (deck.solver.algorithm, deck.solver.method) == ("incremental", "fft")
+    assert (deck.solver.tolerance, deck.solver.coupling) == (1e-8, "full")
+    assert (deck.load[0].normal_load, deck.load[0].steps, deck.load[0].label) == (31.5, 10, "press")
+    assert deck.load[1].twist == pytest.approx(math.radians(0.1), rel=1e-15)
+    assert (deck.output.file, deck.output.fields, deck.output.every) == (
+        "fretting.nc",
+        ("pressure", "traction_x"),
+        5,
+    )
+
+
+WRONG = [
+    (
+        "poisson_ratio = 0.32\ns",
+        "poison_ratio = 0.32\ns",
+        "body.1.poison_ratio: unknown key; did you mean poisson_ratio?",
+    ),
+    ('title = "Sphere on flat"', "titel = 1", "titel: unknown key; did you mean title?"),
+    ("every = 5", "evry = 5", "output.evry: unknown key; did you mean every?"),
+    ("every = 5", "qqqq = 5", "output.qqqq: unknown key; known here: every, fields and file"),
+    (
+        "[friction]\ncoefficient = inf",
+        "[friktion]\ncoefficient = inf",
+        "friktion: unknown key; did you mean friction?",
+    ),
+    ("coefficient = inf", "", "friction.coefficient: missing; expected a number of at least 0 (or inf)"),
+    (
+        'shape = "sphere", radius = "1 mm"',
+        'shape = "sphere"',
+        'body.1.surface.radius: missing; expected a length above 0 such as "1 mm"',
+    ),
+    (
+        'shape = "sphere", radius = "1 mm"',
+        'shape = "sphere", radius = 1, exat = true',
+        "body.1.surface.exat: unknown key; did you mean exact?",
+    ),
+    (
+        'young_modulus = "432 GPa"\n',
+        "",
+        'body.1.young_modulus: missing; expected a pressure such as "210 GPa", or rigid = true',
+    ),
+    (
+        "poisson_ratio = 0.32\ns",
+        "poisson_ratio = 0.6\ns",
+        "body.1.poisson_ratio = 0.6: expected a number above -1 and at most 0.5",
+    ),
+    (
+        "poisson_ratio = 0.32\ns",
+        "poisson_ratio = -1.0\ns",
+        "body.1.poisson_ratio = -1.0: expected a number above -1 and at most 0.5",
+    ),
+    ("72e9", "0", 'body.2.young_modulus = 0: expected a pressure above 0 such as "210 GPa"'),
+    ("72e9", '"-72 GPa"', 'body.2.young_modulus = "-72 GPa": expected a pressure above 0 such as "210 GPa"'),
+    ("72e9", "nan", 'body.2.young_modulus = nan: expected a pressure above 0 such as "210 GPa"'),
+    ("72e9", "inf", 'body.2.young_modulus = inf: expected a pressure above 0 such as "210 GPa"'),
+    ("72e9", "true", 'body.2.young_modulus = true: expected a pressure above 0 such as "210 GPa"'),
+    (
+        'radius = "1 mm"',
+        'radius = "-1 mm"',
+        'body.1.surface.radius = "-1 mm": expected a length above 0 such as "1 mm"',
+    ),
+    (
+        'normal_load = "31.5 N"',
+        "normal_load = -1",
+        'load.1.normal_load = -1: expected a force of at least 0 such as "10 N"',
+    ),
+    (
+        "coefficient = inf",
+        "coefficient = -0.1",
+        "friction.coefficient = -0.1: expected a number of at least 0 (or inf)",
+    ),
+    (
+        "coefficient = inf",
+        "coefficient = nan",
+        "friction.coefficient = nan: expected a number of at least 0 (or inf)",
+    ),
+    ("steps = 10", "steps = 0", "load.1.steps = 0: expected a whole number of at least 1"),
+    ("steps = 10", "steps = 2.0", "load.1.steps = 2.0: expected a whole number of at least 1"),
+    ("steps = 10", "steps = true", "load.1.steps = true: expected a whole number of at least 1"),
+    ("steps = 10", "steps = 1000000", "load.1.steps = 1000000: expected a whole number of at most 100000"),
+    (
+        'method = "fft"',
+        "tolerance = 0",
+        "solver.tolerance = 0: expected a number of at least 1e-14 and at most 0.1",
+    ),
+    (
+        'radius = "1 mm"',
+        'radius = "3 kg"',
+        'body.1.surface.radius = "3 kg": expected a length above 0 such as "1 mm"; "kg" is a mass',
+    ),
+    (
+        'spacing = "3.5 um"',
+        'spacing = "3.5"',
+        'grid.spacing = "3.5": expected a length above 0 such as "1 mm"; a quoted value needs its unit',
+    ),
+    (
+        'twist = "0.1 deg"',
+        "twist = 0.1",
+        'load.2.twist = 0.1: expected an angle with its unit such as "30 deg"',
+    ),
+    (
+        '"incremental"',
+        '"incremntal"',
+        'solver.algorithm = "incremntal": expected "frictionless", "static" or "incremental"; did you '
+        "mean incremental?",
+    ),
+    (
+        '"sphere"',
+        '"spere"',
+        'body.1.surface.shape = "spere": expected "flat", "sphere", "paraboloid", "cylinder", "cone", '
+        '"power", "punch" or "rounded_punch"; did you mean sphere?',
+    ),
+    (
+        '{ shape = "sphere", radius = "1 mm" }',
+        "{ radius = 1 }",
+        'body.1.surface.shape: missing; expected "flat", "sphere", "paraboloid", "cylinder", "cone", '
+        '"power", "punch" or "rounded_punch"',
+    ),
+    (
+        '{ shape = "sphere", radius = "1 mm" }',
+        '"sphere"',
+        'body.1.surface = "sphere": expected a table such as { shape = "sphere", radius = "1 mm" }',
+    ),
+    (
+        '"sphere"',
+        '"heights"',
+        'body.1.surface.shape = "heights": this version reads no height maps from files; give the gap '
+        "as an array in Python: hexcontact.Case(gap=..., lattice=...)",
+    ),
+    (
+        'fields = ["pressure", "traction_x"]',
+        'fields = ["pressure", "tractionx"]',
+        'output.fields = ["pressure", "tractionx"]: expected an array of field names such as '
+        '["pressure", "gap", "zone"]; entry 2, "tractionx": expected ',
+    ),
+    ('title = "Sphere on flat"', "title = 3", "title = 3: expected text in quotes"),
+    ("every = 5", "every = []", "output.every = []: expected a whole number of at least 1"),
+    (
+        "poisson_ratio = 0.32\nsurface",
+        "poisson_ratio = 0.32\nrigid = 1\nsurface",
+        "body.1.rigid = 1: expected true or false",
+    ),
+    (
+        "poisson_ratio = 0.32\nsurface",
+        "poisson_ratio = 0.32\nrigid = true\nsurface",
+        "body.1.poisson_ratio = 0.32: expected nothing, since the body is rigid",
+    ),
+    (
+        'spacing = "3.5 um"',
+        "",
+        "grid.spacing: missing; expected one of spacing, nodes_across and nodes_in_radius",
+    ),
+    (
+        'spacing = "3.5 um"',
+        'spacing = "3.5 um"\nnodes_across = 41',
+        "grid.nodes_across = 41: expected only one of spacing, nodes_across and nodes_in_radius; "
+        "spacing is given too",
+    ),
+    (
+        'spacing = "3.5 um"',
+        'spacing = "3.5 um"\nwindow = [3, 3]',
+        "grid.window = [3, 3]: expected window or extent, not both",
+    ),
+    (
+        'extent = ["0.2 mm", "0.2 mm"]',
+        "window = [3]",
+        "grid.window = [3]: expected two whole numbers such as [41, 41]",
+    ),
+    (
+        'extent = ["0.2 mm", "0.2 mm"]',
+        'extent = "all"',
+        'grid.extent = "all": expected "auto" or two lengths such as ["2 mm", "2 mm"]',
+    ),
+    (
+        'normal_load = "31.5 N"',
+        'normal_load = "31.5 N"\napproach = 1',
+        "load.1.approach = 1: expected normal_load or approach, not both",
+    ),
+    (
+        'tangential_load_x = "3 N"\ntwist = "0.1 deg"',
+        "",
+        "load.2: expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ...",
+    ),
+    (
+        'tangential_load_x = "3 N"',
+        'ramp = "cubic"',
+        'load.2.ramp = "cubic": a cubic ramp needs normal_load in the same segment',
+    ),
+    ("steps = 10\n", "values = [0.5, 1]\n", 'load.1.ramp = "cubic": expected ramp or values, not both'),
+    (
+        'ramp = "cubic"',
+        "values = [0.5, 1]",
+        "load.1.steps = 10: expected 2, as many as there are values (or no steps at all)",
+    ),
+    (
+        'steps = 10\nramp = "cubic"',
+        "values = [0.5, 0.4, 1]",
+        "load.1.values = [0.5, 0.4, 1]: expected fractions of the segment, rising to 1, such as [0.1, "
+        "0.4, 1]",
+    ),
+    (
+        'steps = 10\nramp = "cubic"',
+        "values = [0.5, 0.9]",
+        "load.1.values = [0.5, 0.9]: expected fractions of the segment, rising to 1, such as [0.1, 0.4, 1]",
+    ),
+    ("steps = 10", "repeat = 10", "load.1.repeat = 10: needs a path of segments to repeat"),
+    (
+        "steps = 10",
+        "path = [{normal_load = 1}]",
+        'load.1.normal_load = "31.5 N": expected inside the path, not beside it',
+    ),
+    ("steps = 10", "path = []", "load.1.path: expected at least one entry"),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"), WRONG, ids=[new.replace("\n", " ") for _, new, _ in WRONG]
+)
+def test_each_mistake_gets_its_sentence(old: str, new: str, sentence: str) -> None:
+    assert f": {sentence}" in complaint(changed(old, new))
+
+
+def test_everything_wrong_is_reported_at_once() -> None:
+    text = GOOD.replace("0.32\nsurface", "0.7\nsurface").replace('"1 mm"', '"3 kg"').replace("every", "evry")
+    text = text.replace("72e9", "-1").replace("steps = 10", "steps = -1").replace('"3.5 um"', '"1 s"')
+    keys = [line.split(": ")[1].split(" = ")[0] for line in complaint(text).splitlines()]
+    assert keys == [
+        "body.1.poisson_ratio",
+        "body.1.surface.radius",
+        "body.2.young_modulus",
+        "grid.spacing",
+        "load.1.steps",
+        "output.evry",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "start"),
+    [
+        ("Sphere on flat", "x\ny", "deck.toml:1: is not TOML"),
+        ("0.32\nsurface", "7\nsurface", "deck.toml:5: body.1.poisson_ratio = 7: "),
+        ('radius = "1 mm"', "radius = 0", "deck.toml:6: body.1.surface.radius = 0: "),
+        (', radius = "1 mm"', "", "deck.toml:6: body.1.surface.radius: missing"),
+        ("coefficient = inf", "", "deck.toml:12: friction.coefficient: missing"),
+        ("steps = 30", "steps = 0", "deck.toml:32: load.2.steps = 0: "),
+    ],
+)
+def test_messages_point_at_the_line(old: str, new: str, start: str) -> None:
+    with pytest.raises(DeckError) as error:
+        Deck.parse(decks.parse_toml(changed(old, new), "deck.toml"), Source("deck.toml", changed(old, new)))
+    assert str(error.value).startswith(start)
+
+
+def test_rigid_bodies() -> None:
+    elastic = "young_modulus = 72e9\npoisson_ratio = 0.32\n\n[friction]"
+    assert parse(changed(elastic, "rigid = true\n\n[friction]")).body.body_2.rigid
+    both = GOOD.replace(elastic, "rigid = true\n\n[friction]").replace(
+        'young_modulus = "432 GPa"\npoisson_ratio = 0.32', "rigid = true"
+    )
+    assert "body.2 = {rigid = true}: expected one elastic body at least; both are rigid" in complaint(both)
+
+
+def test_whole_tables_of_the_wrong_kind() -> None:
+    one_load = "\n".join(GOOD.split("[[load]]")[0].splitlines()) + "\n[load]\nnormal_load = 1\n"
+    assert "load: expected an array of tables: write [[load]]" in complaint(one_load)
+    assert "body.1 = 3: expected a table of keys" in complaint("body = { 1 = 3 }")
+    empty = complaint("")
+    for key in ("body", "grid", "load"):
+        assert f"deck.toml: {key}: missing; expected" in empty
+
+
+# --- files -------------------------------------------------------------------------------------------------
+
+
+def test_read_toml(tmp_path: Path) -> None:
+    path = tmp_path / "deck.toml"
+    path.write_text(GOOD, encoding="utf-8")
+    data, text = read_toml(path)
+    assert text == GOOD
+    assert data == tomllib.loads(GOOD)
+    path.write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())  # as Windows editors save it
+    assert read_toml(path)[0] == data
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"a = 1\nb = \n", ":2: is not TOML: Invalid value at column 5"),
+        (b"a = 1\na = 2\n", ":2: is not TOML: Cannot overwrite a value"),
+        (b'a = "x', "is not TOML: "),
+        (b"\xff\xfe", ": is not UTF-8 text (byte 0); expected a deck (a TOML file)"),
+        (b"CDF\x01\x00", ":1: is not TOML: "),
+        (b"a = " + b"[" * 20000, ": is not TOML: nested too deeply"),
+        (b"a = " + b"9" * 5000, ": is not TOML: "),
+    ],
+)
+def test_unreadable_text(tmp_path: Path, content: bytes, sentence: str) -> None:
+    path = tmp_path / "deck.toml"
+    path.write_bytes(content)
+    with pytest.raises(DeckError) as error:
+        read_toml(path)
+    assert str(error.value).startswith(f"{path}:")
+    assert sentence in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    for path, sentence in [
+        (tmp_path / "none.toml", "no such file"),
+        (tmp_path, "is a folder"),
+        (tmp_path / ("x" * 300), "cannot be read"),
+        (tmp_path / "a\0b", "cannot be read"),
+    ]:
+        with pytest.raises(DeckError, match=sentence):
+            read_toml(path)
+
+
+def test_overrides() -> None:
+    data = tomllib.loads(GOOD)
+    new = with_overrides(
+        data,
+        {"grid.spacing": None, "grid.nodes_across": 41, "load.2.steps": 3, "body.2.surface.shape": "flat"},
+    )
+    assert new["grid"] == {"nodes_across": 41, "extent": ["0.2 mm", "0.2 mm"]}
+    assert new["load"][1]["steps"] == 3
+    assert new["body"]["2"]["surface"] == {"shape": "flat"}
+    assert data == tomllib.loads(GOOD)
+    for key in ("load.3.steps", "load.0.steps", "load.x.steps", "load.3"):
+        with pytest.raises(DeckError, match=r"expected an entry from 1 to 2"):
+            with_overrides(data, {key: 1})
+    with pytest.raises(DeckError, match=r"title.x.y: expected a key of a table"):
+        with_overrides(data, {"title.x.y": 1})
+
+
+def test_lines_of_keys() -> None:
+    text = '[a]\nb = 1\n"c d" = 2 # [x]\n\n[[l]]\nb = """\nb = 3\n"""\n[[l]]\nb = { c = 1,\n d = 2 }\n'
+    assert line_of(text, "a") == 1
+    assert line_of(text, "a.b") == 2
+    assert line_of(text, "a.c d") == 3
+    assert line_of(text, "l.1.b") == 6
+    assert line_of(text, "l.1.z") == 5
+    assert line_of(text, "l.2.b.d") == 10
+    assert line_of(text, "nothing") is None
+    assert line_of("body.1.rigid = true\n[body]\n2.rigid = true\n", "body.1.rigid") == 1
+    assert line_of("body.1.rigid = true\n[body]\n2.rigid = true\n", "body.2.rigid") == 3
+
+
+def test_values_are_shown_as_decks_write_them() -> None:
+    assert shown('a"b') == '"a\\"b"'
+    assert shown([1, "x", {"a": 2.5, "b": False}]) == '[1, "x", {a = 2.5, b = false}]'
+    assert len(shown("x" * 1000)) == 60
+    assert len(shown(10**5000)) == 60
+    deep: list[object] = []
+    for _ in range(10000):
+        deep = [deep]
+    assert shown(deep) == "[[[[[...]]]]]"
+
+
+# --- the load history --------------------------------------------------------------------------------------
+
+
+def history(*loads: dict[str, object], mu: float = math.inf) -> tuple[LoadStep, ...]:
+    steps, problems = load_steps([Load(**load) for load in loads], mu)
+    assert problems == []
+    return steps
+
+
+def complaints(*loads: dict[str, object], mu: float) -> dict[str, str]:
+    _, problems = load_steps([Load(**load) for load in loads], mu)
+    return {".".join(map(str, problem.key)): problem.sentence for problem in problems}
+
+
+def test_defaults_hold_everything_but_what_is_named() -> None:
+    (step,) = history({"normal_load": 5.0})
+    assert step == LoadStep(
+        index=0,
+        segment=0,
+        label="",
+        z=Target("force", 5.0),
+        x=Target("force", 0.0),
+        y=Target("force", 0.0),
+        twist=Target("displacement", 0.0),
+    )
+
+
+def test_linear_ramps_go_from_where_the_last_one_ended() -> None:
+    steps = history(
+        {"normal_load": 10.0, "steps": 4, "label": "press"},
+        {"tangential_load_x": 3.0, "tangential_load_y": -1.0, "steps": 2},
+        {"normal_load": 4.0, "torque": 2.0, "steps": 2},
+        {"twist": "1 rad"},
+    )
+    assert [step.index for step in steps] == list(range(9))
+    assert [step.segment for step in steps] == [0] * 4 + [1] * 2 + [2] * 2 + [3]
+    assert [step.label for step in steps] == ["press"] * 4 + [""] * 5
+    assert [step.z.value for step in steps] == [2.5, 5, 7.5, 10, 10, 10, 7, 4, 4]
+    assert [step.x.value for step in steps] == [0, 0, 0, 0, 1.5, 3, 3, 3, 3]
+    assert [step.y.value for step in steps] == [0, 0, 0, 0, -0.5, -1, -1, -1, -1]
+    assert [step.twist.control for step in steps] == ["displacement"] * 6 + ["force"] * 2 + ["displacement"]
+    assert [step.twist.value for step in steps] == [0] * 6 + [1.0, 2.0, 1.0]
+    # the torque takes over from a twist held at 0, which it had to be given before: only its share is known
+    assert [step.twist.from_start for step in steps] == [0] * 6 + [0.5, 0, 0]
+
+
+def test_cubic_ramps() -> None:
+    # P_k = (P0^(1/3) + (k/n) (P1^(1/3) - P0^(1/3)))^3; other loads stay linear
+    steps = history(
+        {"normal_load": 8.0, "tangential_load_x": 2.0, "steps": 4, "ramp": "cubic"},
+        {"normal_load": 27.0, "steps": 2, "ramp": "cubic"},
+        {"normal_load": 0.0, "tangential_load_x": 0.0, "steps": 3, "ramp": "cubic"},
+    )
+    expected = [0.5**3, 1.0, 1.5**3, 8.0, 2.5**3, 27.0, 8.0, 1.0, 0.0]
+    assert [step.z.value for step in steps] == pytest.approx(expected, rel=1e-14)
+    assert [step.x.value for step in steps[:6]] == [0.5, 1.0, 1.5] + [2.0] * 3
+    assert [step.x.value for step in steps[6:]] == pytest.approx([4 / 3, 2 / 3, 0.0], rel=1e-14)
+    assert steps[3].z.value == 8.0
+    assert steps[-1].z.value == 0.0
+
+
+def test_given_fractions() -> None:
+    steps = history({"normal_load": 10.0}, {"normal_load": 20.0, "shift_x": 1.0, "values": [0.1, "40 %", 1]})
+    assert [step.z.value for step in steps] == [10, 11, 14, 20]
+    assert [step.x for step in steps[1:]] == [
+        Target("displacement", 0.1, 0.9),
+        Target("displacement", 0.4, 0.6),
+        Target("displacement", 1.0),
+    ]
+
+
+def test_a_change_of_control_starts_from_the_value_reached() -> None:
+    steps = history(
+        {"approach": 2.0, "steps": 2}, {"normal_load": 10.0, "steps": 4}, {"approach": 1.0, "steps": 2}
+    )
+    assert [step.z.control for step in steps] == ["displacement"] * 2 + ["force"] * 4 + ["displacement"] * 2
+    # the first segment starts from zero, which needs no solution to know
+    assert [step.z.at(math.nan) for step in steps[:1]] != [1.0]
+    assert [step.z.from_start for step in steps[:2]] == [0, 0]
+    assert [step.z.value for step in steps[:2]] == [1, 2]
+    assert [step.z.at(6.0) for step in steps[2:6]] == [7, 8, 9, 10]
+    assert [step.z.at(3.0) for step in steps[6:]] == [2, 1]
+
+
+def test_cycles() -> None:
+    steps = history(
+        {"normal_load": 10.0},
+        {
+            "repeat": 2,
+            "label": "cycle",
+            "path": [{"normal_load": 4.0, "steps": 2, "label": "down"}, {"normal_load": 10.0}],
+        },
+        {"path": [{"normal_load": 1.0}]},
+    )
+    assert [step.z.value for step in steps] == [10, 7, 4, 10, 7, 4, 10, 1]
+    assert [step.segment for step in steps] == [0, 1, 1, 2, 3, 3, 4, 5]
+    assert [step.label for step in steps] == ["", "down", "down", "cycle", "down", "down", "cycle", ""]
+
+
+def test_a_history_of_too_many_steps_is_refused_before_it_is_unrolled() -> None:
+    path = [{"normal_load": 1.0, "steps": 100_000}]
+    assert complaints({"repeat": 100_000, "path": path}, mu=0.0) == {
+        "load": "expected at most 100000 load steps in all, not 10000000000"
+    }
+
+
+@pytest.mark.parametrize(
+    "loads",
+    [
+        [{"normal_load": 0.0}],
+        [{"normal_load": 0.0, "steps": 3}, {"normal_load": 0.0}],
+        [{"approach": -1.0}],
+        [{"shift_x": 1.0}],
+    ],
+)
+def test_a_history_that_never_presses_is_refused(loads: list[dict[str, object]]) -> None:
+    (sentence,) = complaints(*loads, mu=math.inf).values()
+    assert sentence == "expected a normal load or an approach above zero somewhere in the history"
+
+
+def test_the_normal_load_may_return_to_zero() -> None:
+    assert history({"normal_load": 1.0}, {"normal_load": 0.0}, mu=0.0)[-1].z.value == 0.0
+
+
+@pytest.mark.parametrize("key", ["tangential_load_x", "tangential_load_y", "torque", "shift_x", "shift_y"])
+def test_frictionless_contact_carries_nothing_tangential(key: str) -> None:
+    loads = {"normal_load": 1.0}, {key: -0.1, "steps": 3}
+    assert complaints(*loads, mu=0.0) == {f"load.1.{key}": "expected 0, since the contact is frictionless"}
+    assert complaints(*loads, mu=0.3) == {}
+    assert complaints({"normal_load": 1.0, key: 0.0}, mu=0.0) == {}
+
+
+def test_gross_sliding_known_from_the_deck_is_refused() -> None:
+    def sliding(*loads: dict[str, object]) -> list[str]:
+        found = complaints(*loads, mu=0.5)
+        assert all("gross sliding" in sentence for sentence in found.values())
+        return list(found)
+
+    press = {"normal_load": 10.0}
+    assert sliding(press, {"tangential_load_x": 5.0}) == []
+    assert sliding(press, {"tangential_load_x": -5.01}) == ["load.1.tangential_load_x"]
+    assert sliding(press, {"tangential_load_x": 4.0, "tangential_load_y": 3.0}) == []
+    assert sliding(press, {"tangential_load_x": 4.0, "tangential_load_y": 3.1}) == [
+        "load.1.tangential_load_x"
+    ]
+    # proportional loading, then letting go of the normal load alone
+    assert sliding({**press, "tangential_load_y": 5.0, "steps": 7}) == []
+    assert sliding(press, {"tangential_load_y": 3.0}, {"normal_load": 0.0, "steps": 5}) == [
+        "load.2.normal_load"
+    ]
+    # the second turn presses with the tangential load still there: blamed once, as is the load itself
+    turns = {"repeat": 3, "path": [press, {"tangential_load_x": 6.0}]}
+    assert sliding(turns) == ["load.0.path.0.normal_load", "load.0.path.1.tangential_load_x"]
+    # what only the solution tells is left to the run
+    assert sliding({"approach": 1.0}, {"tangential_load_x": 100.0}) == []
+    assert sliding(press, {"shift_x": 100.0}) == []
+    assert list(complaints(press, {"normal_load": 0.0, "torque": 1.0}, mu=math.inf)) == ["load.1.torque"]
+
+
+def test_a_cubic_ramp_from_an_unknown_load_is_refused() -> None:
+    loads = {"approach": 1.0}, {"normal_load": 3.0, "steps": 2, "ramp": "cubic"}
+    assert complaints(*loads, mu=0.0) == {
+        "load.1.ramp": "expected linear, since the segment before was driven by approach"
+    }
+
+
+# --- the page that documents it ----------------------------------------------------------------------------
+
+
+def test_the_deck_reference_is_up_to_date() -> None:
+    names: dict[str, object] = {"__file__": str(ROOT / "docs/deck_tables.py"), "__name__": "deck_tables"}
+    exec(compile((ROOT / "docs/deck_tables.py").read_text(), "docs/deck_tables.py", "exec"), names)
+    page = (ROOT / "docs/deck.md").read_text(encoding="utf-8")
+    assert names["filled"](page) == page, "run: python docs/deck_tables.py"  # type: ignore[operator]
+
+
+def test_every_key_says_what_it_means() -> None:
+    for table in (decks.Body, decks.Friction, decks.Grid, decks.Solver, decks.Load, decks.Output):
+        for key, info in table.known_keys().items():
+            assert info.description, f"{table.__name__}.{key}"

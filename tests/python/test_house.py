@@ -1,0 +1,173 @@
+"""Rules of the house that can be read off the sources: kinds, silence, layers, links, versions."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+import typer.main
+
+import hexcontact
+from hexcontact.cli import app
+
+ROOT = Path(__file__).parents[2]
+LIBRARY = sorted((ROOT / "fortran").glob("*.f90"))
+FORTRAN = [
+    path
+    for folder in ("fortran", "tests", "docs")
+    for ending in ("*.f90", "*.inc")
+    for path in sorted((ROOT / folder).rglob(ending))
+]
+PAGES = [page for folder in (".", "docs", "cases") for page in sorted((ROOT / folder).glob("*.md"))]
+
+NUMBER = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+|\d+(?=[ed][+-]?\d))(?:[ed][+-]?\d+)?(\w*)", re.IGNORECASE)
+
+
+def code(text: str) -> str:
+    """Fortran text in lower case without its strings and comments."""
+    return re.sub(r"'[^'\n]*'|\"[^\"\n]*\"|![^\n]*", "", text).lower()
+
+
+def by_name(path: Path) -> str:
+    return path.name
+
+
+def literals_without_kind(text: str) -> list[str]:
+    return [m.group(0) for m in NUMBER.finditer(code(text)) if not re.fullmatch(r"_[a-z]\w*", m.group(1))]
+
+
+def test_literals_without_kind_are_found() -> None:
+    bad = "x = 1.0 + 2.5e-3*y - .5_wp + 3d0 + 1e6 + 4.*z"
+    good = "x = 1.0_wp + 2.5e-3_wp*y(1:3) - a%b1 + 1.e0_rk ! 0.5\n print '(f8.3)', 1_int64"
+    assert literals_without_kind(bad) == ["1.0", "2.5e-3", "3d0", "1e6", "4."]
+    assert literals_without_kind(good) == []
+
+
+@pytest.mark.parametrize("path", FORTRAN, ids=by_name)
+def test_every_real_literal_has_its_kind(path: Path) -> None:
+    assert literals_without_kind(path.read_text()) == []
+
+
+@pytest.mark.parametrize("path", LIBRARY, ids=by_name)
+def test_module_is_named_after_its_file_and_hides_what_is_not_public(path: Path) -> None:
+    text = code(path.read_text())
+    modules = re.findall(r"^module (\w+)", text, re.MULTILINE)
+    assert modules == [path.stem if path.stem == "hexcontact" else f"hc_{path.stem}"]
+    assert re.search(r"^  implicit none$", text, re.MULTILINE)
+    assert re.search(r"^  private$", text, re.MULTILINE) or path.stem == "hexcontact"
+
+
+@pytest.mark.parametrize("path", LIBRARY, ids=by_name)
+def test_library_never_prints_and_never_stops(path: Path) -> None:
+    assert re.findall(r"\bprint\b *[*'\"(]|\bstop\b|\bwrite *\( *\*|\bopen *\(", code(path.read_text())) == []
+
+
+def test_modules_use_only_those_above_them_in_the_build() -> None:
+    order = re.findall(r"'(\w+)\.f90'", (ROOT / "fortran/meson.build").read_text())
+    assert order
+    for place, name in enumerate(order):
+        used = re.findall(r"^ *use hc_(\w+)", (ROOT / f"fortran/{name}.f90").read_text(), re.MULTILINE)
+        assert set(used) & set(order) <= set(order[:place]), name
+
+
+def test_every_file_of_the_package_is_installed() -> None:
+    listed = re.findall(r"'(hexcontact/[\w/]+\.\w+)'", (ROOT / "pydriver/meson.build").read_text())
+    files = [path for path in (ROOT / "pydriver/hexcontact").rglob("*.*") if path.is_file()]
+    sources = [path for path in files if path.suffix not in {".pyc", ".so"}]
+    assert {path.relative_to(ROOT / "pydriver").as_posix() for path in sources} == set(listed)
+
+
+def test_links_between_pages_lead_somewhere() -> None:
+    dead = []
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+            if re.match(r"https?:|mailto:", target):
+                continue
+            path, _, anchor = target.partition("#")
+            there = (page.parent / path) if path else page
+            if not there.exists() or (anchor and anchor not in anchors(there)):
+                dead.append(f"{page.relative_to(ROOT)}: {target}")
+    assert PAGES
+    assert dead == []
+
+
+def anchors(page: Path) -> set[str]:
+    """What the headings of a page are called in links."""
+    headings = re.findall(r"^#+ +(.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_version_is_the_same_everywhere() -> None:
+    build = re.search(r"version: '([^']+)'", (ROOT / "meson.build").read_text())
+    assert build
+    assert hexcontact.__version__ == build.group(1)
+    assert f"## [{build.group(1)}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_every_dependency_has_its_reason() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    wanted = project["project"]["dependencies"] + project["build-system"]["requires"]
+    wanted += [word for group in project["project"]["optional-dependencies"].values() for word in group]
+    page = (ROOT / "docs/dependencies.md").read_text().lower()
+    names = {canonical(word) for word in wanted}
+    assert {name for name in names if f"| {name} |" not in page} == set()
+
+
+def test_every_package_that_is_imported_is_a_dependency() -> None:
+    trees = [ast.parse(path.read_text()) for path in (ROOT / "pydriver").rglob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+    modules = {name.partition(".")[0] for name in names} - set(sys.stdlib_module_names) - {"hexcontact"}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    declared = {canonical(word) for word in project["dependencies"]}
+    origin = metadata.packages_distributions()
+    undeclared = {name for name in modules if not declared & {canonical(word) for word in origin[name]}}
+    assert undeclared - {"pydantic_core"} == set()  # which pydantic pins to itself
+
+
+def canonical(requirement: str) -> str:
+    """Name of a distribution as PyPI compares it."""
+    return re.sub(r"[-_.]+", "-", re.split(r"[<>=!~ ]", requirement)[0]).lower()
+
+
+def test_command_starts_without_the_heavy_packages() -> None:
+    heavy = {"matplotlib", "xarray", "pandas", "scipy", "netCDF4", "pint", "pydantic", "hypothesis"}
+    program = f"import sys, hexcontact, hexcontact.cli; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_command_is_in_the_readme() -> None:
+    group = typer.main.get_command(app)
+    readme = (ROOT / "README.md").read_text()
+    assert [name for name in group.commands if f"hexcontact {name}" not in readme] == []
+
+
+def block_of(page: str, language: str) -> str:
+    """The first block of code in a language."""
+    found = re.search(rf"^```{language}\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    assert found
+    return found.group(1)
+
+
+def test_readme_python_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -> None:
+    program = block_of((ROOT / "README.md").read_text(), "python")
+    exec(compile(program, "README.md", "exec"), {})
+    assert program.endswith(f"# {capsys.readouterr().out}")
+
+
+def test_readme_deck_gives_the_table_shown(tmp_path: Path) -> None:
+    readme = (ROOT / "README.md").read_text()
+    (tmp_path / "spheres.toml").write_text(block_of(readme, "toml"))
+    words = [sys.executable, "-m", "hexcontact", "run", "spheres.toml"]
+    wide = os.environ | {"COLUMNS": "80"}
+    done = subprocess.run(words, cwd=tmp_path, env=wide, capture_output=True, text=True, check=True)
+    rows = [line.rstrip() for line in done.stdout.partition("Against Hertz")[2].splitlines()]
+    assert len([row for row in rows if row]) > 4
+    assert [row for row in rows if row and row not in readme] == []

@@ -1,0 +1,567 @@
+"""Result files: nothing that was finished is lost, nothing that was there is damaged."""
+
+import errno
+import json
+import os
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray
+from numpy.testing import assert_array_equal
+
+from hexcontact import store as store_module
+from hexcontact.errors import DeckError, ResourceError
+from hexcontact.lattice import Lattice
+from hexcontact.result import Metadata, Step, assemble
+from hexcontact.store import Journal, Lock, Store, journal_of, open_result, read_record
+
+WINDOW = Lattice(spacing=1e-4, row_first=-4, col_first=-5, n_row=9, n_col=10)
+
+
+def made_step(index: int, lattice: Lattice = WINDOW) -> Step:
+    """Return a step with numbers of its own."""
+    rng = np.random.default_rng(index)
+    fields = {
+        "initial_gap": 1e-6 * (lattice.rows[:, None] ** 2 + lattice.cols[None, :] ** 2),
+        "pressure": rng.random(lattice.shape),
+        "gap": rng.random(lattice.shape),
+        "zone": rng.integers(0, 3, lattice.shape).astype("i1"),
+    }
+    history = {"normal_load": 10.0 * (index + 1), "seconds": 0.5, "label": f"pressé {index}", "segment": 1}
+    return Step(index, lattice, fields, history)
+
+
+def written(path: Path, count: int = 3, planned: int = 3, **metadata: object) -> Metadata:
+    """Write `count` steps; finish if all are there."""
+    described = Metadata(title="a case", deck="deck = 1", planned_steps=planned, **metadata)  # type: ignore[arg-type]
+    with Store(path, described) as store:
+        for index in range(count):
+            store.append(made_step(index))
+        if count == planned:
+            store.finish()
+    return described
+
+
+def content(path: Path) -> dict[str, bytes]:
+    """Everything in a folder."""
+    return {str(p.relative_to(path)): p.read_bytes() for p in sorted(path.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "out.nc"
+
+
+# --- what is written can be read ------------------------------------------------------------------
+
+
+def test_a_finished_run_is_one_file(out: Path) -> None:
+    described = written(out)
+    assert [p.name for p in out.parent.iterdir()] == ["out.nc"]
+    result = open_result(out)
+    assert result.complete
+    assert result.dataset.identical(assemble(described, [made_step(k) for k in range(3)]))
+
+
+def test_a_window_that_grew_and_chosen_fields_come_back(out: Path) -> None:
+    larger = replace(WINDOW, row_first=-6, n_row=12)
+    steps = [made_step(0), made_step(1, larger), made_step(2, larger)]
+    described = Metadata(fields=("pressure", "zone"), every=2, planned_steps=3)
+    with Store(out, described) as store:
+        for step in steps:
+            store.append(step)
+        record = read_record(store.folder / "000001.nc")
+        assert_array_equal(record[1].fields["gap"], steps[0].fields["gap"])  # the journal keeps everything
+        assert record[0] == described
+        store.finish()
+    assert open_result(out).dataset.identical(assemble(described, steps))
+
+
+def test_xarray_opens_it_without_us(out: Path) -> None:
+    written(out)
+    program = f"""
+        import sys, warnings, numpy, xarray
+        warnings.simplefilter("error")
+        data = xarray.open_dataset({str(out)!r})
+        assert set(data.coords) == {{"step", "row", "col", "x", "y"}}, data.coords
+        assert data["seconds"].dtype == float and data["zone"].dtype == numpy.int8
+        assert data["label"].values.tolist() == ["pressé 0", "pressé 1", "pressé 2"]
+        assert data["pressure"].attrs["units"] == "Pa" and data["pressure"].attrs["long_name"]
+        assert data.attrs["Conventions"] == "CF-1.11" and data.attrs["deck"] == "deck = 1"
+        assert "hexcontact" not in sys.modules
+        print(float(data["pressure"].sum()))
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True)
+    assert done.stderr == ""
+    total = sum(made_step(k).fields["pressure"].sum() for k in range(3))
+    assert float(done.stdout) == pytest.approx(total, rel=1e-14)
+
+
+def test_what_xarray_writes_can_be_opened(out: Path) -> None:
+    data = assemble(Metadata(planned_steps=2), [made_step(0), made_step(1)])
+    data.to_netcdf(out)
+    assert_array_equal(open_result(out).pressure, data["pressure"])
+
+
+def test_an_unfinished_run_is_read_from_its_journal(out: Path) -> None:
+    described = written(out, count=2, planned=5)
+    assert not out.exists()
+    for path in (out, journal_of(out)):
+        result = open_result(path)
+        assert not result.complete
+        assert result.dataset.identical(assemble(described, [made_step(0), made_step(1)], complete=False))
+
+
+def test_output_and_journal_of_one_run_belong_together(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store_module, "PUBLISH_INTERVAL", 0.0)
+    written(out, count=3, planned=5)
+    assert xarray.open_dataset(out).sizes["step"] == 2  # interim: after 1 and 2 steps, not after 3
+    assert len(open_result(out)) == 3
+    shutil.rmtree(journal_of(out))
+    alone = open_result(out)
+    assert len(alone) == 2
+    assert not alone.complete
+
+
+def test_the_journal_of_another_run_does_not_mix_in(out: Path) -> None:
+    written(out, count=3, planned=3)
+    with Store(out, Metadata(title="new", planned_steps=9), overwrite=True) as store:
+        store.append(made_step(7 - 7))
+    assert open_result(out).case_title == "a case"
+    assert open_result(journal_of(out)).case_title == "new"
+
+
+def test_interim_outputs_cost_linear_time(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store_module, "PUBLISH_INTERVAL", 0.0)
+    reads = 0
+    original = store_module.read_record
+
+    def counted(path: Path) -> tuple[Metadata, Step]:
+        nonlocal reads
+        reads += 1
+        return original(path)
+
+    monkeypatch.setattr(store_module, "read_record", counted)
+    written(out, count=33, planned=34)
+    assert reads == 1 + 2 + 4 + 8 + 16 + 32
+
+
+def test_no_interim_output_within_the_interval(out: Path) -> None:
+    written(out, count=4, planned=5)
+    assert not out.exists()
+
+
+# --- what is there is safe ------------------------------------------------------------------------
+
+
+def test_an_output_that_is_there_is_refused(out: Path) -> None:
+    out.write_text("a thesis")
+    before = content(out.parent)
+    with pytest.raises(DeckError, match=r"out\.nc exists already; --overwrite"):
+        Store(out, Metadata())
+    assert content(out.parent) == before
+    assert [p.name for p in out.parent.iterdir()] == ["out.nc"]
+
+
+def test_the_old_output_stays_until_the_new_one_is_complete(out: Path) -> None:
+    written(out)
+    before = out.read_bytes()
+    with Store(out, Metadata(planned_steps=2), overwrite=True) as store:
+        for index in range(2):
+            store.append(made_step(index))
+            assert out.read_bytes() == before
+        store.finish()
+    assert len(open_result(out)) == 2
+    assert [p.name for p in out.parent.iterdir()] == ["out.nc"]
+
+
+def test_an_unfinished_run_is_not_overwritten_by_accident(out: Path) -> None:
+    written(out, count=2, planned=5)
+    before = content(out.parent)
+    with pytest.raises(
+        DeckError, match=r"out\.nc\.d holds 2 finished steps of an unfinished run; hexcontact info "
+    ):
+        Store(out, Metadata())
+    assert content(out.parent) == before
+
+
+def test_overwriting_an_unfinished_run_keeps_its_steps_until_the_end(out: Path) -> None:
+    written(out, count=2, planned=5)
+    with Store(out, Metadata(title="new", planned_steps=1), overwrite=True) as store:
+        store.append(made_step(0))
+        assert len(open_result(out)) == 2  # all steps of the old run, now in the output
+        store.finish()
+    assert open_result(out).case_title == "new"
+
+
+def test_overwriting_an_abandoned_overwrite_keeps_the_first_output(out: Path) -> None:
+    written(out)
+    with Store(out, Metadata(title="abandoned", planned_steps=9), overwrite=True) as store:
+        store.append(made_step(0))
+    with Store(out, Metadata(title="third", planned_steps=9), overwrite=True) as store:
+        assert len(Journal(store.folder)) == 0
+        assert open_result(out).case_title == "a case"
+
+
+def test_a_link_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "disk" / "real.nc").write_text("old")
+    (tmp_path / "out.nc").symlink_to(tmp_path / "disk" / "real.nc")
+    with Store(tmp_path / "out.nc", Metadata(planned_steps=1), overwrite=True) as store:
+        store.append(made_step(0))
+        store.finish()
+    assert (tmp_path / "out.nc").is_symlink()
+    assert len(open_result(tmp_path / "disk" / "real.nc")) == 1
+
+
+def test_steps_come_in_order(out: Path) -> None:
+    with Store(out, Metadata()) as store:
+        with pytest.raises(ValueError, match="step 1 is next, not step 2"):
+            store.append(made_step(1))
+        store.close()
+        with pytest.raises(ValueError, match="closed"):
+            store.append(made_step(0))
+
+
+def test_places_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(DeckError, match="is a folder; a file name is expected"):
+        Store(tmp_path, Metadata())
+    with pytest.raises(DeckError, match=r"the folder .*missing does not exist"):
+        Store(tmp_path / "missing" / "out.nc", Metadata())
+    (tmp_path / "out.nc.d").write_text("in the way")
+    with pytest.raises(DeckError, match=r"cannot write the journal of .*out\.nc: File exists"):
+        Store(tmp_path / "out.nc", Metadata())
+    assert content(tmp_path) == {"out.nc.d": b"in the way"}
+
+    def denied(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(Path, "mkdir", denied)
+    with pytest.raises(DeckError, match=r"cannot write the journal of .*other\.nc: Permission denied"):
+        Store(tmp_path / "other.nc", Metadata())
+
+
+# --- the disk fails -------------------------------------------------------------------------------
+
+FAILURES = [
+    ("fsync", errno.EIO, "Input/output error", ResourceError),
+    ("replace", errno.EDQUOT, "quota exceeded", ResourceError),
+    ("replace", errno.EACCES, "Permission denied", DeckError),
+]
+
+
+@pytest.mark.parametrize(("call", "number", "words", "kind"), FAILURES)
+def test_a_step_that_cannot_be_committed_leaves_those_before(
+    out: Path, monkeypatch: pytest.MonkeyPatch, call: str, number: int, words: str, kind: type[Exception]
+) -> None:
+    def failing(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    message = rf"cannot write step 3 of .*out\.nc: .*{words}"
+    with pytest.raises(kind, match=message) as caught, Store(out, Metadata(planned_steps=9)) as store:
+        store.append(made_step(0))
+        store.append(made_step(1))
+        monkeypatch.setattr(store_module.os, call, failing)
+        store.append(made_step(2))
+    monkeypatch.undo()
+    [note] = caught.value.__notes__
+    assert note.startswith(f"2 of 9 load steps are finished and kept in {journal_of(out)}; hexcontact info ")
+    assert sorted(p.name for p in journal_of(out).iterdir()) == ["000001.nc", "000002.nc"]
+    assert_array_equal(open_result(out).pressure.sel(step=2), made_step(1).fields["pressure"])
+
+
+def test_an_output_that_cannot_be_written_at_the_end_leaves_the_journal(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = store_module.write
+
+    def full(path: Path, *arguments: object, **options: object) -> None:
+        if path.name == "out.nc.tmp":
+            path.write_bytes(b"half")
+            raise OSError(errno.ENOSPC, "No space left on device")
+        original(path, *arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(store_module, "write", full)
+    with pytest.raises(ResourceError, match=r"cannot write the output of .*: No space left on device"):
+        written(out)
+    assert not out.exists()
+    assert sorted(p.name for p in journal_of(out).iterdir()) == [f"{k:06d}.nc" for k in (1, 2, 3)]
+    assert len(open_result(out)) == 3
+
+
+def test_a_full_disk_is_told_apart_from_wrong_input(out: Path) -> None:
+    """A limit on the size of files makes the real netCDF library fail as on a full disk."""
+    written(out)
+    before = out.read_bytes()
+    program = f"""
+        import resource, signal, sys
+        sys.path[:0] = {[str(Path(__file__).parent), *sys.path]!r}
+        from dataclasses import replace
+        from test_store import WINDOW, made_step
+        from hexcontact.result import Metadata
+        from hexcontact.store import Store
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        with Store({str(out)!r}, Metadata(planned_steps=9), overwrite=True) as store:
+            store.append(made_step(0))
+            resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+            try:
+                store.append(made_step(1, replace(WINDOW, n_row=300, n_col=300)))
+            except Exception as error:
+                print(type(error).__name__, error)
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True)
+    assert done.stderr == ""
+    assert done.stdout.startswith("ResourceError cannot write step 2 of ")
+    assert "is the disk full?" in done.stdout
+    assert out.read_bytes() == before
+    assert [p.name for p in journal_of(out).iterdir()] == ["000001.nc"]
+
+
+# --- killed ---------------------------------------------------------------------------------------
+
+WRITER = """
+    import sys
+    sys.path[:0] = {path!r}
+    from test_store import made_step
+    from hexcontact import store
+    from hexcontact.result import Metadata
+    store.PUBLISH_INTERVAL = 0.0
+    with store.Store({out!r}, Metadata(title="killed", planned_steps=40), overwrite={overwrite!r}) as running:
+        for index in range(40):
+            running.append(made_step(index))
+            print(index + 1, flush=True)
+        running.finish()
+        print("finished", flush=True)
+"""
+
+
+def killed_writer(out: Path, delay: float, overwrite: bool = False) -> list[str]:
+    """Run a writer, kill it `delay` seconds after its first step, and return what it said it had done."""
+    path = [str(Path(__file__).parent), *sys.path]
+    program = textwrap.dedent(WRITER).format(path=path, out=str(out), overwrite=overwrite)
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        first = process.stdout.readline()
+        time.sleep(delay)
+        process.send_signal(signal.SIGKILL)
+        return [first.strip(), *process.stdout.read().split()]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_killed_at_any_moment_all_committed_steps_are_there(out: Path, seed: int) -> None:
+    said = killed_writer(out, random.Random(seed).uniform(0.0, 0.5))
+    result = open_result(out)
+    committed = 40 if said[-1] == "finished" else int(said[-1])
+    assert committed <= len(result) <= committed + 1  # killed between the commit and the word
+    for number in range(1, len(result) + 1):
+        assert_array_equal(result.step(number)["pressure"], made_step(number - 1).fields["pressure"])
+        assert_array_equal(result.step(number)["zone"], made_step(number - 1).fields["zone"])
+    if out.exists():
+        assert xarray.open_dataset(out).sizes["step"] <= len(result)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_killed_while_overwriting_the_old_output_is_whole(out: Path, seed: int) -> None:
+    written(out)
+    before = out.read_bytes()
+    said = killed_writer(out, random.Random(seed).uniform(0.0, 0.3), overwrite=True)
+    if out.read_bytes() != before:
+        assert len(open_result(out)) == 40
+    else:
+        assert said[-1] != "finished"
+        assert open_result(out).case_title == "a case"
+    # the lock that the dead process left is recognized, so is its journal
+    with Store(out, Metadata(title="next", planned_steps=1), overwrite=True) as store:
+        store.append(made_step(0))
+        store.finish()
+    assert [p.name for p in out.parent.iterdir()] == ["out.nc"]
+
+
+# --- two runs -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def other_run(out: Path) -> Iterator[subprocess.Popen[str]]:
+    """Give a second process that is writing `out`."""
+    program = f"""
+        import sys
+        sys.path[:0] = {sys.path!r}
+        from hexcontact.result import Metadata
+        from hexcontact.store import Store
+        with Store({str(out)!r}, Metadata()):
+            print("ready", flush=True)
+            sys.stdin.readline()
+    """
+    with subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(program)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout
+        process.stdout.readline()
+        yield process
+        process.kill()
+
+
+def test_two_runs_cannot_write_one_file(out: Path, other_run: subprocess.Popen[str]) -> None:
+    host = socket.gethostname()
+    message = rf"out\.nc is being written by another run, process {other_run.pid} on {host} since 20"
+    for overwrite in (False, True):
+        with pytest.raises(DeckError, match=message):
+            Store(out, Metadata(), overwrite)
+    other_run.communicate("leave\n")
+    with Store(out, Metadata()):
+        pass
+    assert list(out.parent.iterdir()) == []
+
+
+def test_the_lock_of_a_dead_process_is_taken_over(out: Path, other_run: subprocess.Popen[str]) -> None:
+    other_run.kill()
+    other_run.wait()
+    assert (journal_of(out) / "lock").exists()
+    with Store(out, Metadata(planned_steps=1)) as store:
+        holder = json.loads((store.folder / "lock").read_text())
+        assert holder["process"] == os.getpid()
+        assert holder["host"] == socket.gethostname()
+
+
+def test_the_lock_of_another_host_holds(out: Path) -> None:
+    journal_of(out).mkdir()
+    lock = journal_of(out) / "lock"
+    lock.write_text(json.dumps({"process": 1, "host": "node7", "since": "2030-01-01 00:00:00"}))
+    with pytest.raises(
+        DeckError, match=r"process 1 on node7 since 2030-01-01 00:00:00; if that run is over, delete .*lock"
+    ):
+        Store(out, Metadata())
+    lock.unlink()
+    with Store(out, Metadata()):
+        pass
+
+
+def test_a_lock_of_rubbish_is_taken_over(out: Path) -> None:
+    journal_of(out).mkdir()
+    (journal_of(out) / "lock").write_text("[1, 2")
+    with Store(out, Metadata()):
+        pass
+
+
+def test_without_locks_in_the_file_system_the_process_number_decides(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unsupported(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(store_module.fcntl, "flock", unsupported)
+    path = tmp_path / "lock"
+    lock = Lock(path, tmp_path / "out.nc")
+    with pytest.raises(DeckError, match=f"process {os.getpid()}"):
+        Lock(path, tmp_path / "out.nc")
+    lock.release()
+    with subprocess.Popen([sys.executable, "-c", ""]) as gone:
+        gone.wait()
+    path.write_text(json.dumps({"process": gone.pid, "host": socket.gethostname()}))
+    Lock(path, tmp_path / "out.nc").release()
+
+
+def test_two_threads_write_two_files(tmp_path: Path) -> None:
+    failed: list[BaseException] = []
+
+    def work(name: str) -> None:
+        try:
+            for turn in range(5):
+                written(tmp_path / f"{name}{turn}.nc", 4, 4)
+                assert len(open_result(tmp_path / f"{name}{turn}.nc").pressure.load()) == 4
+        except BaseException as error:
+            failed.append(error)
+
+    threads = [threading.Thread(target=work, args=(name,)) for name in "ab"]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failed == []
+
+
+# --- damaged and foreign files --------------------------------------------------------------------
+
+
+def test_files_that_are_no_results(tmp_path: Path) -> None:
+    (tmp_path / "text.nc").write_text("no netCDF")
+    (tmp_path / "empty.nc").touch()
+    (tmp_path / "folder").mkdir()
+    xarray.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "foreign.nc")
+    for name, message in {
+        "text.nc": r"text\.nc is damaged or not a netCDF file",
+        "empty.nc": r"empty\.nc is damaged or not a netCDF file",
+        "foreign.nc": r"foreign\.nc was not written by hexcontact",
+        "missing.nc": r"there is no file .*missing\.nc",
+        "folder": "folder is a folder without finished steps",
+    }.items():
+        with pytest.raises(DeckError, match=message):
+            open_result(tmp_path / name)
+
+
+def test_another_layout_is_refused_with_its_number(out: Path) -> None:
+    written(out)
+    with netCDF4.Dataset(out, "a") as file:
+        file.schema_version = np.int32(99)
+        file.hexcontact_version = "7.0"
+    message = r"has the file layout 99 of hexcontact 7\.0; this version reads layout 1"
+    with pytest.raises(DeckError, match=message):
+        open_result(out)
+
+
+def test_a_truncated_file_is_damaged_not_a_crash(out: Path) -> None:
+    written(out)
+    whole = out.read_bytes()
+    for part in np.linspace(0, len(whole) - 1, 40).astype(int):
+        out.write_bytes(whole[:part])
+        with pytest.raises(DeckError, match="is damaged"):
+            open_result(out)
+
+
+@pytest.mark.parametrize("planned", [1, 2])
+def test_flipped_bytes_in_a_field_are_noticed(out: Path, planned: int) -> None:
+    """Checksums: a field that can be read is the field that was written, in the output and in the journal."""
+    written(out, 1, planned)
+    file = out if planned == 1 else journal_of(out) / "000001.nc"
+    whole = file.read_bytes()
+    expected = made_step(0).fields["pressure"]
+    noticed = 0
+    for at in range(0, len(whole), 211):
+        file.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
+        try:
+            values = open_result(out).pressure.values
+        except (DeckError, RuntimeError):
+            noticed += 1
+        else:
+            assert_array_equal(values[0], expected)
+    assert noticed > 3
+
+
+def test_a_gap_or_a_damaged_record_in_the_journal_is_named(out: Path) -> None:
+    written(out, count=3, planned=9)
+    record = journal_of(out) / "000002.nc"
+    kept = record.read_bytes()
+    record.write_bytes(kept[: len(kept) // 2])
+    with pytest.raises(DeckError, match=r"000002\.nc is damaged"):
+        open_result(out)
+    record.unlink()
+    with pytest.raises(DeckError, match=r"lacks the record of step 2, 000002\.nc"):
+        open_result(out)
+    with Store(out, Metadata(planned_steps=1), overwrite=True):  # nothing stands in the way of a new run
+        pass

@@ -1,0 +1,249 @@
+"""Surface shapes against values worked out by hand, sums of two, and where two bodies first touch."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from hexcontact.errors import DeckError
+from hexcontact.surfaces import (
+    SHAPES,
+    Cone,
+    Cylinder,
+    Flat,
+    Paraboloid,
+    Power,
+    Punch,
+    RoundedPunch,
+    Separation,
+    Sphere,
+    Surface,
+    principal_curvatures,
+)
+
+SOME = [
+    Flat(),
+    Sphere(radius=2.0),
+    Sphere(radius=2.0, exact=True),
+    Paraboloid(radius_x=4.0, radius_y=1.0, angle="30 deg"),
+    Cylinder(radius=0.5, angle="-20 deg"),
+    Cone(slope=0.1),
+    Power(exponent=3, coefficient=2.0),
+    Punch(radius=1.5),
+    RoundedPunch(flat_radius=0.6, edge_radius=10.0),
+]
+
+
+@pytest.mark.parametrize(
+    ("surface", "x", "y", "height"),
+    [
+        (Flat(), 3.0, 4.0, 0.0),
+        (Sphere(radius=2.0), 3.0, 4.0, 25 / 4),
+        (Sphere(radius="2 mm"), 1e-3, 0.0, 2.5e-4),
+        (Sphere(radius=5.0, exact=True), 3.0, 0.0, 1.0),
+        (Sphere(radius=5.0, exact=True), 0.0, 5.0, 5.0),
+        (Sphere(radius=5.0, exact=True), 5.1, 0.0, math.inf),
+        # a tiny height on a large sphere keeps its digits
+        (Sphere(radius=1e6, exact=True), 1e-3, 0.0, 5e-13),
+        (Paraboloid(radius_x=4.0, radius_y=1.0), 2.0, 3.0, 4 / 8 + 9 / 2),
+        # axis 1 along y: x is now across it
+        (Paraboloid(radius_x=4.0, radius_y=1.0, angle="90 deg"), 2.0, 3.0, 9 / 8 + 4 / 2),
+        (Cylinder(radius=0.5), 7.0, 3.0, 9.0),
+        (Cylinder(radius=0.5, angle="90 deg"), 7.0, 3.0, 49.0),
+        # distance of (1, 0) from a line at 30 degrees is 1/2
+        (Cylinder(radius=0.5, angle="30 deg"), 1.0, 0.0, 0.25),
+        (Cylinder(radius=0.5, angle="30 deg"), math.cos(math.pi / 6), 0.5, 0.0),
+        (Cone(slope=0.1), 3.0, 4.0, 0.5),
+        (Power(exponent=3, coefficient=2.0), 3.0, 4.0, 250.0),
+        (Power(exponent=4, coefficient="0.01 mm^-3"), 1e-3, 0.0, 1e-5),
+        (Power(exponent=1, coefficient=0.1), 3.0, 4.0, 0.5),
+        (Power(exponent=1.5, coefficient="1 mm^-0.5"), 1e-3, 0.0, 1e-3),
+        (Punch(radius=5.0), 3.0, 4.0, 0.0),
+        (Punch(radius=5.0), 3.1, 4.0, math.inf),
+        (RoundedPunch(flat_radius=3.0, edge_radius=10.0), 0.0, 2.9, 0.0),
+        (RoundedPunch(flat_radius=3.0, edge_radius=10.0), 3.0, 4.0, 0.2),
+        (Sphere(radius=2.0, offset=[1.0, -1.0]), 4.0, 3.0, 25 / 4),
+        (Sphere(radius=2.0, offset=["1 mm", 0]), 1e-3, 2e-3, 1e-6),
+    ],
+)
+def test_heights(surface: Surface, x: float, y: float, height: float) -> None:
+    # 1e-14: a few roundings; absolute only where the height is zero
+    assert float(surface.height(x, y)) == pytest.approx(height, rel=1e-14, abs=1e-16 if height == 0 else 0)
+    assert bool(surface.candidate(x, y)) == math.isfinite(height)
+
+
+@pytest.mark.parametrize("surface", SOME, ids=lambda s: type(s).__name__)
+def test_every_shape_is_vectorised_nonnegative_and_touches_at_its_center(surface: Surface) -> None:
+    x, y = np.meshgrid(np.linspace(-3, 3, 7), np.linspace(-2, 2, 5))
+    height = surface.height(x, y)
+    assert height.shape == x.shape
+    assert (height >= 0).all()
+    assert height[2, 3] == 0
+    one_by_one = [
+        [float(surface.height(a, b)) for a, b in zip(p, q, strict=True)] for p, q in zip(x, y, strict=True)
+    ]
+    np.testing.assert_array_equal(height, one_by_one)
+    np.testing.assert_array_equal(surface.candidate(x, y), np.isfinite(height))
+
+
+@pytest.mark.parametrize("surface", SOME, ids=lambda s: type(s).__name__)
+def test_curvature_is_the_second_derivative(surface: Surface) -> None:
+    tensor = surface.curvature
+    if tensor is None:
+        return
+    for point in np.random.default_rng(1).normal(size=(5, 2)):
+        assert 0.5 * point @ tensor @ point == pytest.approx(
+            float(surface.height(*point)), rel=1e-13, abs=1e-16
+        )
+
+
+@pytest.mark.parametrize("surface", SOME, ids=lambda s: type(s).__name__)
+def test_surfaces_survive_pickling_and_cannot_be_changed(surface: Surface) -> None:
+    assert pickle.loads(pickle.dumps(surface)) == surface
+    with pytest.raises(ValueError, match="frozen"):
+        surface.offset = (1.0, 0.0)  # type: ignore[misc]
+
+
+def test_a_rim_node_belongs_to_the_punch_whatever_its_rounding() -> None:
+    angle = np.arange(6) * math.pi / 3
+    assert Punch(radius=1.0).candidate(np.cos(angle), np.sin(angle)).all()
+
+
+def test_all_shapes_of_the_deck_are_there() -> None:
+    assert set(SHAPES) == {
+        "flat",
+        "sphere",
+        "paraboloid",
+        "cylinder",
+        "cone",
+        "power",
+        "punch",
+        "rounded_punch",
+    }
+    assert set(SHAPES.values()) == {type(surface) for surface in SOME}
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: Sphere(radius=-1.0), 'radius = -1.0: expected a length above 0 such as "1 mm"'),
+        (lambda: Sphere(), 'radius: missing; expected a length above 0 such as "1 mm"'),
+        (lambda: Sphere(radius=1.0, exakt=True), "exakt: unknown key; did you mean exact?"),
+        (
+            lambda: Cylinder(radius=1.0, angle=30),
+            'angle = 30: expected an angle with its unit such as "30 deg"',
+        ),
+        (
+            lambda: Power(exponent=2, coefficient="3 mm"),
+            'coefficient = "3 mm": expected a coefficient in m^-1 above 0 such as "0.1 mm^-1"; '
+            '"mm" is a length',
+        ),
+    ],
+)
+def test_a_wrong_surface_is_a_deck_error(make: object, sentence: str) -> None:
+    with pytest.raises(DeckError) as error:
+        make()  # type: ignore[operator]
+    assert str(error.value) == sentence
+
+
+# --- two surfaces ------------------------------------------------------------------------------------------
+
+
+def test_heights_of_both_bodies_add_up() -> None:
+    gap = Separation(Sphere(radius=1.0), Sphere(radius=3.0))
+    np.testing.assert_allclose(
+        gap(np.array([0.0, 0.6]), np.array([0.0, 0.8])), [0.0, 1 / 2 + 1 / 6], rtol=1e-15
+    )
+    assert gap.first_touch == (0.0, 0.0, 0.0)
+
+
+def test_two_spheres_side_by_side_touch_between_their_centers() -> None:
+    # min of r^2/(2 R1) + (d - r)^2/(2 R2): r = d R1/(R1 + R2), height d^2/(2 (R1 + R2))
+    gap = Separation(Sphere(radius=1.0, offset=[1.0, 2.0]), Sphere(radius=3.0, offset=[5.0, 2.0]))
+    x, y, height = gap.first_touch
+    assert (x, y, height) == pytest.approx((2.0, 2.0, 2.0), rel=1e-14)
+    # in between, the sum is a sphere of R = 3/4 about that point
+    assert float(gap(2.5, 2.0)) == pytest.approx(0.25 / 1.5, rel=1e-13)
+
+
+def test_crossed_cylinders_with_offsets_touch_where_their_axes_cross() -> None:
+    gap = Separation(
+        Cylinder(radius=1.0, offset=[3.0, 0.5]), Cylinder(radius=2.0, angle="90 deg", offset=[-1.0, 9.0])
+    )
+    assert gap.first_touch == pytest.approx((-1.0, 0.5, 0.0), abs=1e-14)
+
+
+def test_parallel_cylinders_side_by_side_touch_along_a_line() -> None:
+    gap = Separation(Cylinder(radius=1.0), Cylinder(radius=3.0, offset=[0.0, 4.0]))
+    _, y, height = gap.first_touch
+    assert (y, height) == pytest.approx((1.0, 2.0), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("one", "two"),
+    [
+        (Sphere(radius=2.0, exact=True), Sphere(radius=1.0, exact=True, offset=[0.3, 0.4])),
+        (Cone(slope=0.2), Sphere(radius=1.0, offset=[0.5, 0.0])),
+        (Cone(slope=0.2), Cone(slope=0.1, offset=[0.5, 0.2])),
+        (
+            Power(exponent=3, coefficient=2.0),
+            Paraboloid(radius_x=3, radius_y=1, angle="20 deg", offset=[0.5, 0.2]),
+        ),
+        (
+            RoundedPunch(flat_radius=0.2, edge_radius=1.0),
+            Cylinder(radius=1.0, angle="30 deg", offset=[1.0, 0.0]),
+        ),
+        (Punch(radius=0.3), Paraboloid(radius_x=3, radius_y=1, angle="20 deg", offset=[0.7, 0.6])),
+        (Power(exponent=0.5, coefficient=1.0), Power(exponent=0.5, coefficient=3.0, offset=[1.0, 0.0])),
+    ],
+)
+def test_first_touch_is_the_lowest_point_of_the_plane(one: Surface, two: Surface) -> None:
+    gap = Separation(one, two)
+    x, y, _ = gap.first_touch
+    assert float(gap(x, y)) == 0.0
+    # nowhere on a fine grid, nor close by, is the sum lower by more than the rounding of the search
+    near = np.add.outer(
+        np.array([x, y]), 10.0 ** np.linspace(-6, -1, 40)[:, None] * np.cos(np.linspace(0, 6.28, 40))
+    )
+    grid = np.meshgrid(np.linspace(-1, 2, 601), np.linspace(-1, 2, 601))
+    assert min(gap(*grid).min(), gap(near[0], near[1].T).min()) > -1e-12
+    # the order of the bodies does not matter
+    assert Separation(two, one).first_touch[2] == pytest.approx(gap.first_touch[2], rel=1e-12, abs=1e-15)
+
+
+def test_first_touch_of_a_cone_and_a_sphere() -> None:
+    # m r + (d - r)^2/(2 R): r = d - m R = 0.3, height 0.2 * 0.3 + 0.2^2/2 = 0.08
+    gap = Separation(Cone(slope=0.2), Sphere(radius=1.0, offset=[0.5, 0.0]))
+    assert gap.first_touch == pytest.approx((0.3, 0.0, 0.08), abs=1e-8)
+    assert gap.first_touch[2] == pytest.approx(0.08, rel=1e-14)
+
+
+def test_surfaces_that_never_face_each_other_are_refused() -> None:
+    gap = Separation(Punch(radius=1.0), Punch(radius=1.0, offset=[3.0, 0.0]))
+    with pytest.raises(DeckError, match="side by side"):
+        _ = gap.first_touch
+
+
+def test_principal_curvatures_of_crossed_cylinders() -> None:
+    # angle 60 degrees, R = 75 and 50 mm: the major axis of the published ellipse lies at 39.5533 degrees
+    # (tests/reference/benchmarks.csv, section 9.3)
+    one, two = Cylinder(radius=0.075).curvature, Cylinder(radius=0.05, angle="60 deg").curvature
+    assert one is not None
+    assert two is not None
+    smaller, larger, angle = principal_curvatures(one + two)
+    assert math.degrees(angle) == pytest.approx(39.5533, abs=1e-4)
+    k1, k2 = 1 / 0.075, 1 / 0.05
+    spread = math.sqrt(k1**2 + k2**2 + 2 * k1 * k2 * math.cos(math.radians(120)))
+    assert smaller == pytest.approx((k1 + k2 - spread) / 2, rel=1e-13)
+    assert larger == pytest.approx((k1 + k2 + spread) / 2, rel=1e-13)
+
+
+@pytest.mark.parametrize("degrees", [-80, -30, 0, 20, 60, 90])
+def test_principal_direction_is_the_first_axis_of_a_paraboloid(degrees: float) -> None:
+    tensor = Paraboloid(radius_x=5.0, radius_y=1.0, angle=f"{degrees} deg").curvature
+    assert tensor is not None
+    smaller, larger, angle = principal_curvatures(tensor)
+    assert (smaller, larger) == pytest.approx((0.2, 1.0), rel=1e-14)
+    assert math.sin(angle - math.radians(degrees)) == pytest.approx(0.0, abs=1e-14)
+    assert -math.pi / 2 < angle <= math.pi / 2

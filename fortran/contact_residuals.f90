@@ -4,10 +4,11 @@ module hc_contact_residuals
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
+  use hc_contact_state, only: contact_state_t, load_control, separated, slip
   implicit none
   private
 
-  public :: normal_self_compliance, normal_residual, force_residual
+  public :: normal_self_compliance, normal_residual, force_residual, conclude
 
 contains
 
@@ -65,5 +66,30 @@ contains
       force_residual = abs(carried)
     end if
   end function force_residual
+
+  !> Zones, load and residuals of a state whose pressure and gap are known.
+  pure subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance)
+    !> State to be completed
+    type(contact_state_t), intent(inout) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes that may come into contact
+    logical, intent(in) :: candidate(:, :)
+    !> Self-compliance d_n [m/Pa]
+    real(wp), intent(in) :: compliance
+    !> load_control or approach_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m] that was prescribed
+    real(wp), intent(in) :: target
+    !> Bound of the residuals
+    real(wp), intent(in) :: tolerance
+
+    state%zone = merge(slip, separated, state%pressure > 0.0_wp)
+    state%normal_load = lattice%cell_area()*sum(state%pressure)
+    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance)
+    state%residual_force = 0.0_wp
+    if (control == load_control) state%residual_force = force_residual(state%normal_load, target)
+    state%converged = max(state%residual_normal, state%residual_force) <= tolerance
+  end subroutine conclude
 
 end module hc_contact_residuals

@@ -1,11 +1,12 @@
 !> The state of a contact: tractions, gap, zones and rigid motion over a window.
 module hc_contact_state
   use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   implicit none
   private
 
-  public :: contact_state_t, new_contact_state
+  public :: contact_state_t, new_contact_state, check_problem
   public :: separated, stick, slip
   public :: load_control, approach_control
 
@@ -50,5 +51,23 @@ contains
     allocate (state%gap, source=state%pressure)
     allocate (state%zone(lattice%extent(1), lattice%extent(2)), source=separated)
   end subroutine new_contact_state
+
+  !> Does a problem make sense?
+  pure subroutine check_problem(lattice, initial_gap, candidate, error)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Initial gap (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Allocated on failure: wrong shapes, no candidate at all
+    type(error_t), allocatable, intent(out) :: error
+
+    if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
+      call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
+    else if (.not. any(candidate)) then
+      call raise(error, status%invalid_input, 'no node of the window may come into contact')
+    end if
+  end subroutine check_problem
 
 end module hc_contact_state

@@ -7,12 +7,13 @@
 module hc_direct_contact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
+  use hc_lapack, only: dposv
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
-  use hc_contact_state, only: contact_state_t, new_contact_state, slip, load_control
-  use hc_contact_residuals, only: normal_self_compliance, normal_residual, force_residual
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, load_control
+  use hc_contact_residuals, only: normal_self_compliance, conclude
   implicit none
   private
 
@@ -36,16 +37,6 @@ module hc_direct_contact
     procedure :: solve
   end type direct_contact_t
 
-  interface
-    subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
-      import :: wp
-      character(len=1), intent(in) :: uplo
-      integer, intent(in) :: n, nrhs, lda, ldb
-      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
-      integer, intent(out) :: info
-    end subroutine dposv
-  end interface
-
 contains
 
   !> Matrix of a problem.
@@ -63,14 +54,8 @@ contains
     !> Allocated on failure: wrong shapes, no candidate at all, not enough memory
     type(error_t), allocatable, intent(out) :: error
 
-    if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
-      call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
-      return
-    end if
-    if (.not. any(candidate)) then
-      call raise(error, status%invalid_input, 'no node of the window may come into contact')
-      return
-    end if
+    call check_problem(lattice, initial_gap, candidate, error)
+    if (allocated(error)) return
     self%initial_gap = initial_gap
     self%candidate = candidate
     self%compliance = normal_self_compliance(lattice, pair)
@@ -151,13 +136,8 @@ contains
     call find_gap(self, reshape(state%pressure, [n]), h - delta, gap, error)
     if (allocated(error)) return
     state%gap = reshape(gap, shape(state%gap))
-    where (state%pressure > 0.0_wp) state%zone = slip
     state%approach = delta
-    state%normal_load = self%flexibility%lattice%cell_area()*sum(state%pressure)
-    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%compliance)
-    state%residual_force = 0.0_wp
-    if (control == load_control) state%residual_force = force_residual(state%normal_load, target)
-    state%converged = max(state%residual_normal, state%residual_force) <= tolerance
+    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance)
     state%operator_applications = self%flexibility%applications
   end subroutine solve
 

@@ -2,6 +2,7 @@
 module hc_flexibility_dense
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_lapack, only: dgemv
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
@@ -18,16 +19,6 @@ module hc_flexibility_dense
   contains
     procedure :: apply => dense_apply
   end type dense_flexibility_t
-
-  interface
-    subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
-      import :: wp
-      character(len=1), intent(in) :: trans
-      integer, intent(in) :: m, n, lda, incx, incy
-      real(wp), intent(in) :: alpha, beta, a(lda, *), x(*)
-      real(wp), intent(inout) :: y(*)
-    end subroutine dgemv
-  end interface
 
 contains
 

@@ -10,7 +10,9 @@ module hexcontact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
-  use hc_triangle_integrals
+  use hc_triangle_integrals, only: triangle_integral, triangle_integrals, is_supported, vertex_kernels, &
+                                   load_displacement, linear_load_displacement, &
+                                   evaluate_integral, evaluate_displacement, evaluate_linear_displacement
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy, k_x, k_y
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y

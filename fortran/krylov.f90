@@ -12,6 +12,7 @@
 module hc_krylov
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_lapack, only: dposv
   implicit none
   private
 
@@ -43,16 +44,6 @@ module hc_krylov
       !> Allocated on failure
       type(error_t), allocatable, intent(out) :: error
     end subroutine linear_map
-  end interface
-
-  interface
-    subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
-      import :: wp
-      character(len=1), intent(in) :: uplo
-      integer, intent(in) :: n, nrhs, lda, ldb
-      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
-      integer, intent(out) :: info
-    end subroutine dposv
   end interface
 
 contains

@@ -42,11 +42,7 @@ contains
     normal_symbol = alias_sum(basis, area, theta)
     ! On a Nyquist row k and -k are the same frequency: a cut-off sum has to be made even.
     if (any(2*wrapped == length)) then
-      where (2*wrapped == length)
-        theta = theta
-      elsewhere
-        theta = -theta
-      end where
+      where (2*wrapped /= length) theta = -theta
       normal_symbol = 0.5_wp*(normal_symbol + alias_sum(basis, area, theta))
     end if
   end function normal_symbol

@@ -7,13 +7,13 @@
 !> the lattice of every second node, and so on down to a few nodes.
 module hc_normal_contact
   use hc_precision, only: wp, pi
-  use hc_error, only: error_t, status, raise
+  use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
-  use hc_contact_state, only: contact_state_t, new_contact_state, separated, slip, load_control
-  use hc_contact_residuals, only: normal_self_compliance, normal_residual, force_residual
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, load_control
+  use hc_contact_residuals, only: normal_self_compliance, normal_residual, conclude
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
   use hc_krylov, only: linear_system_t, projected_cg, dot
   use hc_multilevel, only: prolong, restrict_field, restrict_mask
@@ -81,14 +81,8 @@ contains
 
     integer :: l
 
-    if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
-      call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
-      return
-    end if
-    if (.not. any(candidate)) then
-      call raise(error, status%invalid_input, 'no node of the window may come into contact')
-      return
-    end if
+    call check_problem(lattice, initial_gap, candidate, error)
+    if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent)))
     do l = 1, size(self%level)
       associate (level => self%level(l))
@@ -215,8 +209,10 @@ contains
     h = reshape(level%initial_gap, [n])
     candidate = reshape(level%candidate, [n])
     delta = minval(h, mask=candidate)
-    if (target <= merge(0.0_wp, delta, control == load_control)) then
-      call finish_separated(level, control, target, delta, state)
+    if (target <= merge(0.0_wp, delta, control == load_control)) then         ! nothing touches
+      state%approach = merge(delta, target, control == load_control)
+      state%gap = level%initial_gap - state%approach
+      call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance)
       return
     end if
 
@@ -253,13 +249,8 @@ contains
 
     state%pressure = reshape(max(p, 0.0_wp), shape(state%pressure))
     state%gap = reshape(gap, shape(state%gap))
-    where (state%pressure > 0.0_wp) state%zone = slip
     state%approach = delta
-    state%normal_load = level%lattice%cell_area()*sum(state%pressure)
-    state%residual_normal = normal_residual(state%pressure, state%gap, level%candidate, level%compliance)
-    state%residual_force = 0.0_wp
-    if (control == load_control) state%residual_force = force_residual(state%normal_load, target)
-    state%converged = max(state%residual_normal, state%residual_force) <= tolerance
+    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance)
   end subroutine solve_level
 
   !> Make the pressure fit the active set and the load, and find what it does to the gap.
@@ -295,27 +286,6 @@ contains
     p = factor*p
     w = factor*w
   end subroutine restart
-
-  !> Nothing touches.
-  subroutine finish_separated(level, control, target, first_touch, state)
-    !> The problem
-    type(level_t), intent(in) :: level
-    !> load_control or approach_control
-    integer, intent(in) :: control
-    !> Normal load [N] or approach [m]
-    real(wp), intent(in) :: target
-    !> Smallest initial gap [m]
-    real(wp), intent(in) :: first_touch
-    !> Solution
-    type(contact_state_t), intent(inout) :: state
-
-    state%approach = merge(first_touch, target, control == load_control)
-    state%gap = level%initial_gap - state%approach
-    state%zone = separated
-    state%residual_normal = 0.0_wp
-    state%residual_force = 0.0_wp
-    state%converged = .true.
-  end subroutine finish_separated
 
   subroutine level_product(self, x, y, error)
     class(level_t), intent(inout) :: self

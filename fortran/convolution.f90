@@ -266,11 +266,11 @@ contains
     end do
   end function frequencies
 
-  !> result(:, :, o) = sum over i and kernels of weight(kernel, o, i) * kernel * field(:, :, i)
-  subroutine convolve(self, weight, field, result)
+  !> result(:, :, o) = sum over i of kernel(o, i) * field(:, :, i)
+  subroutine convolve(self, kernel, field, result)
     class(convolution_t), intent(inout) :: self
-    !> Weights of the kernels (kernel, onto, from); a pair has even kernels only, or odd ones only
-    real(wp), intent(in) :: weight(:, :, :)
+    !> Number of the kernel (onto, from), negative to reverse its sign
+    integer, intent(in) :: kernel(:, :)
     !> Fields to be convolved (n_col, n_row, from)
     real(wp), intent(in), contiguous :: field(:, :, :)
     !> Sums of the convolutions (n_col, n_row, onto)
@@ -294,7 +294,7 @@ contains
     !$omp barrier
     !$omp do schedule(static)
     do b = 1, self%n_block
-      call convolve_block(self, b, weight, self%block_buffer(:, :, thread))
+      call convolve_block(self, b, kernel, self%block_buffer(:, :, thread))
     end do
     !$omp end do
     do o = 1, size(result, 3)
@@ -309,22 +309,22 @@ contains
   end subroutine convolve
 
   !> Transform a block of columns, multiply with the spectra, transform back.
-  subroutine convolve_block(self, b, weight, buffer)
+  subroutine convolve_block(self, b, kernel, buffer)
     class(convolution_t), intent(inout) :: self
     !> Index of the block
     integer, intent(in) :: b
-    !> Weights of the kernels (kernel, onto, from)
-    real(wp), intent(in) :: weight(:, :, :)
+    !> Number of the kernel (onto, from), negative to reverse its sign
+    integer, intent(in) :: kernel(:, :)
     !> Scratch (width*padded(2), component)
     complex(wp), intent(inout), contiguous :: buffer(:, :)
 
-    complex(wp) :: field(chunk, size(weight, 3))
-    integer :: n_row, w, i, o, row, first, start, last, m
+    real(wp) :: field(chunk, 2, size(kernel, 2)), total(chunk, 2)
+    integer :: n_row, w, i, o, row, first, start, last, m, k
 
     w = self%width
     n_row = self%extent(2)
     first = (b - 1)*w + 1
-    do i = 1, size(weight, 3)
+    do i = 1, size(kernel, 2)
       do row = 1, n_row
         buffer((row - 1)*w + 1:row*w, i) = self%work(first:first + w - 1, row, i)
       end do
@@ -332,19 +332,26 @@ contains
       call fftw_execute_dft(self%column_forward, buffer(:, i), buffer(:, i))
     end do
 
+    ! real and imaginary parts apart: real arithmetic fills the vector registers
     do start = 1, size(buffer, 1), chunk
       last = min(start + chunk - 1, size(buffer, 1))
       m = last - start + 1
-      field(:m, :) = buffer(start:last, :size(weight, 3))
-      do o = 1, size(weight, 2)
-        do i = 1, size(weight, 3)
-          call add_product(weight(:, o, i), self%spectrum(start:last, b, :), self%first_odd, field(:m, i), &
-                           buffer(start:last, o), start_from_zero=(i == 1))
+      do i = 1, size(kernel, 2)
+        field(:m, 1, i) = real(buffer(start:last, i), wp)
+        field(:m, 2, i) = aimag(buffer(start:last, i))
+      end do
+      do o = 1, size(kernel, 1)
+        total = 0.0_wp
+        do i = 1, size(kernel, 2)
+          k = abs(kernel(o, i))
+          call add_product(m, self%spectrum(start:last, b, k), merge(-1.0_wp, 1.0_wp, kernel(o, i) < 0), &
+                           k >= self%first_odd, field(:, :, i), total)
         end do
+        buffer(start:last, o) = cmplx(total(:m, 1), total(:m, 2), wp)
       end do
     end do
 
-    do o = 1, size(weight, 2)
+    do o = 1, size(kernel, 1)
       call fftw_execute_dft(self%column_inverse, buffer(:, o), buffer(:, o))
       do row = 1, n_row
         self%work(first:first + w - 1, row, o) = buffer((row - 1)*w + 1:row*w, o)
@@ -352,48 +359,31 @@ contains
     end do
   end subroutine convolve_block
 
-  !> total = total + (sum over kernels of weight*spectrum) * field
-  pure subroutine add_product(weight, spectrum, first_odd, field, total, start_from_zero)
-    !> Weights of the kernels
-    real(wp), intent(in) :: weight(:)
-    !> Spectra (frequency, kernel)
-    real(wp), intent(in) :: spectrum(:, :)
-    !> The first odd kernel
-    integer, intent(in) :: first_odd
-    !> Transformed field
-    complex(wp), intent(in) :: field(:)
-    !> Transformed result
-    complex(wp), intent(inout) :: total(:)
-    !> The result has no value yet
-    logical, intent(in) :: start_from_zero
+  !> total = total + sign * spectrum * field
+  pure subroutine add_product(n, spectrum, sign, odd, field, total)
+    !> Number of frequencies
+    integer, intent(in) :: n
+    !> Spectrum of the kernel, over i if it is odd
+    real(wp), intent(in) :: spectrum(n)
+    !> Sign of the kernel
+    real(wp), intent(in) :: sign
+    !> The kernel is odd
+    logical, intent(in) :: odd
+    !> Transformed field (frequency, real and imaginary part)
+    real(wp), intent(in) :: field(chunk, 2)
+    !> Transformed result (frequency, real and imaginary part)
+    real(wp), intent(inout) :: total(chunk, 2)
+    integer :: f
 
-    real(wp) :: factor(chunk)
-    integer :: m, f, n
-    logical :: odd
-
-    n = size(field)
-    factor(:n) = weight(1)*spectrum(:, 1)
-    odd = .false.
-    do m = 2, size(spectrum, 2)
-      if (.not. abs(weight(m)) > 0.0_wp) cycle
-      odd = m >= first_odd
-      factor(:n) = factor(:n) + weight(m)*spectrum(:, m)
-    end do
-    ! written in real arithmetic: the compiler would promote the factor to complex
-    if (start_from_zero .and. .not. odd) then
-      do f = 1, n
-        total(f) = cmplx(factor(f)*real(field(f), wp), factor(f)*aimag(field(f)), wp)
-      end do
-      return
-    end if
-    if (start_from_zero) total = 0.0_wp
     if (odd) then
       do f = 1, n
-        total(f) = total(f) + cmplx(-factor(f)*aimag(field(f)), factor(f)*real(field(f), wp), wp)
+        total(f, 1) = total(f, 1) - sign*spectrum(f)*field(f, 2)
+        total(f, 2) = total(f, 2) + sign*spectrum(f)*field(f, 1)
       end do
     else
       do f = 1, n
-        total(f) = total(f) + cmplx(factor(f)*real(field(f), wp), factor(f)*aimag(field(f)), wp)
+        total(f, 1) = total(f, 1) + sign*spectrum(f)*field(f, 1)
+        total(f, 2) = total(f, 2) + sign*spectrum(f)*field(f, 2)
       end do
     end if
   end subroutine add_product

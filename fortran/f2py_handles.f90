@@ -31,7 +31,7 @@ module hc_f2py_handles
     type(direct_contact_t), pointer :: direct_contact => null()
   end type slot_t
 
-  type(slot_t), save, target :: slots(n_slot)
+  type(slot_t), target :: slots(n_slot)
 
 contains
 

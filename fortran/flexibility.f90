@@ -18,10 +18,17 @@ module hc_flexibility
   implicit none
   private
 
-  public :: flexibility_t, normal, along_x, along_y, block_weights
+  public :: flexibility_t, normal, along_x, along_y
+  public :: n_block, first_odd_block, blocks, block_index
 
   !> Components of a traction and of a relative displacement.
   integer, parameter :: normal = 1, along_x = 2, along_y = 3
+
+  !> The operator has six different blocks: normal, xx, xy, yy, which are even in the
+  !> distance of two nodes, and normal-x, normal-y, which are odd.
+  integer, parameter :: n_block = 6, first_odd_block = 5
+  !> Block that stands at (onto, from), negative where its sign is reversed.
+  integer, parameter :: block_index(3, 3) = reshape([1, -5, -6, 5, 2, 3, 6, 3, 4], [3, 3])
 
   !> A flexibility operator over the nodes of a window.
   type, abstract :: flexibility_t
@@ -60,32 +67,22 @@ module hc_flexibility
 
 contains
 
-  !> Weights of the five kernels in one block of the operator.
-  pure function block_weights(pair, onto, from) result(weight)
+  !> The six blocks of the operator at one distance of nodes.
+  pure function blocks(pair, kernel) result(block)
     !> Elastic constants
     type(elastic_pair_t), intent(in) :: pair
-    !> Component of the displacement and of the traction
-    integer, intent(in) :: onto, from
-    !> Weight of each kernel [1/Pa]
-    real(wp) :: weight(5)
+    !> The five pyramid kernels [m]
+    real(wp), intent(in) :: kernel(5)
+    !> Displacement per traction [m/Pa]
+    real(wp) :: block(n_block)
 
-    weight = 0.0_wp
-    if (onto == normal .and. from == normal) then
-      weight(k_1) = pair%lambda_1
-    else if (onto == normal) then
-      weight(merge(k_x, k_y, from == along_x)) = pair%lambda_2
-    else if (from == normal) then
-      weight(merge(k_x, k_y, onto == along_x)) = -pair%lambda_2
-    else if (onto /= from) then
-      weight(k_xy) = pair%lambda_5
-    else if (onto == along_x) then
-      weight(k_1) = pair%lambda_1
-      weight(k_xx) = pair%lambda_5
-    else
-      weight(k_1) = pair%lambda_1 + pair%lambda_5
-      weight(k_xx) = -pair%lambda_5
-    end if
-  end function block_weights
+    block = [pair%lambda_1*kernel(k_1), &
+             pair%lambda_1*kernel(k_1) + pair%lambda_5*kernel(k_xx), &
+             pair%lambda_5*kernel(k_xy), &
+             (pair%lambda_1 + pair%lambda_5)*kernel(k_1) - pair%lambda_5*kernel(k_xx), &
+             pair%lambda_2*kernel(k_x), &
+             pair%lambda_2*kernel(k_y)]
+  end function blocks
 
   subroutine check(self, from, traction, onto, displacement, error)
     class(flexibility_t), intent(in) :: self

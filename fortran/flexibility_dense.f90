@@ -6,7 +6,7 @@ module hc_flexibility_dense
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, block_weights
+  use hc_flexibility, only: flexibility_t, n_block, blocks, block_index
   implicit none
   private
 
@@ -36,8 +36,9 @@ contains
     logical, intent(in), optional :: normal_only
 
     type(pyramid_t) :: pyramid
-    real(wp), allocatable :: table(:, :, :), influence(:, :)
-    integer :: n(2), n_component, from, onto, col, row, source, stat, n_node
+    real(wp), allocatable :: influence(:, :, :)
+    real(wp) :: offset(2), sign
+    integer :: n(2), n_component, from, onto, col, row, source, index, stat, n_node
 
     operator%lattice = lattice
     operator%pair = pair
@@ -46,24 +47,30 @@ contains
     n = lattice%extent
     n_node = lattice%size()
     allocate (operator%matrix(n_node*n_component, n_node*n_component), &
-              table(5, 1 - n(1):n(1) - 1, 1 - n(2):n(2) - 1), &
-              influence(1 - n(1):n(1) - 1, 1 - n(2):n(2) - 1), stat=stat)
+              influence(1 - n(1):n(1) - 1, 1 - n(2):n(2) - 1, n_block), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the flexibility matrix: use method "fft"')
       return
     end if
     call new_pyramid(pyramid, lattice%basis)
-    call pyramid%kernel_table(lattice%basis, table)
+    !$omp parallel do private(col, offset) if (n_node > 1000)
+    do row = 1 - n(2), n(2) - 1
+      do col = 1 - n(1), n(1) - 1
+        offset = col*lattice%basis(:, 1) + row*lattice%basis(:, 2)
+        influence(col, row, :) = blocks(pair, pyramid%kernels(offset(1), offset(2)))
+      end do
+    end do
+    !$omp end parallel do
     do from = 1, n_component
       do onto = 1, n_component
-        influence = reshape(matmul(block_weights(pair, onto, from), reshape(table, [5, size(influence)])), &
-                            shape(influence))
+        index = abs(block_index(onto, from))
+        sign = merge(1.0_wp, -1.0_wp, block_index(onto, from) > 0)
         !$omp parallel do private(col, source) if (n_node > 1000)
         do row = 1, n(2)
           do col = 1, n(1)
             source = (from - 1)*n_node + (row - 1)*n(1) + col
             operator%matrix((onto - 1)*n_node + 1:onto*n_node, source) = &
-              reshape(influence(1 - col:n(1) - col, 1 - row:n(2) - row), [n_node])
+              sign*reshape(influence(1 - col:n(1) - col, 1 - row:n(2) - row, index), [n_node])
           end do
         end do
         !$omp end parallel do

@@ -4,8 +4,8 @@ module hc_flexibility_fft
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_x
-  use hc_flexibility, only: flexibility_t, block_weights
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid
+  use hc_flexibility, only: flexibility_t, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, convolution_memory, kernel_source_t
   implicit none
@@ -15,7 +15,7 @@ module hc_flexibility_fft
 
   !> Convolution operator over a window.
   type, extends(flexibility_t) :: fft_flexibility_t
-    !> Spectra of the pyramid kernels, those of the pressure alone or all five
+    !> Spectra of the blocks, that of the pressure and the gap alone or all six
     type(convolution_t) :: convolution
     !> Components that the operator was set up for
     integer, private :: n_component = 0
@@ -23,13 +23,14 @@ module hc_flexibility_fft
     procedure :: apply => fft_apply
   end type fft_flexibility_t
 
-  !> The pyramid kernels at lattice offsets.
-  type, extends(kernel_source_t) :: lattice_kernels_t
+  !> The blocks of the operator at lattice offsets.
+  type, extends(kernel_source_t) :: lattice_blocks_t
     type(pyramid_t) :: pyramid
+    type(elastic_pair_t) :: pair
     real(wp) :: basis(2, 2) = 0.0_wp
   contains
-    procedure :: values => lattice_kernel_values
-  end type lattice_kernels_t
+    procedure :: values => lattice_block_values
+  end type lattice_blocks_t
 
 contains
 
@@ -48,7 +49,7 @@ contains
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
 
-    type(lattice_kernels_t) :: source
+    type(lattice_blocks_t) :: source
     logical :: only_normal
 
     only_normal = .false.
@@ -57,9 +58,11 @@ contains
     operator%pair = pair
     operator%n_component = merge(1, 3, only_normal)
     call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
-                         merge(1, 5, only_normal), operator%n_component, error, first_odd=k_x, n_threads=n_threads)
+                         merge(1, n_block, only_normal), operator%n_component, error, &
+                         first_odd=first_odd_block, n_threads=n_threads)
     if (allocated(error)) return
     call new_pyramid(source%pyramid, lattice%basis)
+    source%pair = pair
     source%basis = lattice%basis
     call operator%convolution%transform_kernels(source, error)
   end subroutine new_fft_flexibility
@@ -73,20 +76,20 @@ contains
     !> Threads to use
     integer, intent(in) :: n_threads
 
-    fft_memory = convolution_memory(extent, good_size(2*extent - 1), merge(1, 5, normal_only), &
+    fft_memory = convolution_memory(extent, good_size(2*extent - 1), merge(1, n_block, normal_only), &
                                     merge(1, 3, normal_only), n_threads)
   end function fft_memory
 
-  pure subroutine lattice_kernel_values(self, i, j, k)
-    class(lattice_kernels_t), intent(in) :: self
+  pure subroutine lattice_block_values(self, i, j, k)
+    class(lattice_blocks_t), intent(in) :: self
     integer, intent(in) :: i, j
     real(wp), intent(out) :: k(:)
-    real(wp) :: all_five(5), position(2)
+    real(wp) :: block(n_block), position(2)
 
     position = i*self%basis(:, 1) + j*self%basis(:, 2)
-    all_five = self%pyramid%kernels(position(1), position(2))
-    k = all_five(:size(k))
-  end subroutine lattice_kernel_values
+    block = blocks(self%pair, self%pyramid%kernels(position(1), position(2)))
+    k = block(:size(k))
+  end subroutine lattice_block_values
 
   subroutine fft_apply(self, from, traction, onto, displacement, error)
     class(fft_flexibility_t), intent(inout) :: self
@@ -96,21 +99,13 @@ contains
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp) :: weight(5, size(onto), size(from))
-    integer :: i, o
-
     call self%check(from, traction, onto, displacement, error)
     if (allocated(error)) return
     if (max(maxval(from), maxval(onto)) > self%n_component) then
       call raise(error, status%invalid_input, 'the operator was set up for normal contact only')
       return
     end if
-    do i = 1, size(from)
-      do o = 1, size(onto)
-        weight(:, o, i) = block_weights(self%pair, onto(o), from(i))
-      end do
-    end do
-    call self%convolution%convolve(weight, traction, displacement)
+    call self%convolution%convolve(block_index(onto, from), traction, displacement)
     call self%count(from, onto)
   end subroutine fft_apply
 

@@ -84,7 +84,7 @@ contains
     !> Pressure (n_col, n_row, 1) [Pa]
     real(wp), intent(out), contiguous :: pressure(:, :, :)
 
-    call self%convolution%convolve(reshape([1.0_wp], [1, 1, 1]), closing, pressure)
+    call self%convolution%convolve(reshape([1], [1, 1]), closing, pressure)
   end subroutine apply_preconditioner
 
 end module hc_preconditioner

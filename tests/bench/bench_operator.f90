@@ -18,7 +18,7 @@ program bench_operator
                      fftw_forward, fftw_backward, fftw_estimate, good_size
   implicit none
 
-  integer, parameter :: sides(4) = [256, 512, 1024, 2048], n_repeat = 7
+  integer, parameter :: sides(4) = [256, 512, 1024, 2048]
   integer :: i
 
   print '(a)', '| window | scalar product [ms] | over bare FFTs | over blocked FFTs | 3x3 product [ms] | over bare FFTs |'
@@ -64,14 +64,14 @@ contains
     allocate (traction(side, side, n_component), displacement(side, side, n_component))
     call random_number(traction)
     best = huge(best)
-    do repeat = 1, n_repeat
+    do repeat = 1, repeats(side)
       start = seconds()
       call operator%apply([(j, j=1, n_component)], traction, [(j, j=1, n_component)], displacement, error)
       best = min(best, seconds() - start)
     end do
     if (.not. present(blocked)) return
     blocked = huge(blocked)
-    do repeat = 1, n_repeat
+    do repeat = 1, repeats(side)
       start = seconds()
       call operator%convolution%time_transforms()
       blocked = min(blocked, seconds() - start)
@@ -104,7 +104,7 @@ contains
     column_inverse = fftw_plan_many_dft(1_c_int, length, m, spectrum, length, m, 1_c_int, &
                                         spectrum, length, m, 1_c_int, fftw_backward, fftw_estimate)
     bare_transforms = huge(start)
-    do repeat = 1, n_repeat
+    do repeat = 1, repeats(side)
       start = seconds()
       call fftw_execute_dft_r2c(row_forward, rows, spectrum)
       call fftw_execute_dft(column_forward, spectrum, spectrum)
@@ -117,6 +117,13 @@ contains
     call fftw_destroy_plan(column_forward)
     call fftw_destroy_plan(column_inverse)
   end function bare_transforms
+
+  !> Repetitions that take about as long for every window; the best one counts.
+  pure integer function repeats(side)
+    !> Nodes on a side of the window
+    integer, intent(in) :: side
+    repeats = max(7, 20*(1024/side)**2)
+  end function repeats
 
   !> Wall-clock time.
   real(wp) function seconds()

@@ -12,6 +12,7 @@ program bench_operator
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_fftw, only: fftw_plan_many_dft, fftw_plan_many_dft_r2c, fftw_plan_many_dft_c2r, fftw_execute_dft, &
                      fftw_execute_dft_r2c, fftw_execute_dft_c2r, fftw_destroy_plan, &
@@ -26,8 +27,27 @@ program bench_operator
   do i = 1, size(sides)
     call measure(sides(i))
   end do
+  print '(/,a)', '| kernel table of a window | offsets | seconds |'
+  print '(a)', '|---|---|---|'
+  call measure_table(1024)
+  call measure_table(2048)
 
 contains
+
+  !> Seconds of the five kernels at all offsets of a window.
+  subroutine measure_table(side)
+    !> Nodes on a side of the window
+    integer, intent(in) :: side
+    type(pyramid_t) :: pyramid
+    real(wp), allocatable :: table(:, :, :)
+    real(wp) :: start
+
+    allocate (table(5, 2*side - 1, 2*side - 1))
+    call new_pyramid(pyramid, equilateral_basis(1.0_wp))
+    start = seconds()
+    call pyramid%kernel_table(equilateral_basis(1.0_wp), table)
+    print '(a,i0,a,i0,a,f0.2,a)', '| ', side, '^2 | ', 2*side - 1, '^2 | ', seconds() - start, ' |'
+  end subroutine measure_table
 
   !> One row of the table.
   subroutine measure(side)

@@ -318,8 +318,7 @@ contains
     !> Scratch (width*padded(2), component)
     complex(wp), intent(inout), contiguous :: buffer(:, :)
 
-    real(wp) :: field(chunk, 2, size(kernel, 2)), total(chunk, 2)
-    integer :: n_row, w, i, o, row, first, start, last, m, k
+    integer :: n_row, w, i, o, row, first
 
     w = self%width
     n_row = self%extent(2)
@@ -332,7 +331,48 @@ contains
       call fftw_execute_dft(self%column_forward, buffer(:, i), buffer(:, i))
     end do
 
-    ! real and imaginary parts apart: real arithmetic fills the vector registers
+    if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
+      call scale(size(buffer, 1), self%spectrum(:, b, kernel(1, 1)), buffer(:, 1))
+    else
+      call multiply(self, b, kernel, buffer)
+    end if
+
+    do o = 1, size(kernel, 1)
+      call fftw_execute_dft(self%column_inverse, buffer(:, o), buffer(:, o))
+      do row = 1, n_row
+        self%work(first:first + w - 1, row, o) = buffer((row - 1)*w + 1:row*w, o)
+      end do
+    end do
+  end subroutine convolve_block
+
+  !> A single even kernel, the whole operator of frictionless contact.
+  pure subroutine scale(n, spectrum, field)
+    !> Number of frequencies
+    integer, intent(in) :: n
+    !> Spectrum of the kernel
+    real(wp), intent(in) :: spectrum(n)
+    !> Transformed field
+    complex(wp), intent(inout) :: field(n)
+    integer :: f
+
+    do f = 1, n
+      field(f) = cmplx(spectrum(f)*real(field(f), wp), spectrum(f)*aimag(field(f)), wp)
+    end do
+  end subroutine scale
+
+  !> Any kernels. Real and imaginary parts are taken apart: real arithmetic fills the vector registers.
+  subroutine multiply(self, b, kernel, buffer)
+    class(convolution_t), intent(in) :: self
+    !> Index of the block
+    integer, intent(in) :: b
+    !> Number of the kernel (onto, from), negative to reverse its sign
+    integer, intent(in) :: kernel(:, :)
+    !> Transformed fields, replaced by the results
+    complex(wp), intent(inout), contiguous :: buffer(:, :)
+
+    real(wp) :: field(chunk, 2, size(kernel, 2)), total(chunk, 2)
+    integer :: i, o, start, last, m, k
+
     do start = 1, size(buffer, 1), chunk
       last = min(start + chunk - 1, size(buffer, 1))
       m = last - start + 1
@@ -350,14 +390,7 @@ contains
         buffer(start:last, o) = cmplx(total(:m, 1), total(:m, 2), wp)
       end do
     end do
-
-    do o = 1, size(kernel, 1)
-      call fftw_execute_dft(self%column_inverse, buffer(:, o), buffer(:, o))
-      do row = 1, n_row
-        self%work(first:first + w - 1, row, o) = buffer((row - 1)*w + 1:row*w, o)
-      end do
-    end do
-  end subroutine convolve_block
+  end subroutine multiply
 
   !> total = total + sign * spectrum * field
   pure subroutine add_product(n, spectrum, sign, odd, field, total)

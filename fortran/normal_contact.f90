@@ -28,8 +28,10 @@ module hc_normal_contact
   real(wp), parameter :: coarse_tolerance = 1.0e-4_wp
   !> Scale of the classification parameter: r = this/(2 pi lambda_1 a), a the contact radius.
   real(wp), parameter :: classification_scale = 10.0_wp
-  !> Accuracy of a linear solution, relative to the residual at its start.
+  !> Accuracy of a linear solution, relative to the residual at its start, while the set changes.
   real(wp), parameter :: inner_accuracy = 0.1_wp
+  !> Accuracy of the last linear solution, relative to the tolerance.
+  real(wp), parameter :: final_accuracy = 0.3_wp
   integer, parameter :: max_iterations = 400
 
   !> The problem on one lattice.
@@ -200,9 +202,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     real(wp), allocatable :: p(:), w(:), gap(:), h(:), constraint(:, :)
-    logical, allocatable :: candidate(:), active(:)
-    real(wp) :: delta, r, residual, inner_tolerance, multiplier(1), p_max
+    logical, allocatable :: candidate(:), active(:), previous(:)
+    real(wp) :: delta, r, residual, inner_tolerance, multiplier(1)
     integer :: n, sweep, iterations, n_constraint
+    logical :: changed
 
     call new_contact_state(state, level%lattice)
     n = level%lattice%size()
@@ -225,12 +228,19 @@ contains
     delta = target
     residual = 1.0_wp
 
+    changed = .true.
+
     do sweep = 1, max_sweeps
-      call restart(level, control, target, h, active, p, w, error)
-      if (allocated(error)) return
-      if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, active)
-      p_max = maxval(p)
-      inner_tolerance = max(inner_accuracy*min(residual, 1.0_wp), 0.2_wp*tolerance)*level%compliance*p_max
+      if (changed) then
+        call restart(level, control, target, h, active, p, w, error)
+        if (allocated(error)) return
+        if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, active)
+        inner_tolerance = max(inner_accuracy*min(residual, 1.0_wp), final_accuracy*tolerance)
+      else
+        ! the set has been found: the linear problem is worth solving to the end
+        inner_tolerance = final_accuracy*tolerance
+      end if
+      inner_tolerance = inner_tolerance*level%compliance*maxval(p)
       call projected_cg(level, active, constraint, merge(0.0_wp, delta, control == load_control) - h, p, w, &
                         inner_tolerance, max_iterations, multiplier(:n_constraint), residual, iterations, error)
       if (allocated(error)) return
@@ -243,11 +253,19 @@ contains
 
       ! one step of a projected gradient map; scaled with the size of the contact it contracts
       r = classification_scale/(2.0_wp*pi*level%flexibility%pair%lambda_1*sqrt(level%lattice%cell_area()*count(active)/pi))
+      previous = active
       active = candidate .and. p - r*gap > 0.0_wp
       if (.not. any(active)) active = candidate .and. gap <= minval(gap, mask=candidate)
+      changed = any(active .neqv. previous)
     end do
 
-    state%pressure = reshape(max(p, 0.0_wp), shape(state%pressure))
+    if (any(p < 0.0_wp)) then                                                 ! within the tolerance
+      p = max(p, 0.0_wp)
+      call level%product(p, w, error)
+      if (allocated(error)) return
+      gap = h + w - delta
+    end if
+    state%pressure = reshape(p, shape(state%pressure))
     state%gap = reshape(gap, shape(state%gap))
     state%approach = delta
     call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance)

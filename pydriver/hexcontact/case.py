@@ -14,14 +14,16 @@ from . import deck as decks
 from . import grid as grids
 from . import native
 from .case_arguments import as_toml, body_keys, given, with_radians
+from .case_checks import algorithm_of, field_problems, touching_problems
 from .deck import Deck
 from .errors import DeckError
 from .grid import Estimate, NoContactFound
 from .lattice import Lattice
 from .load_history import LoadStep, Target, load_steps
 from .messages import MISSING, Problem, Source, deck_error
-from .native import ElasticPair
-from .surfaces import Separation, Surface, principal_curvatures
+from .native import ElasticPair, Method
+from .surfaces import Separation, Surface
+from .validation import SMALLEST
 
 if TYPE_CHECKING:
     from .result import Result
@@ -32,13 +34,6 @@ Array = NDArray[np.float64]
 
 # Windows of up to so many nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
 MOST_DIRECT_NODES = 200
-
-FRICTIONLESS_FIELDS = (
-    "pressure",
-    "gap",
-    "zone",
-    *(name for name in decks.FIELDS if name.startswith("displacement_")),
-)
 
 
 @dataclass(frozen=True)
@@ -278,7 +273,7 @@ class Case:
         self.title = deck.title
         self.body_1, self.body_2 = _body(deck.body.body_1), _body(deck.body.body_2)
         self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
-        algorithm, problems = _algorithm(deck)
+        algorithm, problems = algorithm_of(deck)
         self.solver = SolverSettings(
             algorithm, deck.solver.method, deck.solver.tolerance, deck.solver.coupling
         )
@@ -287,11 +282,11 @@ class Case:
         )
         mu = 0.0 if algorithm == "frictionless" else self.friction_coefficient
         self.load_steps, of_history = load_steps(deck.load, mu)
-        problems += of_history + _field_problems(deck, algorithm)
+        problems += of_history + field_problems(deck, algorithm)
         self._surface_gap: Separation | None = None
         if gap is None:
             self._surface_gap = Separation(deck.body.body_1.surface, deck.body.body_2.surface)
-            problems += _touching_problems(self._surface_gap)
+            problems += touching_problems(self._surface_gap)
         elif self.body_1.surface is not None or self.body_2.surface is not None:
             problems.append(
                 Problem(("gap",), MISSING, "expected either a gap or surfaces of the bodies, not both")
@@ -306,7 +301,7 @@ class Case:
             self.body_2.young_modulus,
             self.body_2.poisson_ratio,
         )
-        self.window_fixed = grids.is_fixed(deck.grid) or isinstance(gap, np.ndarray)
+        self.window_fixed = grids.is_fixed(deck.grid)
         self.lattice = self._size(deck.grid, source, lattice)
 
     # --- what solving needs ---------------------------------------------------------------------------------
@@ -356,11 +351,12 @@ class Case:
         """
         return grids.grown(lattice) if contact is None else grids.grown(lattice, grids.rim_sides(contact))
 
-    def method_for(self, lattice: Lattice) -> str:
+    def method_for(self, lattice: Lattice) -> Method:
         """Return the method to use on a window, "direct" or "fft"; decides what "auto" means."""
-        if self.solver.method != "auto":
-            return self.solver.method
-        return "direct" if lattice.n_row * lattice.n_col <= MOST_DIRECT_NODES else "fft"
+        small = lattice.size <= MOST_DIRECT_NODES
+        return (
+            "direct" if self.solver.method == "direct" or (self.solver.method == "auto" and small) else "fft"
+        )
 
     def memory_needed(self, lattice: Lattice) -> int:
         """Return the memory (bytes) that solving on a window takes."""
@@ -392,7 +388,10 @@ class Case:
         if self._surface_gap is not None:
             return self._surface_gap(x, y)
         assert callable(self._given_gap)
-        return np.asarray(self._given_gap(x, y), dtype=float)
+        gap = np.asarray(self._given_gap(x, y), dtype=float)
+        if gap.shape != np.shape(x):
+            raise DeckError(f"gap: expected an array of the shape of x, {np.shape(x)}, not {gap.shape}")
+        return gap
 
     def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:
         """Return the window, checked against an estimate of the contact wherever there is one."""
@@ -425,61 +424,11 @@ class Case:
         found = [
             grids.estimate_contact(self.pair, self._gap_at, center, origin, **{name: value})
             for name, value in largest.items()
-            if value > 0
+            if value >= SMALLEST
         ]
         return found[0] if len(found) == 1 else found[0].joined(found[1])
-
-
-# --- from deck to case --------------------------------------------------------------------------------------
 
 
 def _body(body: decks.Body) -> Body:
     surface = None if body.surface.shape == "flat" else body.surface
     return Body(body.young_modulus, body.poisson_ratio, body.rigid, surface)
-
-
-def _algorithm(deck: Deck) -> tuple[str, list[Problem]]:
-    """Return the algorithm that a deck asks for, and what stands against it."""
-    given, mu = deck.solver.algorithm, deck.friction.coefficient if deck.friction else None
-    algorithm = given or ("incremental" if mu else "frictionless")
-    problems = []
-    if algorithm == "frictionless" and mu:
-        sentence = 'expected 0, since solver.algorithm = "frictionless"'
-        problems.append(Problem(("friction", "coefficient"), mu, sentence))
-    if algorithm != "frictionless" and mu is None:
-        sentence = (
-            f'missing; expected a number of at least 0 (or inf), since solver.algorithm = "{algorithm}"'
-        )
-        problems.append(Problem(("friction", "coefficient"), MISSING, sentence))
-    if algorithm != "frictionless":
-        # The one place that holds friction back.
-        key, value = (("solver", "algorithm"), given) if given else (("friction", "coefficient"), mu)
-        problems.append(Problem(key, value, "this version solves frictionless contact only"))
-    return algorithm, problems
-
-
-def _field_problems(deck: Deck, algorithm: str) -> list[Problem]:
-    """Complain about fields that a frictionless run does not yield."""
-    known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else decks.FIELDS
-    missing = [name for name in deck.output.fields or () if name not in known]
-    if not missing:
-        return []
-    sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
-    return [Problem(("output", "fields"), deck.output.fields, sentence)]
-
-
-def _touching_problems(gap: Separation) -> list[Problem]:
-    """Complain about surfaces that never touch, or that touch along a line or all over, without end."""
-    try:
-        gap.first_touch  # noqa: B018 (worked out here, kept for later)
-    except DeckError as error:
-        return [Problem(("body", "2", "surface"), MISSING, str(error))]
-    one, two = gap.surface_1.curvature, gap.surface_2.curvature
-    if one is None or two is None:
-        return []
-    smaller, larger, _ = principal_curvatures(one + two)
-    if smaller > 1e-12 * larger:
-        return []
-    where = "everywhere" if larger == 0 else "along a line"
-    sentence = f"the two surfaces touch {where}, so the contact has no end; expected a shape that bounds it"
-    return [Problem(("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), MISSING, sentence)]

@@ -298,11 +298,17 @@ def _open(path: Path) -> Result:
 @app.command(epilog="Example: hexcontact plot hertz_spheres.nc --what section --output section.pdf")
 @_guarded
 def plot(
-    file: ResultFile,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FILE]", help="The result, a netCDF file.", show_default=False),
+    ] = None,
     what: Annotated[
         str,
         typer.Option(
-            "--what", "-w", help="overview, field, section, boundary or history; all: each in a file."
+            "--what",
+            "-w",
+            help="overview, pressure, section, boundary or history; all: each in a file. Without FILE: "
+            "pyramid (Figure 5.6) or load-shapes (Figure 7.3).",
         ),
     ] = "overview",
     step: Annotated[int, typer.Option("--step", "-s", help="Load step, the first is 1; -1: the last.")] = -1,
@@ -313,13 +319,23 @@ def plot(
         ),
     ] = None,
 ) -> None:
-    """Draw a result."""
+    """Draw a result, or what the influence functions and load shapes look like."""
+    from . import plotting_influence
     from .plotting import FIGURES
 
-    if what not in (known := [*FIGURES, "all"]):
+    general = plotting_influence.FIGURES
+    if what not in (known := [*FIGURES, "all", *general]):
         from .messages import did_you_mean, listed
 
         raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
+    if (file is None) != (what in general):
+        expected = "expected no FILE" if file else "expected the FILE of a result"
+        raise DeckError(f"--what {what}: {expected}")
+    if file is None:
+        picture = output or Path(f"{what}.png")
+        general[what]().savefig(picture, dpi=200)
+        print(f"written: {picture}")
+        return
     result, first = _open(file), output or file.with_suffix(".png")
     for name in FIGURES if what == "all" else [what]:
         named = what == "all" or output is None

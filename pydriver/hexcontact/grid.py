@@ -170,12 +170,11 @@ def estimate_contact(
     NoContactFound
         If nothing touches, or if the contact has no end.
     """
-    target: dict[str, float | None] = {"normal_load": normal_load, "approach": approach}
     half = _starting_half_size(pair, gap, center, normal_load, approach)
     lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), origin)
     enclosed, enlargements = False, 0
     for _ in range(MOST_TRIALS):
-        contact = _solve(pair, gap, lattice, target)
+        contact = _solve(pair, gap, lattice, normal_load, approach)
         if contact is None or not contact.any():
             # Under load control there is always contact; at an approach the nodes may have missed it.
             lattice = centered(lattice.spacing / 4, center, lattice.shape, origin)
@@ -222,13 +221,13 @@ def _starting_half_size(
             inside = 2 * pair.effective_modulus * radii * profile < normal_load
         else:
             inside = profile < (approach or 0.0)
-    if inside[-1] or not inside.any():
-        raise NoContactFound("the contact has no end, or nothing touches")
-    return float(radii[np.flatnonzero(inside)[-1] + 1])
+    if inside[-1]:
+        raise NoContactFound("the contact has no end")
+    return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 
 def _solve(
-    pair: ElasticPair, gap: GapFunction, lattice: Lattice, target: dict[str, float | None]
+    pair: ElasticPair, gap: GapFunction, lattice: Lattice, normal_load: float | None, approach: float | None
 ) -> NDArray[np.bool_] | None:
     """Return the nodes in contact of a rough frictionless solution, or None if no node can touch."""
     height = np.asarray(gap(lattice.x, lattice.y), float)
@@ -236,7 +235,8 @@ def _solve(
     if not candidate.any():
         return None
     height = np.where(candidate, height, 0.0)
-    solution = NormalContact(lattice, pair, height, candidate, threads=1).solve(**target, tolerance=1e-4)
+    contact = NormalContact(lattice, pair, height, candidate, threads=1)
+    solution = contact.solve(normal_load=normal_load, approach=approach, tolerance=1e-4)
     return np.asarray(solution.pressure > 0)
 
 

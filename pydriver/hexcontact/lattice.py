@@ -42,7 +42,9 @@ class Lattice:
         if not (np.isfinite(self.spacing) and self.spacing > 0):
             raise DeckError(f"spacing = {self.spacing!r}: expected a positive length in meters")
         if self.n_row < 1 or self.n_col < 1:
-            raise DeckError(f"window = [{self.n_row}, {self.n_col}]: expected at least one row and one column")
+            raise DeckError(
+                f"window = [{self.n_row}, {self.n_col}]: expected at least one row and one column"
+            )
 
     @classmethod
     def covering(
@@ -68,7 +70,9 @@ class Lattice:
         """
         unit = cls(spacing, 0, 0, 1, 1, origin)
         half = 0.5 * np.array([length_x, length_y])
-        corners = np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)]) * half + np.asarray(center) - origin
+        corners = (
+            np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)]) * half + np.asarray(center) - origin
+        )
         indices = corners @ np.linalg.inv(unit.basis)
         # a rectangle that ends on a row or column keeps it, whatever the rounding
         first = np.floor(indices.min(axis=0) + 1e-9).astype(int)

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 
 from .deck import LOADS, MOST_STEPS, Load, Segment
 from .messages import MISSING, Problem
+from .validation import SMALLEST
 
 Control = Literal["force", "displacement"]
 Motion = Literal["z", "x", "y", "twist"]
@@ -124,7 +125,7 @@ def load_steps(
             steps.append(LoadStep(len(steps), number, label, **now))
             problems += _overload(key, segment, steps[-1], friction_coefficient)
 
-    if all(step.z.value <= 0 for step in steps):
+    if all(step.z.value < SMALLEST for step in steps):
         first = loads[0].normal_load
         key, value = (("load", 0, "normal_load"), first) if first is not None else (("load",), MISSING)
         sentence = "expected a normal load or an approach above zero somewhere in the history"

@@ -20,7 +20,12 @@ _api = _core.hc_f2py_api
 
 Method = Literal["direct", "fft"]
 _METHODS = {"direct": 0, "fft": 1}
-_ERRORS: dict[int, type[HexcontactError]] = {1: DeckError, 2: ConvergenceError, 3: ResourceError, 4: HexcontactError}
+_ERRORS: dict[int, type[HexcontactError]] = {
+    1: DeckError,
+    2: ConvergenceError,
+    3: ResourceError,
+    4: HexcontactError,
+}
 
 
 def raise_for(code: int, message: bytes) -> None:
@@ -154,7 +159,9 @@ class FlexibilityOperator:
         """
         zero = np.zeros(self.lattice.shape)
         named = {"pressure": pressure, "traction_x": traction_x, "traction_y": traction_y}
-        columns = [_field(zero if value is None else value, self.lattice, name) for name, value in named.items()]
+        columns = [
+            _field(zero if value is None else value, self.lattice, name) for name, value in named.items()
+        ]
         traction = np.array(columns).T
         displacement, code, message = _api.apply_operator(self._handle, traction)
         raise_for(code, message)
@@ -227,7 +234,9 @@ class NormalContact:
         self.lattice = lattice
         mask = np.ones(lattice.shape, dtype=bool) if candidate is None else np.asarray(candidate, dtype=bool)
         if mask.shape != lattice.shape:
-            raise DeckError(f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)")
+            raise DeckError(
+                f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)"
+            )
         # nodes that can never touch may have any gap, also none at all
         gap = np.where(mask, np.asarray(initial_gap, dtype=np.float64), 0.0)
         self._mask = mask
@@ -276,7 +285,11 @@ class NormalContact:
         target = normal_load if normal_load is not None else approach
         assert target is not None
         if not np.isfinite(target) or (normal_load is not None and normal_load < 0):
-            name, kind = ("approach", "a number") if normal_load is None else ("normal_load", "a number not below zero")
+            name, kind = (
+                ("approach", "a number")
+                if normal_load is None
+                else ("normal_load", "a number not below zero")
+            )
             raise DeckError(f"{name} = {target!r}: expected {kind}")
         if not 0 < tolerance < 1:
             raise DeckError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
@@ -302,7 +315,9 @@ class NormalContact:
         )
 
 
-def memory_needed(method: Method, n_row: int, n_col: int, *, operator_only: bool = False, threads: int = 1) -> int:
+def memory_needed(
+    method: Method, n_row: int, n_col: int, *, operator_only: bool = False, threads: int = 1
+) -> int:
     """Return the bytes that a frictionless problem takes on a window of the given size.
 
     Parameters

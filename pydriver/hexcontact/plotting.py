@@ -404,7 +404,7 @@ def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
 
 FIGURES: dict[str, Callable[..., Figure]] = {
     "overview": overview,
-    "field": pressure_field,
+    "pressure": pressure_field,
     "section": section,
     "boundary": contact_boundary,
     "history": history,

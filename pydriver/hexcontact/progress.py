@@ -142,6 +142,6 @@ def describe(history: Any, short: bool = False) -> str:
             f"radius {quantity(history['contact_radius'], 'm')}",
             f"R_n {history['residual_normal']:.1e}",
             f"R_P {history['residual_force']:.1e}",
-            f"{history['seconds']:.2f} s",
+            quantity(history["seconds"], "s", 3),
         ]
     return "  ".join(part for part in parts if part)

@@ -1,8 +1,7 @@
 """The result of a run: what each load step leaves, and how it is laid out in a file.
 
-Every quantity is defined once, in `VARIABLES`: its dimensions, unit, meaning and what stands
-where a step has no value. `Layout` turns a run into dimensions, coordinates and attributes
-(CF-1.11); `assemble` fills an `xarray.Dataset` with it, `hexcontact.store` a netCDF file.
+The quantities are those of `hexcontact.variables`. `Layout` turns a run into dimensions, coordinates
+and attributes (CF-1.11); `assemble` fills an `xarray.Dataset` with it, `hexcontact.netcdf` a file.
 """
 
 from __future__ import annotations
@@ -18,141 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .variables import CONVENTIONS, FIELDS, NAN, SCHEMA_VERSION, VARIABLES
+
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
 
     from .lattice import Lattice
 
-SCHEMA_VERSION = 1
-CONVENTIONS = "CF-1.11"
-
-NAN = float("nan")
-NOT_KEPT = -1  # zone of a step whose fields the deck chose not to keep (output.every)
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One quantity of the result: what a file says about it.
-
-    Attributes
-    ----------
-    dims : tuple of str
-        Some of ``step``, ``row``, ``col``.
-    units : str
-        SI unit, ``"1"`` for a pure number, empty for text.
-    long_name : str
-        What it is, in words.
-    padding : float or int
-        Value at nodes outside the window that a step was solved on.
-    dtype : str
-        numpy type in the file; ``"str"`` for text.
-    flags : mapping of int to str
-        Meaning of each value, for a quantity that is a code.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    padding: float | int = NAN
-    dtype: str = "f8"
-    flags: Mapping[int, str] = field(default_factory=dict)
-
-    @property
-    def is_field(self) -> bool:
-        """Whether there is a value at every node in every step."""
-        return self.dims == ("step", "row", "col")
-
-    @property
-    def missing(self) -> float | int:
-        """Value that says "not kept"."""
-        return NAN if self.dtype == "f8" else NOT_KEPT
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """CF attributes."""
-        attributes: dict[str, Any] = {"long_name": self.long_name}
-        if self.units:
-            attributes["units"] = self.units
-        if self.flags:
-            attributes["flag_values"] = np.array(list(self.flags), dtype=self.dtype)
-            attributes["flag_meanings"] = " ".join(self.flags.values())
-        return attributes
-
-
-def _node(units: str, long_name: str, **more: Any) -> Variable:
-    return Variable(("step", "row", "col"), units, long_name, **more)
-
-
-def _scalar(units: str, long_name: str, **more: Any) -> Variable:
-    return Variable(("step",), units, long_name, **more)
-
-
-_ZONES = {NOT_KEPT: "not_kept", 0: "separated", 1: "stick", 2: "slip"}
-_PLANE = ("row", "col")
-
-VARIABLES: dict[str, Variable] = {
-    # coordinates
-    "step": Variable(("step",), "1", "number of the load step, the first is 1", dtype="i4"),
-    "row": Variable(("row",), "1", "lattice index along the second basis vector", dtype="i4"),
-    "col": Variable(("col",), "1", "lattice index along the first basis vector", dtype="i4"),
-    "x": Variable(_PLANE, "m", "x coordinate of the node"),
-    "y": Variable(_PLANE, "m", "y coordinate of the node"),
-    # nodes
-    "initial_gap": Variable(_PLANE, "m", "gap of the undeformed surfaces at first touch"),
-    "pressure": _node("Pa", "contact pressure", padding=0.0),
-    "traction_x": _node("Pa", "shear traction on body 1 along x", padding=0.0),
-    "traction_y": _node("Pa", "shear traction on body 1 along y", padding=0.0),
-    "gap": _node("m", "gap between the deformed surfaces"),
-    "zone": _node("1", "contact zone of the node", padding=0, dtype="i1", flags=_ZONES),
-    "relative_displacement_x": _node(
-        "m", "displacement of body 1 relative to body 2 along x, less the shift"
-    ),
-    "relative_displacement_y": _node(
-        "m", "displacement of body 1 relative to body 2 along y, less the shift"
-    ),
-    "slip_increment_x": _node("m", "slip during the step along x", padding=0.0),
-    "slip_increment_y": _node("m", "slip during the step along y", padding=0.0),
-    "accumulated_slip": _node("m", "length of the slip path so far", padding=0.0),
-    "displacement_1_x": _node("m", "surface displacement of body 1 along x"),
-    "displacement_1_y": _node("m", "surface displacement of body 1 along y"),
-    "displacement_1_z": _node("m", "surface displacement of body 1 into body 1"),
-    "displacement_2_x": _node("m", "surface displacement of body 2 along x"),
-    "displacement_2_y": _node("m", "surface displacement of body 2 along y"),
-    "displacement_2_z": _node("m", "surface displacement of body 2 into body 2"),
-    # history
-    "normal_load": _scalar("N", "normal load pressing the bodies together"),
-    "tangential_load_x": _scalar("N", "tangential load on body 1 along x"),
-    "tangential_load_y": _scalar("N", "tangential load on body 1 along y"),
-    "torque": _scalar("N m", "torque on body 1 about z"),
-    "approach": _scalar("m", "normal approach of the remote parts of the bodies"),
-    "shift_x": _scalar("m", "shift of body 2 relative to body 1 far away along x"),
-    "shift_y": _scalar("m", "shift of body 2 relative to body 1 far away along y"),
-    "twist": _scalar("rad", "rotation of body 2 relative to body 1 far away about z"),
-    "contact_area": _scalar("m2", "contact area: cells of the nodes in contact"),
-    "stick_area": _scalar("m2", "stick area: cells of the sticking nodes"),
-    "contact_radius": _scalar("m", "radius of the disc as large as the contact area"),
-    "contact_radius_fit": _scalar("m", "radius at which the pressure of a circular contact vanishes"),
-    "stick_radius": _scalar("m", "radius of the disc as large as the stick area"),
-    "stick_center_x": _scalar("m", "x coordinate of the centroid of the stick area"),
-    "stick_center_y": _scalar("m", "y coordinate of the centroid of the stick area"),
-    "max_pressure": _scalar("Pa", "largest contact pressure of a node"),
-    "max_traction": _scalar("Pa", "largest shear traction of a node"),
-    "dissipated_energy": _scalar("J", "energy dissipated by friction so far"),
-    "elastic_energy": _scalar("J", "elastic energy stored in both bodies"),
-    "sweeps": _scalar("1", "iterations of the solver", dtype="i4"),
-    "operator_applications": _scalar("1", "applications of the full flexibility operator"),
-    "seconds": _scalar("s", "wall time of the step"),
-    "residual_normal": _scalar("1", "residual of the normal contact conditions, R_n"),
-    "residual_tangential": _scalar("1", "residual of the friction conditions, R_t"),
-    "residual_force": _scalar("1", "residual of the normal load, R_P"),
-    "residual_shear_force": _scalar("1", "residual of the tangential load, R_Q"),
-    "residual_torque": _scalar("1", "residual of the torque, R_M"),
-    "segment": _scalar("1", "segment of the load history, the first is 1", dtype="i4"),
-    "label": _scalar("", "label of the segment", dtype="str"),
-}
-
-FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.is_field)
 _COORDINATES = ("step", "row", "col", "x", "y")
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
@@ -172,9 +44,9 @@ class Step:
     lattice : Lattice
         Window it was solved on.
     fields : mapping of str to ndarray
-        Arrays of shape (n_row, n_col), SI; names of `VARIABLES`. ``initial_gap`` among them.
+        Arrays of shape (n_row, n_col), SI; names of `hexcontact.variables`. ``initial_gap`` among them.
     history : mapping of str to number or text
-        Values by step; names of `VARIABLES`.
+        Values by step; names of `hexcontact.variables`.
     """
 
     index: int

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from . import memory
 from .errors import ConvergenceError, DeckError
 from .estimators import area_radius, edge_radius
+from .grid import rim_sides
 from .progress import Reporter, reporter
-from .result import FIELDS, Metadata, Result, Step, assemble
+from .result import Metadata, Result, Step, assemble
+from .variables import FIELDS
 
 if TYPE_CHECKING:
     from .case import Body, Case, LoadStep
@@ -28,6 +30,7 @@ Array = NDArray[np.float64]
 _STATE = ("pressure", "gap", "zone")  # what every frictionless step leaves
 _DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"))
 _ITEM = 8  # bytes of a float
+_ARRAYS = 12  # fields over the window that Python holds while a step is solved and written
 _CIRCULAR = 0.99  # least ratio of the axes of a contact that counts as circular
 
 
@@ -136,6 +139,15 @@ def record(
     store.finish()
 
 
+def memory_needed(case: Case, lattice: Lattice) -> int:
+    """Return the memory (bytes) that solving and writing a load step on a window takes."""
+    from . import native
+
+    bodies = {name[:-2] for name in case.output.fields if name in _DISPLACEMENTS}
+    operator = native.memory_needed("fft", lattice.n_row, lattice.n_col, operator_only=True)
+    return case.memory_needed(lattice) + len(bodies) * operator + _ARRAYS * _ITEM * lattice.size
+
+
 def steps(case: Case, kept_in_memory: bool = False) -> Iterator[Step]:
     """Solve a case step by step.
 
@@ -172,7 +184,7 @@ def steps(case: Case, kept_in_memory: bool = False) -> Iterator[Step]:
         value = target.z.at(at_start[target.z.control])
         while True:
             solution = window.solve(target.z.control, value)
-            if not _touches_rim(solution.zone):
+            if not any(rim_sides(solution.zone > 0)):
                 break
             window = window.grown(solution, target)
         if not solution.converged:
@@ -188,7 +200,7 @@ class _Window:
         from .native import NormalContact
 
         memory.require(
-            case.memory_needed(lattice) + held * lattice.size,
+            memory_needed(case, lattice) + held * lattice.size,
             f"a window of {lattice.n_row} x {lattice.n_col} nodes (method {case.method_for(lattice)})",
             "choose a larger grid.spacing" + (", or an output file" if held else ""),
         )
@@ -258,11 +270,6 @@ class _Window:
         z, x, y = self.bodies[number].apply(pressure)
         sign = 1.0 if number == 1 else -1.0
         return {"x": sign * x, "y": sign * y, "z": z}
-
-
-def _touches_rim(zone: NDArray[Any]) -> bool:
-    """Whether contact reaches the outermost nodes of the window."""
-    return bool(zone[0].any() or zone[-1].any() or zone[:, 0].any() or zone[:, -1].any())
 
 
 def _not_converged(case: Case, target: LoadStep, solution: NormalSolution) -> str:

@@ -12,208 +12,28 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
-import json
 import os
 import re
 import shutil
-import socket
-import sys
 import threading
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
-
-import numpy as np
+from typing import Self
 
 from .errors import DeckError, HexcontactError, ResourceError
-from .result import FIELDS, SCHEMA_VERSION, VARIABLES, Layout, Metadata, Result, Step, assemble, window_of
-
-if TYPE_CHECKING:
-    import netCDF4
+from .lock import Lock
+from .netcdf import flush, read_output, read_record, write
+from .result import Layout, Metadata, Result, Step, assemble
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
-_CHUNK = 512  # nodes of a chunk along row and col
 _RECORD = re.compile(r"\d{6}\.nc")
 _LACKING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, None}
-_netcdf = threading.Lock()  # the netCDF library must not be entered by two threads
 
 
 def journal_of(path: Path) -> Path:
     """Folder of the journal that belongs to the output `path`."""
     return path.with_name(path.name + ".d")
-
-
-@contextlib.contextmanager
-def _alone() -> Iterator[None]:
-    """Keep other threads out of the netCDF library, those that read through xarray too."""
-    backend = sys.modules.get("xarray.backends.netCDF4_")
-    with _netcdf, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
-        yield
-
-
-# --- writing --------------------------------------------------------------------------------------
-
-
-def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool, compress: bool = True) -> None:
-    """Write a netCDF file and flush it to disk.
-
-    Parameters
-    ----------
-    path : Path
-        File to write; replaced if it is there.
-    layout : Layout
-        Layout of all the steps.
-    steps : iterable of Step
-        The steps with their fields; gone through once, none is kept.
-    complete : bool
-        Whether these are all steps of the run.
-    compress : bool
-        Compress what has a value at every node.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    import netCDF4
-
-    try:
-        with _alone():
-            file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
-        try:
-            with _alone():
-                file.setncatts(layout.attributes(complete))
-                for name, size in layout.sizes.items():
-                    file.createDimension(name, size)
-                for name, values in layout.coordinates().items():
-                    _column(file, layout, name, compress)[...] = values
-                columns = {name: _column(file, layout, name, compress) for name in layout.variables}
-            gap_column = columns.pop("initial_gap", None)
-            gap: Any = None
-            for position, step in enumerate(steps):
-                with _alone():
-                    for name, column in columns.items():
-                        column[position] = _characters(column, layout.value(name, position, step))
-                if gap_column is not None:
-                    gap = layout.initial_gap(gap, step)
-            with _alone():
-                if gap_column is not None:
-                    gap_column[...] = gap
-        finally:
-            with _alone():
-                file.close()
-    except RuntimeError as error:  # the HDF5 library hides the reason, a full disk mostly
-        raise OSError(None, str(error), str(path)) from error
-    _flush(path)
-
-
-def _column(file: netCDF4.Dataset, layout: Layout, name: str, compress: bool) -> netCDF4.Variable:
-    """Create the variable `name` with its attributes."""
-    variable = VARIABLES[name]
-    if variable.dtype == "str":
-        # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
-        longest = max(len(str(step.history.get(name, "")).encode()) for step in layout.steps)
-        file.createDimension(f"{name}_length", max(1, longest))
-        column = file.createVariable(name, "S1", (*variable.dims, f"{name}_length"))
-        column.setncatts({**variable.attributes, "_Encoding": "utf-8"})
-        column.set_auto_chartostring(False)
-        return column
-    options: dict[str, Any] = {}
-    if variable.dims[-2:] == ("row", "col"):
-        options["compression"] = "zlib" if compress else None
-        options["complevel"] = 1
-        options["fletcher32"] = True  # damage shows as an error, not as wrong numbers
-        options["chunksizes"] = [min(_CHUNK, len(file.dimensions[dim])) for dim in variable.dims]
-        if "step" in variable.dims:
-            options["chunksizes"][0] = 1
-        if variable.dtype == "f8":
-            options["fill_value"] = variable.missing
-    column = file.createVariable(name, variable.dtype, variable.dims, **options)
-    column.setncatts(variable.attributes)
-    if variable.dims[-2:] == ("row", "col") and name not in ("x", "y"):
-        column.coordinates = "x y"
-    return column
-
-
-def _characters(column: netCDF4.Variable, value: Any) -> Any:
-    """Turn text into the characters of `column`; everything else stays as it is."""
-    if not isinstance(value, str):
-        return value
-    return np.frombuffer(value.encode().ljust(column.shape[-1], b"\0"), "S1")
-
-
-def _flush(path: Path) -> None:
-    """See to it that a file, or the names in a folder, are on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-# --- reading --------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
-    try:
-        yield
-    except (HexcontactError, FileNotFoundError):
-        raise
-    except PermissionError as error:
-        raise DeckError(f"{path} cannot be read: {error.strerror}") from error
-    except Exception as error:  # damage takes any form: every library below has its own exceptions
-        raise DeckError(
-            f"{path} is damaged or not a netCDF file ({str(error).strip() or type(error).__name__})"
-        ) from error
-
-
-def _check_ours(attributes: dict[str, Any], path: Path) -> None:
-    version = attributes.get("schema_version")
-    if version is None or "hexcontact_version" not in attributes:
-        raise DeckError(f"{path} was not written by hexcontact: its attributes name no schema_version")
-    if int(version) != SCHEMA_VERSION:
-        raise DeckError(
-            f"{path} has the file layout {int(version)} of hexcontact {attributes['hexcontact_version']}; "
-            f"this version reads layout {SCHEMA_VERSION}"
-        )
-
-
-def _attributes(file: netCDF4.Dataset) -> dict[str, Any]:
-    return {name: file.getncattr(name) for name in file.ncattrs()}
-
-
-def read_record(path: Path) -> tuple[Metadata, Step]:
-    """Read one record of a journal.
-
-    Raises
-    ------
-    DeckError
-        If the file is damaged or of another kind.
-    FileNotFoundError
-        If it is not there.
-    """
-    import netCDF4
-
-    with _reading(path), _alone(), netCDF4.Dataset(path) as file:
-        file.set_auto_mask(False)
-        attributes = _attributes(file)
-        _check_ours(attributes, path)
-        fields, history = {}, {}
-        for name in VARIABLES.keys() & file.variables.keys():
-            if name in FIELDS:
-                fields[name] = file[name][0]
-            elif VARIABLES[name].dims == ("step",):
-                value = file[name][0]
-                history[name] = str(value) if VARIABLES[name].dtype == "str" else value
-        if "initial_gap" in file.variables:
-            fields["initial_gap"] = file["initial_gap"][...]
-        window = window_of(attributes, file["row"][...], file["col"][...])
-        index = int(history.pop("step")) - 1
-    return Metadata.from_attributes(attributes), Step(index, window, fields, history)
 
 
 class Journal:
@@ -287,7 +107,7 @@ def open_result(path: str | os.PathLike[str]) -> Result:
                 if journal := Journal(target):
                     return journal.result(target)
                 raise DeckError(f"{target} is a folder without finished steps in it")
-            output = _open_output(target) if target.exists() else None
+            output = read_output(target) if target.exists() else None
             if output is not None and output.complete:
                 return output
             journal = Journal(journal_of(target))
@@ -303,101 +123,6 @@ def open_result(path: str | os.PathLike[str]) -> Result:
 def _continues(journal: Journal, output: Result) -> bool:
     """Whether the steps of `output` are the first ones of `journal`."""
     return len(journal) >= len(output) and journal.metadata.run == output.dataset.attrs.get("run")
-
-
-def _open_output(path: Path) -> Result:
-    import netCDF4
-
-    with _reading(path), _alone(), netCDF4.Dataset(path) as file:
-        attributes = _attributes(file)
-        _check_ours(attributes, path)
-        for name in ("step", "row", "col", "x", "y"):
-            if file[name].dimensions != VARIABLES[name].dims or 0 in file[name].shape:
-                raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
-    with _reading(path):
-        import xarray
-
-        result = Result(xarray.open_dataset(path, engine="netcdf4"), str(path))
-        for variable in result.dataset.variables.values():
-            if variable.ndim < 2:
-                variable.load()
-        _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)
-        return result
-
-
-# --- the run --------------------------------------------------------------------------------------
-
-
-class Lock:
-    """Keeps two runs from writing one output.
-
-    The lock is held through the operating system, which lets go of it when the process dies.
-    File systems differ in whether another machine notices, so the file names process and host:
-    a lock left by another host counts as held.
-
-    Parameters
-    ----------
-    path : Path
-        Lock file.
-    output : Path
-        What is being protected, for the message.
-
-    Raises
-    ------
-    DeckError
-        If another run holds it.
-    """
-
-    def __init__(self, path: Path, output: Path) -> None:
-        self.path = path
-        while True:
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-            try:
-                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                held = False
-            except BlockingIOError:
-                held = True
-            except OSError:  # a file system without locks: only the process number is left to go by
-                held = _is_running(self._holder())
-            if held or _same_file(path, self._descriptor):
-                break
-            os.close(self._descriptor)  # the one who held it deleted the file in between
-        holder = self._holder()
-        if held or holder.get("host", socket.gethostname()) != socket.gethostname():
-            os.close(self._descriptor)
-            since = f" since {holder['since']}" if "since" in holder else ""
-            raise DeckError(
-                f"{output} is being written by another run, process {holder.get('process', '?')} "
-                f"on {holder.get('host', '?')}{since}; if that run is over, delete {path}"
-            )
-        text = {"process": os.getpid(), "host": socket.gethostname(), "since": time.strftime("%F %T")}
-        os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, json.dumps(text).encode(), 0)
-
-    def _holder(self) -> dict[str, Any]:
-        with contextlib.suppress(ValueError):
-            holder = json.loads(os.pread(self._descriptor, 1000, 0))
-            if isinstance(holder, dict):
-                return holder
-        return {}
-
-    def release(self) -> None:
-        """Let go of the lock."""
-        self.path.unlink(missing_ok=True)
-        os.close(self._descriptor)
-
-
-def _is_running(holder: dict[str, Any]) -> bool:
-    import psutil
-
-    return holder.get("host") == socket.gethostname() and psutil.pid_exists(int(holder.get("process", -1)))
-
-
-def _same_file(path: Path, descriptor: int) -> bool:
-    try:
-        return os.path.samestat(os.stat(path), os.fstat(descriptor))
-    except FileNotFoundError:
-        return False
 
 
 class Store:
@@ -433,13 +158,10 @@ class Store:
             raise DeckError(f"{self.path} is a folder; a file name is expected")
         if not self.path.parent.is_dir():
             raise DeckError(f"cannot write {self.path}: the folder {self.path.parent} does not exist")
-        if self.path.exists() and not overwrite:
-            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
         with self._writing("the journal"):
-            self.folder.mkdir(exist_ok=True)
             if not os.access(self.path.parent, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-            self._lock = Lock(self.folder / "lock", self.path)
+            self._lock = self._locked()
         try:
             self._take_over(overwrite)
         except BaseException:
@@ -447,8 +169,17 @@ class Store:
             raise
         self._in_the_way = self.path.exists()
 
+    def _locked(self) -> Lock:
+        while True:
+            self.folder.mkdir(exist_ok=True)
+            flush(self.path.parent)
+            with contextlib.suppress(FileNotFoundError):  # a run that just ended took the folder away
+                return Lock(self.folder / "lock", self.path)
+
     def _take_over(self, overwrite: bool) -> None:
-        """Deal with what an unfinished run left."""
+        """Deal with what is there: an output, or what an unfinished run left."""
+        if self.path.exists() and not overwrite:
+            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
         left = Journal(self.folder)
         if left and not overwrite:
             raise DeckError(
@@ -458,10 +189,12 @@ class Store:
         with self._writing("the journal"):
             if left:  # they become the old output, which is only replaced by a complete new one
                 with contextlib.suppress(DeckError):
-                    old = _open_output(self.path) if self.path.exists() else None
+                    old = read_output(self.path) if self.path.exists() else None
                     if old is None or (not old.complete and _continues(left, old)):
                         layout = Layout(left.metadata, [step.head for step in left])
                         self._replace(self.path, layout, left, complete=left.complete)
+                    if old is not None:
+                        old.close()
             left.remove()
 
     def __enter__(self) -> Self:
@@ -502,7 +235,7 @@ class Store:
         try:
             write(temporary, layout, steps, complete, compress)
             os.replace(temporary, target)
-            _flush(target.parent)
+            flush(target.parent)
         except BaseException:
             with contextlib.suppress(OSError):
                 temporary.unlink()

@@ -40,7 +40,7 @@ def console() -> Console:
 
 
 def table(title: str, headers: Sequence[str], rows: Iterable[Row]) -> Table:
-    """Return a table; the first column is text, the others are numbers."""
+    """Return a table of numbers; names and labels are text, which may wrap on a narrow terminal."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -49,8 +49,9 @@ def table(title: str, headers: Sequence[str], rows: Iterable[Row]) -> Table:
         title=Text(title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, show_header=any(headers),
         pad_edge=False,
     )  # fmt: skip
-    for position, header in enumerate(headers):
-        shown.add_column(Text(header), justify="right" if position else "left", no_wrap=True)
+    for header in headers:
+        text = header in ("", "label")
+        shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
     for row in rows:
         shown.add_row(*map(Text, row))
     return shown
@@ -58,10 +59,7 @@ def table(title: str, headers: Sequence[str], rows: Iterable[Row]) -> Table:
 
 def pairs(title: str, rows: Iterable[Row]) -> Table:
     """Return a table of names and what belongs to them."""
-    shown = table(title, ("", ""), rows)
-    shown.columns[1].justify = "left"
-    shown.columns[1].no_wrap = False
-    return shown
+    return table(title, ("", ""), rows)
 
 
 # --- before the run -------------------------------------------------------------------------------
@@ -69,6 +67,8 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
 
 def case_rows(case: Case) -> list[Row]:
     """Return what would be run."""
+    from .solve import memory_needed
+
     lattice = case.lattice
     span = [max(axis.max() - axis.min(), 0.0) for axis in (lattice.x, lattice.y)]
     pressed = [step.z.value for step in case.load_steps if step.z.control == "force"]
@@ -85,7 +85,7 @@ def case_rows(case: Case) -> list[Row]:
         ("load steps", str(len(case.load_steps))),
         ("largest load", quantity(max(pressed), "N") if pressed else "follows from the approach"),
         ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
-        ("memory", f"{quantity(case.memory_needed(lattice), 'B', 3)}"),
+        ("memory", f"{quantity(memory_needed(case, lattice), 'B', 3)}"),
     ]  # fmt: skip
 
 
@@ -126,21 +126,29 @@ def step_rows(history: History) -> list[Row]:
         for name, unit in _SHOWN.items()
         if name in history
     ]
-    residuals = {"R_n": "normal", "R_t": "tangential", "R_P": "force", "R_Q": "shear_force", "R_M": "torque"}
-    found = [f"{sign} = {history['residual_' + name]:.1e}" for sign, name in residuals.items()
-             if not math.isnan(history.get("residual_" + name, math.nan))]  # fmt: skip
-    return [*rows, ("residuals", ", ".join(found)), ("work", _work(history))]
+    residuals = ", ".join(f"{sign} = {value:.1e}" for sign, value in _residuals(history).items())
+    return [*rows, ("residuals", residuals), ("work", _work(history))]
+
+
+def _residuals(history: History) -> dict[str, float]:
+    """Return the residuals that there are, by the symbol of the theory."""
+    names = {"R_n": "normal", "R_t": "tangential", "R_P": "force", "R_Q": "shear_force", "R_M": "torque"}
+    found = {sign: float(history.get(f"residual_{name}", math.nan)) for sign, name in names.items()}
+    return {sign: value for sign, value in found.items() if not math.isnan(value)}
 
 
 def _work(history: History) -> str:
     return (
         f"{history['sweeps']} iterations, {history['operator_applications']:.3g} operator applications, "
-        f"{history['seconds']:.2f} s"
+        f"{quantity(history['seconds'], 's', 3)}"
     )
 
 
 def history_rows(histories: Sequence[History]) -> list[Row]:
-    """Return a row for each load step; of a long history only some steps, the last among them."""
+    """Return a row for each load step; of a long history only some steps, the last among them.
+
+    The residual is the largest of a step.
+    """
     stride = max(1, math.ceil(len(histories) / _MOST_ROWS))
     chosen = [k for k in range(len(histories)) if (len(histories) - 1 - k) % stride == 0]
     return [
@@ -151,15 +159,14 @@ def history_rows(histories: Sequence[History]) -> list[Row]:
             quantity(h["approach"], "m"),
             quantity(h["max_pressure"], "Pa"),
             quantity(h["contact_radius"], "m"),
-            f"{h['residual_normal']:.1e}",
-            f"{h['residual_force']:.1e}",
-            f"{h['seconds']:.2f}",
+            f"{max(_residuals(h).values(), default=math.nan):.1e}",
+            quantity(h["seconds"], "s", 3),
         )
         for k, h in ((k, histories[k]) for k in chosen)
     ]
 
 
-HISTORY_HEADERS = ("step", "label", "load", "approach", "p_max", "radius", "R_n", "R_P", "seconds")
+HISTORY_HEADERS = ("step", "label", "load", "approach", "p_max", "radius", "residual", "time")
 
 
 # --- against Hertz --------------------------------------------------------------------------------

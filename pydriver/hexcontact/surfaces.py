@@ -217,7 +217,8 @@ class Power(Surface):
     def _to_si(cls, value: object, info: ValidationInfo) -> float:
         if "exponent" not in info.data:  # itself wrong, and reported
             return 0.0
-        return Quantity(_coefficient_dimension(info.data["exponent"]), above=0).parse(value)
+        dimension = _coefficient_dimension(info.data["exponent"])
+        return Quantity(dimension, above=0, any_size=True).parse(value)
 
     def _height(self, x: Array, y: Array) -> Array:
         return self.coefficient * np.hypot(x, y) ** self.exponent

@@ -30,6 +30,9 @@ def refuse_key(key: str, value: object, sentence: str) -> NoReturn:
     raise ValidationError.from_exception_data("", [_details(Problem((key,), value, sentence))])
 
 
+# Products of a few such numbers neither overflow nor vanish, and no contact is outside.
+SMALLEST, LARGEST = 1e-30, 1e30
+
 # --- kinds of values ----------------------------------------------------------------------------------------
 
 
@@ -61,13 +64,17 @@ class Kind:
 
 @dataclass(frozen=True)
 class Quantity(Kind):
-    """A finite number with a dimension and bounds, in SI once read. `infinite` admits +inf as well."""
+    """A finite number with a dimension and bounds, in SI once read.
+
+    `infinite` admits +inf as well; `any_size` admits what no length, force or modulus could be.
+    """
 
     dimension: Dimension
     above: float | None = None
     at_least: float | None = None
     at_most: float | None = None
     infinite: bool = False
+    any_size: bool = False
 
     def _expected(self) -> str:
         limits = [
@@ -94,6 +101,10 @@ class Quantity(Kind):
         )
         if not inside:
             refuse(f"expected {self.expected}")
+        if not self.any_size and LARGEST < abs(number) < math.inf:
+            refuse(f"expected {self.expected}, not above {LARGEST:g} in SI")
+        if not self.any_size and self.above == 0 and number < SMALLEST:
+            refuse(f"expected {self.expected}, not below {SMALLEST:g} in SI")
         return number
 
 

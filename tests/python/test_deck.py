@@ -553,6 +553,7 @@ def test_a_history_of_too_many_steps_is_refused_before_it_is_unrolled() -> None:
         [{"normal_load": 0.0}],
         [{"normal_load": 0.0, "steps": 3}, {"normal_load": 0.0}],
         [{"approach": -1.0}],
+        [{"normal_load": 1e-300}],
         [{"shift_x": 1.0}],
     ],
 )

@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import xarray
 from numpy.testing import assert_array_equal
 
 from hexcontact.lattice import Lattice
-from hexcontact.result import VARIABLES, Metadata, Result, Step, assemble, window_of
+from hexcontact.result import Layout, Metadata, Result, Step, assemble, window_of
+from hexcontact.variables import VARIABLES
 
 SMALL = Lattice(spacing=1e-4, row_first=-2, col_first=-3, n_row=5, n_col=6, origin=(1e-5, 0.0))
 LARGE = Lattice(spacing=1e-4, row_first=-3, col_first=-5, n_row=8, n_col=9, origin=(1e-5, 0.0))
@@ -130,10 +132,10 @@ class TestResult:
         assert "pressure" in dir(self.result)
         with pytest.raises(AttributeError, match="stick_area is not in this result"):
             _ = self.result.stick_area
-        with pytest.raises(AttributeError, match="presure is no quantity"):
-            _ = self.result.presure
-        with pytest.raises(KeyError, match="presure"):
-            _ = self.result["presure"]
+        with pytest.raises(AttributeError, match="pressur is no quantity"):
+            _ = self.result.pressur
+        with pytest.raises(KeyError, match="pressur"):
+            _ = self.result["pressur"]
 
     def test_steps_count_from_one(self) -> None:
         assert len(self.result) == 2
@@ -163,3 +165,11 @@ class TestResult:
     def test_can_be_pickled(self) -> None:
         again = pickle.loads(pickle.dumps(self.result))
         assert again.dataset.identical(self.result.dataset)
+
+
+def test_the_reference_page_names_every_quantity() -> None:
+    page = (Path(__file__).parents[2] / "docs/netcdf.md").read_text()
+    for name, variable in VARIABLES.items():
+        assert f"| `{name}` | {variable.units or '–'} | {variable.long_name} |" in page
+    for attribute in Layout(Metadata(), [made_step(0)]).attributes(complete=True):
+        assert f"`{attribute}`" in page

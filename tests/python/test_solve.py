@@ -3,6 +3,7 @@
 import io
 import math
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -90,6 +91,15 @@ def test_a_contact_that_reaches_the_rim_gets_a_larger_window() -> None:
     p_max = float(large.max_pressure[0])
     inside = small.pressure.isel(step=0), large.pressure.isel(step=0).reindex(both, fill_value=0.0)
     assert_allclose(inside[0], inside[1], rtol=0, atol=1e-7 * p_max)
+
+
+@pytest.mark.parametrize(("row", "col"), [(-9, 0), (9, 0), (0, -9), (0, 9)])
+def test_a_window_beside_the_contact_grows_towards_it(row: int, col: int) -> None:
+    case = sphere(normal_load=10.0)
+    expected = float(case.run().max_pressure[0])
+    case.lattice = replace(case.lattice, row_first=row - 12, col_first=col - 12, n_row=25, n_col=25)
+    case.window_fixed = False
+    assert float(case.run().max_pressure[0]) == pytest.approx(expected, rel=1e-8)
 
 
 def test_steps_before_the_growth_are_padded() -> None:
@@ -270,6 +280,7 @@ def test_the_bar_moves_on_a_terminal(
 ) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
     shown = reporter()
     assert type(shown).__name__ == "Bar"
     sphere(loads=[{"normal_load": 10.0, "steps": 2}]).run(progress=shown)
@@ -346,3 +357,13 @@ def test_memory_that_is_there_is_not_refused() -> None:
         ResourceError, match=r"a window of 9 x 9 nodes needs 1e\+09 GB of memory and .* GB are available"
     ):
         check()
+
+
+def test_two_cases_run_in_two_threads() -> None:
+    alone = sphere().run()
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(lambda _: sphere().run(), range(4)))
+    for result in together:
+        assert_allclose(
+            result.pressure.values, alone.pressure.values, rtol=0, atol=1e-9 * float(alone.max_pressure[0])
+        )

@@ -22,11 +22,14 @@ import pytest
 import xarray
 from numpy.testing import assert_array_equal
 
+from hexcontact import lock as lock_module
 from hexcontact import store as store_module
 from hexcontact.errors import DeckError, ResourceError
 from hexcontact.lattice import Lattice
+from hexcontact.lock import Lock
+from hexcontact.netcdf import read_record
 from hexcontact.result import Metadata, Step, assemble
-from hexcontact.store import Journal, Lock, Store, journal_of, open_result, read_record
+from hexcontact.store import Journal, Store, journal_of, open_result
 
 WINDOW = Lattice(spacing=1e-4, row_first=-4, col_first=-5, n_row=9, n_col=10)
 
@@ -108,6 +111,45 @@ def test_xarray_opens_it_without_us(out: Path) -> None:
     assert done.stderr == ""
     total = sum(made_step(k).fields["pressure"].sum() for k in range(3))
     assert float(done.stdout) == pytest.approx(total, rel=1e-14)
+
+
+@pytest.mark.parametrize("deck", ["", "spacing = '3 µm'\n" * 20_000])
+def test_the_deck_is_kept_to_the_letter(out: Path, deck: str) -> None:
+    with Store(out, Metadata(title="Kugel auf Fläche", deck=deck, planned_steps=1)) as store:
+        store.append(made_step(0))
+        store.finish()
+    assert open_result(out).deck == deck
+    assert open_result(out).case_title == "Kugel auf Fläche"
+
+
+def test_there_are_no_strings_of_variable_length(out: Path) -> None:
+    """HDF5 up to 2.2 crashes on them when one process opens a file more than once."""
+    written(out, parameters={"note": "µ"})
+    with netCDF4.Dataset(out) as file:
+        assert file.data_model == "NETCDF4_CLASSIC"
+        assert file.note == "µ"
+        assert file["label"].dtype == "S1"
+
+
+def test_a_file_can_be_open_many_times(out: Path) -> None:
+    written(out, parameters={"note": "µ"})
+    program = f"""
+        import random, sys
+        sys.path[:0] = {sys.path!r}
+        from hexcontact.store import open_result
+        random.seed(1)
+        held = []
+        for turn in range(150):
+            held.append(open_result({str(out)!r}))
+            assert held[-1].label.values[0] == "pressé 0"
+            if len(held) > 6:
+                held.pop(random.randrange(7)).close()
+    """
+    environment = {**os.environ, "MALLOC_PERTURB_": "165"}  # makes use of freed memory show
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program)], env=environment, capture_output=True
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 def test_what_xarray_writes_can_be_opened(out: Path) -> None:
@@ -429,6 +471,26 @@ def test_two_runs_cannot_write_one_file(out: Path, other_run: subprocess.Popen[s
     assert list(out.parent.iterdir()) == []
 
 
+def test_an_output_that_came_while_we_waited_is_refused(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another run finishes, and takes its journal away, just before we get the lock."""
+    original = Lock.__init__
+    calls = 0
+
+    def late(self: Lock, path: Path, output: Path) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == 1:
+            out.write_text("of the other run")
+            path.parent.rmdir()
+        original(self, path, output)
+
+    monkeypatch.setattr(Lock, "__init__", late)
+    with pytest.raises(DeckError, match="exists already"):
+        Store(out, Metadata())
+    assert calls == 2
+    assert out.read_text() == "of the other run"
+
+
 def test_the_lock_of_a_dead_process_is_taken_over(out: Path, other_run: subprocess.Popen[str]) -> None:
     other_run.kill()
     other_run.wait()
@@ -465,7 +527,7 @@ def test_without_locks_in_the_file_system_the_process_number_decides(
     def unsupported(*_: object) -> None:
         raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(store_module.fcntl, "flock", unsupported)
+    monkeypatch.setattr(lock_module.fcntl, "flock", unsupported)
     path = tmp_path / "lock"
     lock = Lock(path, tmp_path / "out.nc")
     with pytest.raises(DeckError, match=f"process {os.getpid()}"):

@@ -1,0 +1,227 @@
+"""One result file: writing it step by step, reading it back, refusing what is damaged or foreign."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import sys
+import threading
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import DeckError, HexcontactError
+from .result import Layout, Metadata, Result, Step, window_of
+from .variables import FIELDS, SCHEMA_VERSION, VARIABLES
+
+if TYPE_CHECKING:
+    import netCDF4
+
+_CHUNK = 512  # nodes of a chunk along row and col
+_netcdf = threading.Lock()  # the netCDF library must not be entered by two threads
+
+
+@contextlib.contextmanager
+def _alone() -> Iterator[None]:
+    """Keep other threads out of the netCDF library, those that read through xarray too."""
+    backend = sys.modules.get("xarray.backends.netCDF4_")
+    with _netcdf, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
+        yield
+
+
+# --- writing --------------------------------------------------------------------------------------
+
+
+def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool, compress: bool = True) -> None:
+    """Write a netCDF file and flush it to disk.
+
+    Parameters
+    ----------
+    path : Path
+        File to write; replaced if it is there.
+    layout : Layout
+        Layout of all the steps.
+    steps : iterable of Step
+        The steps with their fields; gone through once, none is kept.
+    complete : bool
+        Whether these are all steps of the run.
+    compress : bool
+        Compress what has a value at every node.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    import netCDF4
+
+    try:
+        with _alone():
+            file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
+        try:
+            with _alone():
+                file.setncatts(layout.attributes(complete))
+                for name, size in layout.sizes.items():
+                    file.createDimension(name, size)
+                for name, values in layout.coordinates().items():
+                    _column(file, layout, name, compress)[...] = values
+                columns = {name: _column(file, layout, name, compress) for name in layout.variables}
+            gap_column = columns.pop("initial_gap", None)
+            gap: Any = None
+            for position, step in enumerate(steps):
+                with _alone():
+                    for name, column in columns.items():
+                        column[position] = _characters(column, layout.value(name, position, step))
+                if gap_column is not None:
+                    gap = layout.initial_gap(gap, step)
+            with _alone():
+                if gap_column is not None:
+                    gap_column[...] = gap
+        finally:
+            with _alone():
+                file.close()
+    except RuntimeError as error:  # the HDF5 library hides the reason, a full disk mostly
+        raise OSError(None, str(error), str(path)) from error
+    flush(path)
+
+
+def _column(file: netCDF4.Dataset, layout: Layout, name: str, compress: bool) -> netCDF4.Variable:
+    """Create the variable `name` with its attributes."""
+    variable = VARIABLES[name]
+    if variable.dtype == "str":
+        # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
+        longest = max(len(str(step.history.get(name, "")).encode()) for step in layout.steps)
+        file.createDimension(f"{name}_length", max(1, longest))
+        column = file.createVariable(name, "S1", (*variable.dims, f"{name}_length"))
+        column.setncatts({**variable.attributes, "_Encoding": "utf-8"})
+        column.set_auto_chartostring(False)
+        return column
+    options: dict[str, Any] = {}
+    if variable.dims[-2:] == ("row", "col"):
+        options["compression"] = "zlib" if compress else None
+        options["complevel"] = 1
+        options["fletcher32"] = True  # damage shows as an error, not as wrong numbers
+        options["chunksizes"] = [min(_CHUNK, len(file.dimensions[dim])) for dim in variable.dims]
+        if "step" in variable.dims:
+            options["chunksizes"][0] = 1
+        if variable.dtype == "f8":
+            options["fill_value"] = variable.missing
+    column = file.createVariable(name, variable.dtype, variable.dims, **options)
+    column.setncatts(variable.attributes)
+    if variable.dims[-2:] == ("row", "col") and name not in ("x", "y"):
+        column.coordinates = "x y"
+    return column
+
+
+def _characters(column: netCDF4.Variable, value: Any) -> Any:
+    """Turn text into the characters of `column`; everything else stays as it is."""
+    if not isinstance(value, str):
+        return value
+    return np.frombuffer(value.encode().ljust(column.shape[-1], b"\0"), "S1")
+
+
+def flush(path: Path) -> None:
+    """See to it that a file, or the names in a folder, are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if not (path.is_dir() and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # not every system can
+            raise
+    finally:
+        os.close(descriptor)
+
+
+# --- reading --------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
+    try:
+        yield
+    except (HexcontactError, FileNotFoundError):
+        raise
+    except PermissionError as error:
+        raise DeckError(f"{path} cannot be read: {error.strerror}") from error
+    except Exception as error:  # damage takes any form: every library below has its own exceptions
+        raise DeckError(
+            f"{path} is damaged or not a netCDF file ({str(error).strip() or type(error).__name__})"
+        ) from error
+
+
+def _check_ours(attributes: dict[str, Any], path: Path) -> None:
+    version = attributes.get("schema_version")
+    if version is None or "hexcontact_version" not in attributes:
+        raise DeckError(f"{path} was not written by hexcontact: its attributes name no schema_version")
+    if int(version) != SCHEMA_VERSION:
+        raise DeckError(
+            f"{path} has the file layout {int(version)} of hexcontact {attributes['hexcontact_version']}; "
+            f"this version reads layout {SCHEMA_VERSION}"
+        )
+
+
+def _attributes(file: netCDF4.Dataset) -> dict[str, Any]:
+    return {name: file.getncattr(name) for name in file.ncattrs()}
+
+
+def read_record(path: Path) -> tuple[Metadata, Step]:
+    """Read one record of a journal.
+
+    Raises
+    ------
+    DeckError
+        If the file is damaged or of another kind.
+    FileNotFoundError
+        If it is not there.
+    """
+    import netCDF4
+
+    with _reading(path), _alone(), netCDF4.Dataset(path) as file:
+        file.set_auto_mask(False)
+        attributes = _attributes(file)
+        _check_ours(attributes, path)
+        fields, history = {}, {}
+        for name in VARIABLES.keys() & file.variables.keys():
+            if name in FIELDS:
+                fields[name] = file[name][0]
+            elif VARIABLES[name].dims == ("step",):
+                value = file[name][0]
+                history[name] = str(value) if VARIABLES[name].dtype == "str" else value
+        if "initial_gap" in file.variables:
+            fields["initial_gap"] = file["initial_gap"][...]
+        window = window_of(attributes, file["row"][...], file["col"][...])
+        index = int(history.pop("step")) - 1
+    return Metadata.from_attributes(attributes), Step(index, window, fields, history)
+
+
+def read_output(path: Path) -> Result:
+    """Open an output file; its fields are read when they are asked for.
+
+    Raises
+    ------
+    DeckError
+        If the file is damaged, of another kind or of another version.
+    FileNotFoundError
+        If it is not there.
+    """
+    import netCDF4
+
+    with _reading(path), _alone(), netCDF4.Dataset(path) as file:
+        attributes = _attributes(file)
+        _check_ours(attributes, path)
+        for name in ("step", "row", "col", "x", "y"):
+            if file[name].dimensions != VARIABLES[name].dims or 0 in file[name].shape:
+                raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
+    with _reading(path):
+        import xarray
+
+        result = Result(xarray.open_dataset(path, engine="netcdf4"), str(path))
+        for variable in result.dataset.variables.values():
+            if variable.ndim < 2:
+                variable.load()
+        _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)
+        return result

@@ -219,6 +219,8 @@ contains
       return
     end if
 
+    ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
+    if (control /= load_control) candidate = candidate .and. h < target
     p = reshape(start, [n])
     active = candidate .and. p > 0.0_wp
     if (.not. any(active)) active = candidate
@@ -299,7 +301,7 @@ contains
     if (control == load_control) then
       factor = target/(level%lattice%cell_area()*sum(p))
     else
-      factor = max(dot(p, target - h, level%n_threads), 0.0_wp)/dot(p, w, level%n_threads)
+      factor = dot(p, target - h, level%n_threads)/dot(p, w, level%n_threads)
     end if
     p = factor*p
     w = factor*w

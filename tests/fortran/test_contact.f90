@@ -34,6 +34,7 @@ contains
       new_test('projected_cg', test_projected_cg), &
       new_test('residuals', test_residuals), &
       new_test('hertz', test_hertz), &
+      new_test('any_approach', test_any_approach), &
       new_test('flat_punch', test_flat_punch), &
       new_test('methods_agree', test_methods_agree), &
       new_test('any_start', test_any_start), &
@@ -170,6 +171,32 @@ contains
     if (allocated(error)) return
     call check(error, reshape(again%pressure, [3721]), reshape(state%pressure, [3721]), 1.0e-8_wp, 'same pressure')
   end subroutine test_hertz
+
+  !> Approaches from first touch to contact everywhere, on windows much wider than the contact, too.
+  subroutine test_any_approach(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(normal_contact_t) :: contact
+    type(contact_state_t) :: state
+    real(wp) :: gap(41, 41), load
+    logical :: candidate(41, 41)
+    integer :: i
+
+    call paraboloid(20, lattice, gap, candidate, error)
+    if (allocated(error)) return
+    call new_normal_contact(contact, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error)
+    if (allocated(error)) return
+    load = 0.0_wp
+    do i = 1, 200
+      call contact%solve(approach_control, 0.01_wp*i, 1.0e-8_wp, 50, state, error)
+      if (allocated(error)) return
+      call check_true(error, state%converged .and. state%normal_load > load, 'converged, and the load rises')
+      if (allocated(error)) return
+      call check_true(error, state%operator_applications < 30.0_wp, 'no work wasted')
+      if (allocated(error)) return
+      load = state%normal_load
+    end do
+  end subroutine test_any_approach
 
   !> Rigid flat punch: P = 2 E* a approach, with the radius of the area of its nodes.
   subroutine test_flat_punch(error)

@@ -102,11 +102,11 @@ debug-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## a
 # --- development -------------------------------------------------------------
 
 lint: install $(STAMPS)/extra-lint $(STAMPS)/extra-test  ## check style, types and spelling
-	ruff check
-	ruff format --check
-	mypy
-	fortitude check --quiet
-	codespell
+	@code=0; \
+	for check in 'ruff check' 'ruff format --check' mypy 'fortitude check fortran tests docs' codespell; do \
+	  echo "$$check"; $$check || code=1; \
+	done; \
+	exit $$code
 
 format: $(STAMPS)/system $(STAMPS)/extra-lint  ## let ruff mend what it can
 	ruff check --fix

@@ -22,7 +22,7 @@ module hc_convolution
   public :: convolution_t, new_convolution, convolution_memory, kernel_source_t
 
   !> Bytes that one component of a column block should take, so that blocks stay in cache.
-  integer, parameter :: block_bytes = 131072
+  integer, parameter :: block_bytes = 32768
   !> Smaller windows are left to one thread: starting the others takes longer than they save.
   integer, parameter :: worth_sharing = 16384
   !> Number of frequencies that are multiplied at a time.
@@ -360,7 +360,8 @@ contains
     end do
   end subroutine scale
 
-  !> Any kernels. Real and imaginary parts are taken apart: real arithmetic fills the vector registers.
+  !> Up to three fields and any kernels. Real and imaginary parts are taken apart: real arithmetic
+  !> fills the vector registers.
   subroutine multiply(self, b, kernel, buffer)
     class(convolution_t), intent(in) :: self
     !> Index of the block
@@ -370,56 +371,61 @@ contains
     !> Transformed fields, replaced by the results
     complex(wp), intent(inout), contiguous :: buffer(:, :)
 
-    real(wp) :: field(chunk, 2, size(kernel, 2)), total(chunk, 2)
-    integer :: i, o, start, last, m, k
+    integer, parameter :: plain = 1, rotated = 2
+    !> Fields (frequency, real and imaginary part, as they are or times i, from)
+    real(wp) :: field(chunk, 2, 2, 3), total(chunk, 2), sign(3)
+    integer :: i, o, start, last, m, k(3), turn(3)
 
+    field = 0.0_wp
     do start = 1, size(buffer, 1), chunk
       last = min(start + chunk - 1, size(buffer, 1))
       m = last - start + 1
       do i = 1, size(kernel, 2)
-        field(:m, 1, i) = real(buffer(start:last, i), wp)
-        field(:m, 2, i) = aimag(buffer(start:last, i))
+        field(:m, 1, plain, i) = real(buffer(start:last, i), wp)
+        field(:m, 2, plain, i) = aimag(buffer(start:last, i))
+        field(:m, 1, rotated, i) = -field(:m, 2, plain, i)
+        field(:m, 2, rotated, i) = field(:m, 1, plain, i)
       end do
       do o = 1, size(kernel, 1)
-        total = 0.0_wp
+        k = abs(kernel(o, 1))                         ! fields that are absent count with weight zero
+        sign = 0.0_wp
+        turn = plain
         do i = 1, size(kernel, 2)
-          k = abs(kernel(o, i))
-          call add_product(m, self%spectrum(start:last, b, k), merge(-1.0_wp, 1.0_wp, kernel(o, i) < 0), &
-                           k >= self%first_odd, field(:, :, i), total)
+          k(i) = abs(kernel(o, i))
+          sign(i) = merge(1.0_wp, -1.0_wp, kernel(o, i) > 0)
+          if (k(i) >= self%first_odd) turn(i) = rotated
         end do
+        call add_up(m, sign, self%spectrum(start:last, b, k(1)), self%spectrum(start:last, b, k(2)), &
+                    self%spectrum(start:last, b, k(3)), field(:, :, turn(1), 1), field(:, :, turn(2), 2), &
+                    field(:, :, turn(3), 3), total)
         buffer(start:last, o) = cmplx(total(:m, 1), total(:m, 2), wp)
       end do
     end do
   end subroutine multiply
 
-  !> total = total + sign * spectrum * field
-  pure subroutine add_product(n, spectrum, sign, odd, field, total)
+  !> total = sum over three fields of sign * spectrum * field
+  pure subroutine add_up(n, sign, spectrum_1, spectrum_2, spectrum_3, field_1, field_2, field_3, total)
     !> Number of frequencies
     integer, intent(in) :: n
-    !> Spectrum of the kernel, over i if it is odd
-    real(wp), intent(in) :: spectrum(n)
-    !> Sign of the kernel
-    real(wp), intent(in) :: sign
-    !> The kernel is odd
-    logical, intent(in) :: odd
-    !> Transformed field (frequency, real and imaginary part)
-    real(wp), intent(in) :: field(chunk, 2)
+    !> Signs of the kernels
+    real(wp), intent(in) :: sign(3)
+    !> Spectra of the kernels
+    real(wp), intent(in) :: spectrum_1(n), spectrum_2(n), spectrum_3(n)
+    !> Transformed fields (frequency, real and imaginary part)
+    real(wp), intent(in) :: field_1(chunk, 2), field_2(chunk, 2), field_3(chunk, 2)
     !> Transformed result (frequency, real and imaginary part)
-    real(wp), intent(inout) :: total(chunk, 2)
+    real(wp), intent(out) :: total(chunk, 2)
+    real(wp) :: s_1, s_2, s_3
     integer :: f
 
-    if (odd) then
-      do f = 1, n
-        total(f, 1) = total(f, 1) - sign*spectrum(f)*field(f, 2)
-        total(f, 2) = total(f, 2) + sign*spectrum(f)*field(f, 1)
-      end do
-    else
-      do f = 1, n
-        total(f, 1) = total(f, 1) + sign*spectrum(f)*field(f, 1)
-        total(f, 2) = total(f, 2) + sign*spectrum(f)*field(f, 2)
-      end do
-    end if
-  end subroutine add_product
+    do f = 1, n
+      s_1 = sign(1)*spectrum_1(f)
+      s_2 = sign(2)*spectrum_2(f)
+      s_3 = sign(3)*spectrum_3(f)
+      total(f, 1) = s_1*field_1(f, 1) + s_2*field_2(f, 1) + s_3*field_3(f, 1)
+      total(f, 2) = s_1*field_1(f, 2) + s_2*field_2(f, 2) + s_3*field_3(f, 2)
+    end do
+  end subroutine add_up
 
   !> Run the transforms of one scalar product and nothing else, to compare times with.
   subroutine time_transforms(self)

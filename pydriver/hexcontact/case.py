@@ -70,7 +70,7 @@ class SolverSettings:
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """What is kept of a run; see [output] in the deck reference. No fields: all there are."""
+    """What is kept of a run; see [output] in the deck reference. No fields: pressure, gap and zone."""
 
     file: Path | None = None
     fields: tuple[str, ...] = ()
@@ -196,6 +196,9 @@ class Case:
         array = None if gap is None or callable(gap) else np.array(gap, dtype=float)
         if lattice is not None:
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
+            if gap is None:  # so that the deck of the case finds the same window again
+                middle = [lattice.cols[lattice.n_col // 2], lattice.rows[lattice.n_row // 2]]
+                center = (origin + middle @ lattice.basis).tolist()
         elif array is not None and window is None and array.ndim == 2:
             window = array.shape
         if loads is None:

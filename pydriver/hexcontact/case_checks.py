@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from .deck import FIELDS, Deck
+from .deck import Deck
 from .errors import DeckError
 from .messages import MISSING, Problem
 from .surfaces import Separation, principal_curvatures
+from .variables import FIELDS
 
 FRICTIONLESS_FIELDS = (
     "pressure",

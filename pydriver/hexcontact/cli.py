@@ -21,6 +21,8 @@ from . import __version__
 from .errors import DeckError, HexcontactError, ResourceError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from .case import Case
     from .result import Result
     from .store import Store
@@ -194,9 +196,10 @@ def run(
     case = _case(deck, settings)
     target = output or case.output.file or Path(f"{deck.stem}.nc")
     shown, histories = reporter(quiet), []
-    previous = signal.signal(signal.SIGTERM, _on_sigterm)
     with Store(target, solve.metadata_of(case), overwrite) as store:
+        previous = signal.getsignal(signal.SIGTERM)
         try:
+            signal.signal(signal.SIGTERM, _on_sigterm)
             with shown.watching(case.title or deck.stem, len(case.load_steps)):
                 _in_background(
                     lambda: solve.record(case, store, shown, lambda step: histories.append(step.history))
@@ -332,9 +335,7 @@ def plot(
         expected = "expected no FILE" if file else "expected the FILE of a result"
         raise DeckError(f"--what {what}: {expected}")
     if file is None:
-        picture = output or Path(f"{what}.png")
-        general[what]().savefig(picture, dpi=200)
-        print(f"written: {picture}")
+        print(f"written: {_save(general[what], what, output or Path(f'{what}.png'))}")
         return
     result, first = _open(file), output or file.with_suffix(".png")
     for name in FIGURES if what == "all" else [what]:
@@ -347,11 +348,16 @@ def _draw(result: Result, what: str, step: int, picture: Path) -> Path:
     """Draw one picture of a result into a file."""
     from .plotting import FIGURES
 
+    of_step = () if what == "history" else (step,)
+    return _save(lambda: FIGURES[what](result, *of_step), f"{what} of {result.path}", picture)
+
+
+def _save(draw: Callable[[], Figure], what: str, picture: Path) -> Path:
+    """Write a picture."""
     try:
-        figure = FIGURES[what](result) if what == "history" else FIGURES[what](result, step)
-        figure.savefig(picture, dpi=200)
+        draw().savefig(picture, dpi=200)
     except (IndexError, ValueError) as error:  # no such step, nothing in contact, no such kind of file
-        raise DeckError(f"cannot draw {what} of {result.path}: {error}") from error
+        raise DeckError(f"cannot draw {what}: {error}") from error
     return picture
 
 

@@ -22,28 +22,10 @@ from .messages import Source, deck_error
 from .surfaces import Flat, Point, Surface, SurfaceKind
 from .units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE
 from .validation import Flag, Quantity, Several, Table, Text, Whole, Word, WordOr, problems_of, refuse
+from .variables import FIELDS
 
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
-FIELDS = (
-    "pressure",
-    "traction_x",
-    "traction_y",
-    "gap",
-    "zone",
-    "relative_displacement_x",
-    "relative_displacement_y",
-    "slip_increment_x",
-    "slip_increment_y",
-    "accumulated_slip",
-    "displacement_1_x",
-    "displacement_1_y",
-    "displacement_1_z",
-    "displacement_2_x",
-    "displacement_2_y",
-    "displacement_2_z",
-)
-"""Fields by step that a result can hold."""
 
 LOADS = {
     "z": ("normal_load", "approach"),

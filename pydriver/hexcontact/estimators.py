@@ -144,8 +144,7 @@ def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
     center = points.mean(axis=1)
     variance, axes = np.linalg.eigh(np.cov(points, bias=True))
     minor, major = 2.0 * np.sqrt(np.maximum(variance, 0.0))
-    angle = np.pi / 2 - (np.pi / 2 - np.arctan2(axes[1, 1], axes[0, 1])) % np.pi
-    return Ellipse(float(major), float(minor), float(angle), (float(center[0]), float(center[1])))
+    return Ellipse(float(major), float(minor), _angle(axes[:, 1]), (float(center[0]), float(center[1])))
 
 
 def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse:
@@ -194,5 +193,10 @@ def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse
     if not (top > 0.0 and curvature[0] > 0.0):
         raise ValueError("the pressure does not vanish on an ellipse")
     major, minor = 1.0 / np.sqrt(curvature)
-    angle = np.pi / 2 - (np.pi / 2 - np.arctan2(axes[1, 0], axes[0, 0])) % np.pi
-    return Ellipse(float(major), float(minor), float(angle), (float(x0 + middle[0]), float(y0 + middle[1])))
+    center = float(x0 + middle[0]), float(y0 + middle[1])
+    return Ellipse(float(major), float(minor), _angle(axes[:, 0]), center)
+
+
+def _angle(axis: Array) -> float:
+    """Direction of an axis (rad) from x; it has no sense, so it is in (-pi/2, pi/2]."""
+    return float(np.pi / 2 - (np.pi / 2 - np.arctan2(axis[1], axis[0])) % np.pi)

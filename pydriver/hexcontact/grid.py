@@ -127,17 +127,7 @@ def grown(lattice: Lattice, sides: tuple[bool, bool, bool, bool] = (True, True, 
     """Return a larger window with the same nodes: a quarter more (four at least) on each given side."""
     rows = max(4, math.ceil(GROWTH * lattice.n_row))
     cols = max(4, math.ceil(GROWTH * lattice.n_col))
-    below, above, left, right = (
-        n * int(side) for n, side in zip((rows, rows, cols, cols), sides, strict=True)
-    )
-    return Lattice(
-        lattice.spacing,
-        lattice.row_first - below,
-        lattice.col_first - left,
-        lattice.n_row + below + above,
-        lattice.n_col + left + right,
-        origin=lattice.origin,
-    )
+    return lattice.grown(*(n * side for n, side in zip((rows, rows, cols, cols), sides, strict=True)))
 
 
 # --- the estimate -------------------------------------------------------------------------------------------

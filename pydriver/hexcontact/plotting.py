@@ -23,6 +23,7 @@ from .step_view import StepView, dataset_of, scaled, worded
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
 
     from .result import Result
 
@@ -68,7 +69,9 @@ def _triangles(view: StepView) -> tuple[Triangulation, Array] | None:
     return triangulation, p.ravel()[used]
 
 
-def _draw_field(figure: Figure, axes: Axes, view: StepView) -> None:
+def _draw_field(figure: FigureBase, view: StepView) -> None:
+    """Draw the pressure over the plane, and the outline of a Hertz solution."""
+    axes = figure.add_subplot()
     to_length, length = scaled(max(np.abs(view.window()[:2]).max(), view.spacing), "m")
     to_stress, stress = scaled(float(view.pressure.max()), "Pa")
     drawn = _triangles(view)
@@ -83,14 +86,14 @@ def _draw_field(figure: Figure, axes: Axes, view: StepView) -> None:
     if view.hertz is not None:
         _outline(axes, view.hertz, view.center, to_length, label="Hertz contact area")
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)
-    x_min, x_max, y_min, y_max = (to_length * limit for limit in view.window())
-    axes.set(
-        xlim=(x_min, x_max),
-        ylim=(y_min, y_max),
-        xlabel=f"x ({length})",
-        ylabel=f"y ({length})",
-        aspect="equal",
-    )
+    _set_plane(axes, view.window(), to_length, length)
+
+
+def _set_plane(axes: Axes, limits: tuple[float, float, float, float], factor: float, unit: str) -> None:
+    """Show the part of the plane between x_min, x_max, y_min, y_max (m)."""
+    x_min, x_max, y_min, y_max = (factor * limit for limit in limits)
+    axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal")
+    axes.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})")
 
 
 def _outline(axes: Axes, ellipse: Any, center: tuple[float, float], factor: float, **style: Any) -> Line2D:
@@ -103,7 +106,12 @@ def _outline(axes: Axes, ellipse: Any, center: tuple[float, float], factor: floa
     return line
 
 
-def _draw_section(axes: Axes, below: Axes | None, view: StepView, angle: float) -> None:
+def _draw_section(figure: FigureBase, view: StepView, angle: float) -> None:
+    """Draw the pressure along a line, and the error below it where there is a Hertz solution."""
+    if view.hertz is None:
+        axes = bottom = figure.add_subplot()
+    else:
+        axes, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     to_length, length = scaled(max(np.abs(view.window()[:2]).max(), view.spacing), "m")
     to_stress, stress = scaled(float(view.pressure.max()), "Pa")
     at = int(np.argmin(np.hypot(view.x - view.center[0], view.y - view.center[1])))
@@ -116,6 +124,8 @@ def _draw_section(axes: Axes, below: Axes | None, view: StepView, angle: float) 
     if inside.size:
         first, last = max(inside[0] - 3, 0), min(inside[-1] + 4, p.size)
         s, p = s[first:last], p[first:last]
+    start = x0 if angle == 0.0 else 0.0  # along x the place on the line is x itself
+    place = (start + s) * to_length
     few = s.size < 100  # nodes one can tell apart
     look: dict[str, Any] = {
         "marker": "o",
@@ -125,29 +135,23 @@ def _draw_section(axes: Axes, below: Axes | None, view: StepView, angle: float) 
         "ls": "",
     }
     look = look if few else {"ls": "-"}
-    axes.plot(s * to_length, p * to_stress, color=COMPUTED, label="computed", zorder=3 if few else 1, **look)
-    bottom = axes
+    axes.plot(place, p * to_stress, color=COMPUTED, label="computed", zorder=3 if few else 1, **look)
     if view.hertz is not None:
         fine = np.linspace(s[0], s[-1], 1001)
         exact = view.hertz.pressure(*_points(view, x0, y0, fine, angle))
-        axes.plot(
-            fine * to_length, exact * to_stress, "-" if few else "--", color=EXACT, label="Hertz", zorder=2
-        )
-        if below is not None:
-            at_nodes = view.hertz.pressure(*_points(view, x0, y0, s, angle))
-            below.axhline(0.0, color=GUIDE, lw=0.7)
-            error = 100 * (p - at_nodes) / view.hertz.max_pressure
-            below.plot(s * to_length, error, "o-" if few else "-", ms=2.5, lw=0.7, color=COMPUTED)
-            below.set_ylabel("error (% of $p_0$)")
-            axes.tick_params(labelbottom=False)
-            bottom = below
-    axes.set(
-        ylabel=f"pressure p ({stress})",
-        xlim=((s[0] - 0.5 * view.spacing) * to_length, (s[-1] + 0.5 * view.spacing) * to_length),
-    )
+        line = "-" if few else "--"
+        axes.plot((start + fine) * to_length, exact * to_stress, line, color=EXACT, label="Hertz", zorder=2)
+        at_nodes = view.hertz.pressure(*_points(view, x0, y0, s, angle))
+        error = 100 * (p - at_nodes) / view.hertz.max_pressure
+        bottom.axhline(0.0, color=GUIDE, lw=0.7)
+        bottom.plot(place, error, "o-" if few else "-", ms=2.5, lw=0.7, color=COMPUTED)
+        bottom.set_ylabel("error (% of $p_0$)")
+        axes.tick_params(labelbottom=False)
+    rim = 0.5 * view.spacing * to_length
+    axes.set(ylabel=f"pressure p ({stress})", xlim=(place[0] - rim, place[-1] + rim))
     axes.set_ylim(0.0, 1.08 * to_stress * max(float(p.max()), np.finfo(float).tiny))
     axes.legend(loc="lower center")
-    direction = "x" if angle == 0.0 else f"distance along {np.degrees(angle):g}°"
+    direction = "x" if angle == 0.0 else f"distance from the center along {np.degrees(angle):g}°"
     bottom.set_xlabel(f"{direction} ({length})")
 
 
@@ -185,7 +189,7 @@ def pressure_field(result: Result | xarray.Dataset, step: int = -1) -> Figure:
     with matplotlib.rc_context(STYLE):
         view = StepView.of(result, step)
         figure = _figure(4.6, 4.0)
-        _draw_field(figure, figure.add_subplot(), view)
+        _draw_field(figure, view)
         figure.suptitle(view.title)
         return figure
 
@@ -216,11 +220,7 @@ def section(result: Result | xarray.Dataset, step: int = -1, angle: float = 0.0)
     with matplotlib.rc_context(STYLE):
         view = StepView.of(result, step)
         figure = _figure(4.6, 4.2)
-        if view.hertz is None:
-            _draw_section(figure.add_subplot(), None, view, angle)
-        else:
-            upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-            _draw_section(upper, lower, view, angle)
+        _draw_section(figure, view, angle)
         figure.suptitle(view.title)
         return figure
 
@@ -279,8 +279,7 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
             a, b = view.hertz.semi_major, view.hertz.semi_minor
             exact = f"a = {worded(a, 'm')}" if b > 0.999 * a else f"{worded(a, 'm')} by {worded(b, 'm')}"
             _outline(axes, view.hertz, view.center, to_length, label=f"Hertz, {exact}")
-        axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal")
-        axes.set(xlabel=f"x ({length})", ylabel=f"y ({length})")
+        _set_plane(axes, limits, to_length, length)
         legend = figure.legend(loc="outside lower center", ncols=2, handlelength=1.6)
         for handle in legend.legend_handles[:2]:
             cast(Line2D, handle).set_markersize(4.0)
@@ -392,12 +391,8 @@ def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
         view = StepView.of(result, step)
         figure = _figure(8.6, 3.7)
         left, right = cast(Any, figure.subfigures(1, 2, width_ratios=(1.15, 1)))
-        _draw_field(left, left.add_subplot(), view)
-        if view.hertz is None:
-            _draw_section(right.add_subplot(), None, view, 0.0)
-        else:
-            upper, lower = right.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-            _draw_section(upper, lower, view, 0.0)
+        _draw_field(left, view)
+        _draw_section(right, view, 0.0)
         figure.suptitle(view.title)
         return figure
 

@@ -320,17 +320,17 @@ class Result:
         """Return a quantity."""
         if name.startswith("_") or name in ("dataset", "path"):
             raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0]) from None
+
+    def __getitem__(self, name: str) -> xarray.DataArray:
+        """Return a quantity, ``step`` too, which is a method as an attribute."""
         if name in self.dataset.variables:
             return self.dataset[name]
         what = "not in this result" if name in VARIABLES else "no quantity of a result"
-        raise AttributeError(f"{name} is {what}; there are {', '.join(map(str, self.dataset.variables))}")
-
-    def __getitem__(self, name: str) -> xarray.DataArray:
-        """Return a quantity."""
-        try:
-            return getattr(self, name)
-        except AttributeError as error:
-            raise KeyError(str(error)) from None
+        raise KeyError(f"{name} is {what}; there are {', '.join(map(str, self.dataset.variables))}")
 
     def __dir__(self) -> list[str]:
         """Name the quantities too."""

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from .result import Result
+
 if TYPE_CHECKING:
     import xarray
 
     from .analytic import EllipticContact
-    from .result import Result
 
 Array = NDArray[np.float64]
 
@@ -87,10 +88,9 @@ class StepView:
             If the pressure of that step was not kept.
         """
         dataset = dataset_of(result)
-        numbers = list(dataset["step"].values)
-        if step not in numbers and not -len(numbers) <= step < 0:
-            raise IndexError(f"there is no step {step}; the result has steps {numbers[0]} to {numbers[-1]}")
-        one = dataset.isel(step=step) if step < 0 else dataset.sel(step=step)
+        one = Result(dataset).step(step)
+        if "pressure" not in one:
+            raise ValueError("the pressure was not kept (output.fields)")
         pressure = one["pressure"].values
         if not np.isfinite(pressure).any():
             raise ValueError(f"the pressure of step {int(one['step'])} was not kept (output.every)")
@@ -101,12 +101,12 @@ class StepView:
             center = (float((pressure * x).sum() / weight), float((pressure * y).sum() / weight))
         else:
             center = known[1]
-        title = str(dataset.attrs.get("title", ""))
-        if len(numbers) > 1:
-            title += f", step {int(one['step'])}"
-        title += f" (P = {worded(float(one['normal_load']), 'N')})"
+        named = [str(dataset.attrs.get("title", ""))]
+        if dataset.sizes["step"] > 1:
+            named.append(f"step {int(one['step'])}")
+        title = ", ".join(filter(None, named)) + f" (P = {worded(float(one['normal_load']), 'N')})"
         return cls(
-            title=title,
+            title=title.lstrip(),
             x=x,
             y=y,
             pressure=pressure,

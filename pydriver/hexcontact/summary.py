@@ -70,7 +70,7 @@ def case_rows(case: Case) -> list[Row]:
     from .solve import memory_needed
 
     lattice = case.lattice
-    span = [max(axis.max() - axis.min(), 0.0) for axis in (lattice.x, lattice.y)]
+    span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)  # the window may be too large to fill
     pressed = [step.z.value for step in case.load_steps if step.z.control == "force"]
     return [
         *((f"body {number}", _body(body)) for number, body in ((1, case.body_1), (2, case.body_2))),

@@ -316,11 +316,6 @@ class Separation:
         """Return the gap (m) at points of the plane: >= 0 up to rounding, inf where nothing can touch."""
         return self._sum(x, y) - self.first_touch[2]
 
-    @property
-    def reach(self) -> float:
-        """Radius (m) of the part of the plane in which the surfaces can touch; may be infinite."""
-        return min(self.surface_1.reach, self.surface_2.reach)
-
     @cached_property
     def first_touch(self) -> tuple[float, float, float]:
         """Point x, y (m) at which the bodies touch first, and the sum of their heights there (m).

@@ -287,6 +287,13 @@ def bowl(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.hypot(x, y) < 5e-5, np.inf, (x**2 + y**2) / 0.02)
 
 
+def test_the_deck_of_a_case_finds_a_given_window_again() -> None:
+    lattice = Lattice(3e-5, row_first=-11, col_first=-14, n_row=25, n_col=24, origin=(1e-6, 3e-6))
+    case = sphere_on_flat(lattice=lattice)
+    assert case.lattice == lattice
+    assert Case.from_text(case.deck_text).lattice == lattice
+
+
 def test_a_gap_may_be_a_function_or_an_array() -> None:
     by_function = sphere_on_flat(body_1=STEEL, gap=bowl, nodes_across=31)
     assert not by_function.window_fixed

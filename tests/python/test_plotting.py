@@ -204,8 +204,9 @@ def test_a_huge_field_is_thinned_out() -> None:
     assert view.contact.sum() > plotting._DRAWN_NODES > drawn[1].size / 1.3
 
 
-def test_section_shows_the_nodes_of_a_row_and_hertz() -> None:
-    result = sphere()
+@pytest.mark.parametrize("center", [0.0, 0.3])
+def test_section_shows_the_nodes_of_a_row_and_hertz(center: float) -> None:
+    result = sphere((center, 0.0))
     figure = plotting.section(result, 2)
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     x, p = lines["computed"].get_data()
@@ -218,7 +219,7 @@ def test_section_shows_the_nodes_of_a_row_and_hertz() -> None:
         assert value == pytest.approx(expected[np.round(at, 9)], abs=1e-9)
     x, p = (np.asarray(values) for values in lines["Hertz"].get_data())
     solution = analytic.hertz_sphere(2.0, 1.5, normal_load=0.8)
-    np.testing.assert_allclose(p * to_stress, solution.pressure(x * to_length), atol=1e-5)
+    np.testing.assert_allclose(p * to_stress, solution.pressure(x * to_length - center), atol=1e-5)
 
 
 def test_section_at_an_angle_follows_the_ellipse() -> None:
@@ -266,6 +267,8 @@ def test_what_cannot_be_drawn_is_said() -> None:
     with pytest.raises(ValueError, match="no node is in contact"):
         plotting.contact_boundary(result, 2)
     assert isinstance(plotting.overview(result, 2), Figure)  # an empty field is still a picture
+    with pytest.raises(ValueError, match="the pressure was not kept"):
+        plotting.overview(result.drop_vars("pressure"))
 
 
 def test_no_window_system_is_touched() -> None:

@@ -129,6 +129,7 @@ class TestResult:
     def test_quantities_by_name(self) -> None:
         assert isinstance(self.result.pressure, xarray.DataArray)
         assert self.result["approach"].values.tolist() == [1e-6, 1e-6]
+        assert self.result["step"].values.tolist() == [1, 2]  # as an attribute it is a method
         assert "pressure" in dir(self.result)
         with pytest.raises(AttributeError, match="stick_area is not in this result"):
             _ = self.result.stick_area

@@ -86,7 +86,7 @@ class Case:
     Parameters
     ----------
     body_1, body_2 : Body or mapping
-        The bodies; a mapping has the keys of [body.1].
+        The bodies; a mapping has the keys of [body.1] (an angle carries its unit here, too: "30 deg").
     gap : callable or array_like, optional
         Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m), or an array
         (n_row, n_col) over the nodes of the window. Infinite where nothing can touch. The approach is
@@ -394,6 +394,9 @@ class Case:
         gap = np.asarray(self._given_gap(x, y), dtype=float)
         if gap.shape != np.shape(x):
             raise DeckError(f"gap: expected an array of the shape of x, {np.shape(x)}, not {gap.shape}")
+        if (bad := np.isnan(gap)).any():
+            where = f"x = {x[bad][0]:.4g} m, y = {y[bad][0]:.4g} m"
+            raise DeckError(f"gap: expected numbers, or inf where nothing can touch; it is NaN at {where}")
         return gap
 
     def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:

@@ -156,6 +156,9 @@ Settings = Annotated[
 ]
 
 
+_PICTURES = (".png", ".pdf", ".svg")
+
+
 def _case(deck: Path, settings: list[str] | None) -> Case:
     from .case import Case
 
@@ -195,6 +198,8 @@ def run(
 
     case = _case(deck, settings)
     target = output or case.output.file or Path(f"{deck.stem}.nc")
+    if target.suffix in _PICTURES:
+        raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
     shown, histories = reporter(quiet), []
     with Store(target, solve.metadata_of(case), overwrite) as store:
         previous = signal.getsignal(signal.SIGTERM)
@@ -231,11 +236,12 @@ def _summarize(case: Case, histories: list[Any], target: Path, picture: Path | N
 @_guarded
 def check(deck: DeckFile, settings: Settings = None) -> None:
     """Read a deck, report everything that is wrong with it, and say what would be run."""
-    from . import summary
+    from . import solve, summary
 
     case = _case(deck, settings)
     console = summary.console()
     console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
+    solve.require_memory(case, case.lattice)
     console.print(f"{deck} is ready to run", soft_wrap=True)
 
 

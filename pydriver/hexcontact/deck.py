@@ -243,7 +243,7 @@ class Output(Table):
     file: Annotated[str, Text()] | None = Field(None, description="netCDF file of the result")
     fields: (
         Annotated[tuple[str, ...], Several(Word(FIELDS), "field names", '["pressure", "gap", "zone"]')] | None
-    ) = Field(None, description="fields to keep; all that the algorithm yields if absent")
+    ) = Field(None, description="fields to keep; pressure, gap and zone if absent")
     every: Count = Field(
         1, description="keep the fields of every n-th step (the history always holds all steps)"
     )

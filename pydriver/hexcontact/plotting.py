@@ -86,6 +86,8 @@ def _draw_field(figure: FigureBase, view: StepView) -> None:
     if view.hertz is not None:
         _outline(axes, view.hertz, view.center, to_length, label="Hertz contact area")
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)
+    if not view.pressure.any():
+        axes.text(0.5, 0.5, "no contact", transform=axes.transAxes, ha="center", va="center")
     _set_plane(axes, view.window(), to_length, length)
 
 

@@ -15,6 +15,7 @@ from . import memory
 from .errors import ConvergenceError, DeckError
 from .estimators import area_radius, edge_radius
 from .grid import rim_sides
+from .messages import listed
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
 from .variables import FIELDS
@@ -148,6 +149,35 @@ def memory_needed(case: Case, lattice: Lattice) -> int:
     return case.memory_needed(lattice) + len(bodies) * operator + _ARRAYS * _ITEM * lattice.size
 
 
+def require_memory(case: Case, lattice: Lattice, held: int = 0) -> None:
+    """Refuse a window that does not fit into memory.
+
+    Parameters
+    ----------
+    case : Case
+        The problem.
+    lattice : Lattice
+        The window.
+    held : int
+        Bytes a node that the result will keep in memory.
+
+    Raises
+    ------
+    ResourceError
+        If less memory is available.
+    """
+    advice = ["a smaller window" if case.window_fixed else "a larger grid.spacing"]
+    if (method := case.method_for(lattice)) == "direct":
+        advice.append('solver.method = "fft"')
+    if held:
+        advice.append("an output file")
+    memory.require(
+        memory_needed(case, lattice) + held * lattice.size,
+        f"a window of {lattice.n_row} x {lattice.n_col} nodes (method {method})",
+        f"choose {listed(advice, 'or')}",
+    )
+
+
 def steps(case: Case, kept_in_memory: bool = False) -> Iterator[Step]:
     """Solve a case step by step.
 
@@ -199,11 +229,7 @@ class _Window:
     def __init__(self, case: Case, lattice: Lattice, fields: list[str], held: int) -> None:
         from .native import NormalContact
 
-        memory.require(
-            memory_needed(case, lattice) + held * lattice.size,
-            f"a window of {lattice.n_row} x {lattice.n_col} nodes (method {case.method_for(lattice)})",
-            "choose a larger grid.spacing" + (", or an output file" if held else ""),
-        )
+        require_memory(case, lattice, held)
         self.case, self.lattice, self.fields, self.held = case, lattice, fields, held
         gap, self.candidate = case.initial_gap(lattice)
         self.gap: Array = np.where(self.candidate, gap, np.nan)

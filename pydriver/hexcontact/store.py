@@ -125,6 +125,12 @@ def _continues(journal: Journal, output: Result) -> bool:
     return len(journal) >= len(output) and journal.metadata.run == output.dataset.attrs.get("run")
 
 
+def _may_be_a_result(path: Path) -> bool:
+    """Tell whether a file that is to be replaced is empty or begins like netCDF."""
+    with path.open("rb") as file:
+        return file.read(4) in (b"", b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
+
+
 class Store:
     """Writes a run: each step to the journal as it is finished, all of them to the output.
 
@@ -180,6 +186,10 @@ class Store:
         """Deal with what is there: an output, or what an unfinished run left."""
         if self.path.exists() and not overwrite:
             raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
+        if self.path.exists() and not _may_be_a_result(self.path):
+            raise DeckError(
+                f"{self.path} is not a netCDF file, so it is not overwritten; choose another output"
+            )
         left = Journal(self.folder)
         if left and not overwrite:
             raise DeckError(

@@ -552,3 +552,14 @@ def test_a_mutated_deck_is_a_case_or_a_deck_error(text: str) -> None:
         return
     assert case.lattice.size > 0
     assert case.load_steps
+
+
+def test_nan_of_a_gap_function_is_named() -> None:
+    with pytest.raises(DeckError, match=r"gap: expected numbers, or inf .*; it is NaN at x = -"):
+        Case(
+            body_1={"young_modulus": 210e9, "poisson_ratio": 0.3},
+            body_2={"rigid": True},
+            gap=lambda x, y: np.where(x < 0, np.nan, x**2 + y**2),
+            spacing=1e-5,
+            normal_load=1.0,
+        )

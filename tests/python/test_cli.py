@@ -141,9 +141,9 @@ def test_output_goes_where_the_deck_or_the_option_says(deck: Path) -> None:
 
 def test_an_existing_output_needs_overwrite(deck: Path) -> None:
     out = deck.with_suffix(".nc")
-    out.write_text("precious")
+    out.write_text("CDF\x01precious")
     refused(inside(deck.parent, "run", "sphere.toml"), 2, r"sphere\.nc exists already; --overwrite")
-    assert out.read_text() == "precious"
+    assert out.read_text() == "CDF\x01precious"
     assert inside(deck.parent, "run", "sphere.toml", "--overwrite", "-q").returncode == 0
     assert len(open_result(out)) == 2
 
@@ -411,3 +411,20 @@ def test_names_of_the_package_are_there() -> None:
 def test_the_picture_shows_the_same_numbers_as_the_file(solved: Path) -> None:
     result = open_result(solved / "sphere.nc")
     assert_array_equal(np.asarray(result.step(-1)["pressure"]) > 0, np.asarray(result.step(-1)["zone"]) > 0)
+
+
+def test_overwrite_replaces_results_only(deck: Path) -> None:
+    before = deck.read_text()
+    done = hexcontact_(deck.parent, "run", "sphere.toml", "--output", "sphere.toml", "--overwrite")
+    assert (done.returncode, deck.read_text()) == (2, before)
+    assert "sphere.toml is not a netCDF file" in done.stderr
+    done = hexcontact_(deck.parent, "run", "sphere.toml", "--output", "a.png", "--plot")
+    assert done.returncode == 2
+    assert "output a.png: expected a netCDF file, such as a.nc" in done.stderr
+
+
+def test_check_refuses_what_memory_cannot_hold(deck: Path) -> None:
+    done = hexcontact_(deck.parent, "check", "sphere.toml", "--set", "grid.window=[60000, 60000]")
+    assert done.returncode == 4, done.stderr
+    assert "a window of 60000 x 60000 nodes" in done.stderr
+    assert "are available" in done.stderr

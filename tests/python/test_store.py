@@ -260,7 +260,7 @@ def test_overwriting_an_abandoned_overwrite_keeps_the_first_output(out: Path) ->
 
 def test_a_link_is_followed(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
-    (tmp_path / "disk" / "real.nc").write_text("old")
+    (tmp_path / "disk" / "real.nc").write_bytes(b"CDF\x01old")
     (tmp_path / "out.nc").symlink_to(tmp_path / "disk" / "real.nc")
     with Store(tmp_path / "out.nc", Metadata(planned_steps=1), overwrite=True) as store:
         store.append(made_step(0))

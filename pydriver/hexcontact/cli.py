@@ -165,6 +165,18 @@ def _case(deck: Path, settings: list[str] | None) -> Case:
     return Case.from_toml(deck, overrides=dict(map(_setting, settings or ())))
 
 
+def _target(case: Case, deck: Path, output: Path | None = None) -> Path:
+    """Return the file that a run writes: what the user, else the deck, else the deck's name says."""
+    target = output or case.output.file or Path(f"{deck.stem}.nc")
+    if target.suffix in _PICTURES:
+        raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
+    if not target.parent.is_dir():
+        there = target.parent.exists()
+        fault = f"{target.parent} is not a folder" if there else f"the folder {target.parent} does not exist"
+        raise DeckError(f"cannot write {target}: {fault}")
+    return target
+
+
 def _setting(text: str) -> tuple[str, Any]:
     """Split KEY=VALUE; a value that is not TOML is text, so that units need no quotes."""
     key, equals, value = text.partition("=")
@@ -197,9 +209,7 @@ def run(
     from .store import Store
 
     case = _case(deck, settings)
-    target = output or case.output.file or Path(f"{deck.stem}.nc")
-    if target.suffix in _PICTURES:
-        raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
+    target = _target(case, deck, output)
     shown, histories = reporter(quiet), []
     with Store(target, solve.metadata_of(case), overwrite) as store:
         previous = signal.getsignal(signal.SIGTERM)
@@ -242,6 +252,7 @@ def check(deck: DeckFile, settings: Settings = None) -> None:
     console = summary.console()
     console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
     solve.require_memory(case, case.lattice)
+    _target(case, deck)
     console.print(f"{deck} is ready to run", soft_wrap=True)
 
 

@@ -152,7 +152,8 @@ def _draw_section(figure: FigureBase, view: StepView, angle: float) -> None:
     rim = 0.5 * view.spacing * to_length
     axes.set(ylabel=f"pressure p ({stress})", xlim=(place[0] - rim, place[-1] + rim))
     axes.set_ylim(0.0, 1.08 * to_stress * max(float(p.max()), np.finfo(float).tiny))
-    axes.legend(loc="lower center")
+    if view.hertz is not None:
+        axes.legend(loc="lower center")
     direction = "x" if angle == 0.0 else f"distance from the center along {np.degrees(angle):g}°"
     bottom.set_xlabel(f"{direction} ({length})")
 

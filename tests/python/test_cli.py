@@ -428,3 +428,10 @@ def test_check_refuses_what_memory_cannot_hold(deck: Path) -> None:
     assert done.returncode == 4, done.stderr
     assert "a window of 60000 x 60000 nodes" in done.stderr
     assert "are available" in done.stderr
+
+
+def test_check_looks_at_the_output_folder(deck: Path) -> None:
+    for folder, fault in (("nowhere", "the folder nowhere does not exist"), (deck.name, "is not a folder")):
+        done = hexcontact_(deck.parent, "check", deck.name, "--set", f'output.file="{folder}/a.nc"')
+        assert done.returncode == 2
+        assert fault in done.stderr

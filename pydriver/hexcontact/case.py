@@ -382,7 +382,8 @@ class Case:
         rows, cols = self.lattice.shape
         title = f"{self.title!r}, " if self.title else ""
         return (
-            f"Case({title}{self.solver.algorithm}, {rows} x {cols} nodes, {len(self.load_steps)} load steps)"
+            f"Case({title}{self.solver.algorithm}, {rows} x {cols} nodes, "
+            f"{(n := len(self.load_steps))} load step{'s' * (n > 1)})"
         )
 
     # --- the window -----------------------------------------------------------------------------------------

@@ -397,7 +397,8 @@ class Result:
         steps = f"{len(self)} load step{'s' * (len(self) != 1)}"
         spacing = attributes.get("lattice_spacing", NAN)
         lines = [
-            f"Result of {self.case_title!r}" + (f", {self.path}" if self.path else ""),
+            (f"Result of {self.case_title!r}" if self.case_title else "Result")
+            + (f", {self.path}" if self.path else ""),
             f"  {steps if self.complete else f'{steps} of {planned} (unfinished run)'}"
             f", {sizes['row']} x {sizes['col']} nodes, spacing {spacing:.6g} m",
         ]

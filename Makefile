@@ -71,9 +71,12 @@ install: $(STAMPS)/installed  ## build and install into .venv (done by the targe
 
 # --- use ---------------------------------------------------------------------
 
-demo: install  ## press two spheres together: result, picture and table in output/
+demo: install  ## press a sphere on aluminum, then shear it: history, result and pictures in output/
 	@mkdir -p output
-	cd output && hexcontact run ../cases/hertz_spheres.toml --overwrite --plot
+	cd output && hexcontact run ../cases/dissimilar_fretting.toml --overwrite --plot
+	cd output && hexcontact plot dissimilar_fretting.nc --what tractions --step 10,11,15,20,25,30,35,40
+	cd output && hexcontact plot dissimilar_fretting.nc --what zones --step 10,11,15,20,25,30,35,40
+	cd output && hexcontact plot dissimilar_fretting.nc --what history
 
 verify: install  ## compare with published, discrete and analytic solutions (minutes)
 	hexcontact verify

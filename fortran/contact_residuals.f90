@@ -1,14 +1,19 @@
 !> How well a state fulfils the contact conditions; dimensionless.
 module hc_contact_residuals
   use hc_precision, only: wp
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_contact_state, only: contact_state_t, load_control, separated, slip
+  use hc_contact_state, only: contact_state_t, force_control, normal, separated, slip
+  use hc_friction_law, only: coulomb_t, on_cone
   implicit none
   private
 
-  public :: normal_self_compliance, normal_residual, force_residual, conclude
+  public :: normal_self_compliance, tangential_self_compliance
+  public :: normal_residual, tangential_residual, force_residual, conclude, least_traction
+
+  !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
+  real(wp), parameter :: least_traction = 1.0e-3_wp
 
 contains
 
@@ -25,6 +30,22 @@ contains
     k = pyramid%kernels(0.0_wp, 0.0_wp)
     normal_self_compliance = pair%lambda_1*k(k_1)
   end function normal_self_compliance
+
+  !> Tangential displacement of a node under its own pyramid of unit traction [m/Pa].
+  !>
+  !> (lambda_1 + lambda_5/2) K1(0) on the equilateral lattice, where K_xx(0) = K1(0)/2.
+  pure real(wp) function tangential_self_compliance(lattice, pair)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    type(pyramid_t) :: pyramid
+    real(wp) :: k(5)
+
+    call new_pyramid(pyramid, lattice%basis)
+    k = pyramid%kernels(0.0_wp, 0.0_wp)
+    tangential_self_compliance = pair%lambda_1*k(k_1) + pair%lambda_5*k(k_xx)
+  end function tangential_self_compliance
 
   !> R_n = max |p - max(0, p - g/d_n)|/p_max over all candidate nodes.
   !>
@@ -55,6 +76,42 @@ contains
     end if
   end function normal_residual
 
+  !> R_t = max |q - P(q - ds/d_t)|/tau over the nodes in contact, P the projection on the cone.
+  !>
+  !> Bounds tractions outside of the cone, slip in stick and a wrong direction
+  !> of slip at once. The scale tau is mu p_max; the largest traction, but
+  !> not less than a thousandth of p_max, without slip; without friction there is nothing to fulfil.
+  pure real(wp) function tangential_residual(traction, slip_increment, pressure, friction, compliance)
+    !> Traction (n_col, n_row, 2) [Pa] and slip of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: traction(:, :, :), slip_increment(:, :, :)
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in) :: pressure(:, :)
+    !> Law of friction
+    type(coulomb_t), intent(in) :: friction
+    !> Self-compliance d_t [m/Pa]
+    real(wp), intent(in) :: compliance
+    real(wp) :: scale, worst, q(2), p_max, q_max
+    integer :: col, row
+
+    p_max = 0.0_wp
+    q_max = 0.0_wp
+    worst = 0.0_wp
+    do row = 1, size(pressure, 2)
+      do col = 1, size(pressure, 1)
+        if (.not. pressure(col, row) > 0.0_wp) cycle
+        q = traction(col, row, :)
+        p_max = max(p_max, pressure(col, row))
+        q_max = max(q_max, norm2(q))
+        worst = max(worst, norm2(q - on_cone(q - slip_increment(col, row, :)/compliance, &
+                                             friction%bound(pressure(col, row)))))
+      end do
+    end do
+    scale = friction%coefficient*p_max
+    if (friction%no_slip) scale = max(q_max, least_traction*p_max)
+    tangential_residual = 0.0_wp
+    if (scale > 0.0_wp) tangential_residual = worst/scale
+  end function tangential_residual
+
   !> R_P = |sum A_p p - P|/P.
   elemental real(wp) function force_residual(carried, load)
     !> Load carried by the pressure, and prescribed load [N]
@@ -77,7 +134,7 @@ contains
     logical, intent(in) :: candidate(:, :)
     !> Self-compliance d_n [m/Pa]
     real(wp), intent(in) :: compliance
-    !> load_control or approach_control
+    !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m] that was prescribed
     real(wp), intent(in) :: target
@@ -85,10 +142,10 @@ contains
     real(wp), intent(in) :: tolerance
 
     state%zone = merge(slip, separated, state%pressure > 0.0_wp)
-    state%normal_load = lattice%cell_area()*sum(state%pressure)
+    state%load(normal) = lattice%cell_area()*sum(state%pressure)
     state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance)
     state%residual_force = 0.0_wp
-    if (control == load_control) state%residual_force = force_residual(state%normal_load, target)
+    if (control == force_control) state%residual_force = force_residual(state%load(normal), target)
     state%converged = max(state%residual_normal, state%residual_force) <= tolerance
   end subroutine conclude
 

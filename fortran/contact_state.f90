@@ -1,20 +1,34 @@
-!> The state of a contact: tractions, gap, zones and rigid motion over a window.
+!> The state of a contact: tractions, gap, zones, loads and rigid motions over a window.
 module hc_contact_state
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
+  use hc_flexibility, only: normal, along_x, along_y
   implicit none
   private
 
-  public :: contact_state_t, new_contact_state, check_problem
+  public :: contact_state_t, new_contact_state, new_friction_state, check_problem
   public :: separated, stick, slip
-  public :: load_control, approach_control
+  public :: load_target_t, force_control, displacement_control
+  public :: normal, along_x, along_y, about_z, n_motion
 
   !> Zone of a node; without friction every node in contact slips.
   integer, parameter :: separated = 0, stick = 1, slip = 2
 
-  !> What is prescribed along z: the normal load, or the approach.
-  integer, parameter :: load_control = 1, approach_control = 2
+  !> The rigid motions: approach, shift along x and along y, and twist about z.
+  !> `normal`, `along_x` and `along_y` are those of the tractions.
+  integer, parameter :: about_z = 4, n_motion = 4
+
+  !> What is prescribed of a motion: its load, or itself.
+  integer, parameter :: force_control = 1, displacement_control = 2
+
+  !> What the bodies are driven to, motion by motion.
+  type :: load_target_t
+    !> force_control or displacement_control
+    integer :: control(n_motion) = [force_control, force_control, force_control, displacement_control]
+    !> Load [N], torque [N m]; or approach, shift [m], twist [rad]
+    real(wp) :: value(n_motion) = 0.0_wp
+  end type load_target_t
 
   !> A solution and how well it fulfils the contact conditions.
   type :: contact_state_t
@@ -22,18 +36,38 @@ module hc_contact_state
     real(wp), allocatable :: pressure(:, :), gap(:, :)
     !> Zone of each node (n_col, n_row)
     integer, allocatable :: zone(:, :)
-    !> Normal load, the sum of the pressure times the cell area [N]
-    real(wp) :: normal_load = 0.0_wp
-    !> Approach of the remote parts [m]
-    real(wp) :: approach = 0.0_wp
+    !> With friction: shear traction on body 1 (n_col, n_row, 2) [Pa]
+    real(wp), allocatable :: traction(:, :, :)
+    !> With friction: relative displacement s = (u1 - u2) - shift - twist x r (n_col, n_row, 2) [m]
+    real(wp), allocatable :: relative_displacement(:, :, :)
+    !> With friction: change of s during the step, on the nodes in contact (n_col, n_row, 2) [m]
+    real(wp), allocatable :: slip_increment(:, :, :)
+    !> With friction: length of the slip path so far (n_col, n_row) [m]
+    real(wp), allocatable :: accumulated_slip(:, :)
+    !> Normal load, tangential loads on body 1 [N] and torque [N m]: resultants of the tractions
+    real(wp) :: load(n_motion) = 0.0_wp
+    !> Approach, shifts [m] and twist [rad] of the remote parts
+    real(wp) :: motion(n_motion) = 0.0_wp
+    !> Energy dissipated by friction so far [J]
+    real(wp) :: dissipated_energy = 0.0_wp
     !> Residual of the contact conditions along the normal
     real(wp) :: residual_normal = huge(1.0_wp)
+    !> Residual of the friction conditions
+    real(wp) :: residual_tangential = 0.0_wp
     !> Residual of the normal load; 0 where the approach is prescribed
     real(wp) :: residual_force = huge(1.0_wp)
-    !> Both residuals are within the tolerance
+    !> Residual of the tangential loads, of those that are prescribed
+    real(wp) :: residual_shear_force = 0.0_wp
+    !> Residual of the torque; 0 where the twist is prescribed
+    real(wp) :: residual_torque = 0.0_wp
+    !> All residuals are within the tolerance
     logical :: converged = .false.
+    !> No node sticks and the tangential load cannot be carried
+    logical :: sliding = .false.
     !> Active sets that were tried on the finest lattice
     integer :: sweeps = 0
+    !> Times that the load step was halved
+    integer :: cuts = 0
     !> Work, in applications of the full operator on the finest lattice
     real(wp) :: operator_applications = 0.0_wp
   end type contact_state_t
@@ -51,6 +85,20 @@ contains
     allocate (state%gap, source=state%pressure)
     allocate (state%zone(lattice%extent(1), lattice%extent(2)), source=separated)
   end subroutine new_contact_state
+
+  !> A state with friction before the first load: no contact, nothing displaced.
+  pure subroutine new_friction_state(state, lattice)
+    !> State to be set up
+    type(contact_state_t), intent(out) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+
+    call new_contact_state(state, lattice)
+    allocate (state%traction(lattice%extent(1), lattice%extent(2), 2), source=0.0_wp)
+    allocate (state%relative_displacement, source=state%traction)
+    allocate (state%slip_increment, source=state%traction)
+    allocate (state%accumulated_slip, source=state%pressure)
+  end subroutine new_friction_state
 
   !> Does a problem make sense?
   pure subroutine check_problem(lattice, initial_gap, candidate, error)

@@ -12,12 +12,12 @@ module hc_direct_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, load_control
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, force_control
   use hc_contact_residuals, only: normal_self_compliance, conclude
   implicit none
   private
 
-  public :: direct_contact_t, new_direct_contact
+  public :: direct_contact_t, new_direct_contact, first_guess, exchange, patience
 
   !> Exchanges of whole sets that may fail to lower the number of wrong nodes.
   integer, parameter :: patience = 10
@@ -65,7 +65,7 @@ contains
   !> Solve for a normal load or an approach.
   subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)
     class(direct_contact_t), intent(inout) :: self
-    !> load_control or approach_control
+    !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
@@ -83,7 +83,7 @@ contains
     real(wp), allocatable :: h(:), p(:)
     logical, allocatable :: candidate(:), active(:), wrong(:)
     real(wp) :: delta, gap(self%flexibility%lattice%size())
-    integer :: n, n_wrong, fewest, left, last
+    integer :: n, fewest, left
 
     call new_contact_state(state, self%flexibility%lattice)
     self%flexibility%applications = 0.0_wp
@@ -97,11 +97,11 @@ contains
       active = candidate .and. reshape(start, [n])
       if (.not. any(active)) active = candidate
     else
-      active = first_guess(self, control, target, h, candidate)
+      active = first_guess(self%flexibility%lattice, self%flexibility%pair, control, target, h, candidate)
     end if
-    if (target <= merge(0.0_wp, delta, control == load_control)) then
+    if (target <= merge(0.0_wp, delta, control == force_control)) then
       active = .false.
-      if (control /= load_control) delta = target
+      if (control /= force_control) delta = target
     end if
     fewest = huge(1)
     left = patience
@@ -115,20 +115,8 @@ contains
 
       ! the gap of a node in contact is zero up to rounding, which must not count as penetration
       wrong = (active .and. p < 0.0_wp) .or. (candidate .and. .not. active .and. gap < 0.0_wp)
-      n_wrong = count(wrong)
-      if (n_wrong == 0) exit
-      if (n_wrong < fewest) then
-        fewest = n_wrong
-        left = patience
-      else
-        left = left - 1
-      end if
-      if (left > 0) then
-        active = active .neqv. wrong
-      else
-        last = findloc(wrong, .true., dim=1, back=.true.)
-        active(last) = .not. active(last)
-      end if
+      if (.not. any(wrong)) exit
+      call exchange(wrong, fewest, left, active)
       if (.not. any(active)) active = candidate .and. gap <= minval(gap, mask=candidate)
     end do
 
@@ -136,19 +124,47 @@ contains
     call find_gap(self, reshape(state%pressure, [n]), h - delta, gap, error)
     if (allocated(error)) return
     state%gap = reshape(gap, shape(state%gap))
-    state%approach = delta
+    state%motion(normal) = delta
     call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance)
     state%operator_applications = self%flexibility%applications
   end subroutine solve
+
+  !> Exchange the wrong nodes; one only as soon as the number of them does not fall any more.
+  pure subroutine exchange(wrong, fewest, left, active)
+    !> Nodes that are active and should not be, or should be and are not; one at least
+    logical, intent(in) :: wrong(:)
+    !> Smallest number of wrong nodes so far; huge(1) at the start
+    integer, intent(inout) :: fewest
+    !> Exchanges of whole sets left that may fail to lower it; `patience` at the start
+    integer, intent(inout) :: left
+    !> Active nodes
+    logical, intent(inout) :: active(:)
+    integer :: last
+
+    if (count(wrong) < fewest) then
+      fewest = count(wrong)
+      left = patience
+    else
+      left = left - 1
+    end if
+    if (left > 0) then
+      active = active .neqv. wrong
+    else
+      last = findloc(wrong, .true., dim=1, back=.true.)
+      active(last) = .not. active(last)
+    end if
+  end subroutine exchange
 
   !> Nodes that the undeformed bodies would overlap on; about twice the contact area of a sphere.
   !>
   !> Under a load the overlap is that at which a flat punch of the same area
   !> would reach the rim of the overlap: mean initial gap + P/(2 E* a) = overlap.
-  pure function first_guess(self, control, target, h, candidate) result(active)
-    !> The problem
-    class(direct_contact_t), intent(in) :: self
-    !> load_control or approach_control
+  pure function first_guess(lattice, pair, control, target, h, candidate) result(active)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
@@ -161,15 +177,14 @@ contains
     integer :: i
 
     overlap = target
-    if (control == load_control) then
+    if (control == force_control) then
       low = minval(h, mask=candidate)
       high = maxval(h, mask=candidate)
       do i = 1, 50
         overlap = 0.5_wp*(low + high)
         active = candidate .and. h <= overlap
-        radius = sqrt(count(active)*self%flexibility%lattice%cell_area()/pi)
-        if (sum(h, mask=active)/count(active) + target/(2.0_wp*self%flexibility%pair%effective_modulus()*radius) &
-            > overlap) then
+        radius = sqrt(count(active)*lattice%cell_area()/pi)
+        if (sum(h, mask=active)/count(active) + target/(2.0_wp*pair%effective_modulus()*radius) > overlap) then
           low = overlap
         else
           high = overlap
@@ -183,7 +198,7 @@ contains
   !> Pressure that closes the gap on the active nodes: K p = approach - h.
   subroutine solve_active(self, control, target, h, active, p, delta, error)
     class(direct_contact_t), intent(in) :: self
-    !> load_control or approach_control
+    !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
@@ -223,7 +238,7 @@ contains
       call raise(error, status%no_convergence, 'the flexibility matrix of the contact area is not positive definite')
       return
     end if
-    if (control == load_control) delta = (target/self%flexibility%lattice%cell_area() + sum(rhs(:, 2)))/sum(rhs(:, 1))
+    if (control == force_control) delta = (target/self%flexibility%lattice%cell_area() + sum(rhs(:, 2)))/sum(rhs(:, 1))
     p(node) = delta*rhs(:, 1) - rhs(:, 2)
   end subroutine solve_active
 

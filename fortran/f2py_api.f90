@@ -6,13 +6,13 @@ module hc_f2py_api
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot
+  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
-  use hc_flexibility, only: normal, along_x, along_y
+  use hc_flexibility, only: along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
-  use hc_contact_state, only: contact_state_t
+  use hc_contact_state, only: contact_state_t, normal
   use hc_normal_contact, only: new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: new_direct_contact
   implicit none
@@ -256,8 +256,8 @@ contains
       gap = reshape(state%gap, [n_node])
       zone = reshape(state%zone, [n_node])
     end if
-    normal_load = state%normal_load
-    approach = state%approach
+    normal_load = state%load(normal)
+    approach = state%motion(normal)
     residuals = [state%residual_normal, state%residual_force]
     sweeps = state%sweeps
     operator_applications = state%operator_applications
@@ -271,25 +271,5 @@ contains
     integer(c_int64_t), intent(in) :: handle
     call free_slot(handle)
   end subroutine free_handle
-
-  !> Elastic constants from a vector.
-  pure type(elastic_pair_t) function pair_of(lambda)
-    real(c_double), intent(in) :: lambda(3)
-    pair_of = elastic_pair_t(lambda(1), lambda(2), lambda(3))
-  end function pair_of
-
-  !> An error as a code and a message.
-  pure subroutine report(error, code, message)
-    type(error_t), allocatable, intent(in) :: error
-    integer(c_int), intent(out) :: code
-    character(len=*), intent(out) :: message
-
-    code = status%ok
-    message = ''
-    if (allocated(error)) then
-      code = error%code
-      message = error%message
-    end if
-  end subroutine report
 
 end module hc_f2py_api

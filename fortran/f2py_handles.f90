@@ -5,16 +5,18 @@
 !> in another. This is the one place with module state; it is not part of the
 !> Fortran library.
 module hc_f2py_handles
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_flexibility, only: flexibility_t
   use hc_normal_contact, only: normal_contact_t
+  use hc_elastic_pair, only: elastic_pair_t
   use hc_direct_contact, only: direct_contact_t
+  use hc_friction_problem, only: friction_solver_t
   implicit none
   private
 
-  public :: slot_t, take_slot, enter, leave, free_slot
+  public :: slot_t, take_slot, enter, leave, free_slot, report, pair_of
 
   !> Objects that may exist at a time.
   integer, parameter :: n_slot = 4096
@@ -29,6 +31,7 @@ module hc_f2py_handles
     class(flexibility_t), pointer :: operator => null()
     type(normal_contact_t), pointer :: normal_contact => null()
     type(direct_contact_t), pointer :: direct_contact => null()
+    class(friction_solver_t), pointer :: friction => null()
   end type slot_t
 
   type(slot_t), target :: slots(n_slot)
@@ -47,6 +50,7 @@ contains
       if (associated(slot%operator)) deallocate (slot%operator)
       if (associated(slot%normal_contact)) deallocate (slot%normal_contact)
       if (associated(slot%direct_contact)) deallocate (slot%direct_contact)
+      if (associated(slot%friction)) deallocate (slot%friction)
       slot%generation = slot%generation + 1
       slot%busy = .false.
     end associate
@@ -109,5 +113,25 @@ contains
     slot%busy = .false.
     !$omp end critical (hc_handles)
   end subroutine leave
+
+  !> Elastic constants from a vector.
+  pure type(elastic_pair_t) function pair_of(lambda)
+    real(c_double), intent(in) :: lambda(3)
+    pair_of = elastic_pair_t(lambda(1), lambda(2), lambda(3))
+  end function pair_of
+
+  !> An error as a code and a message.
+  pure subroutine report(error, code, message)
+    type(error_t), allocatable, intent(in) :: error
+    integer(c_int), intent(out) :: code
+    character(len=*), intent(out) :: message
+
+    code = status%ok
+    message = ''
+    if (allocated(error)) then
+      code = error%code
+      message = error%message
+    end if
+  end subroutine report
 
 end module hc_f2py_handles

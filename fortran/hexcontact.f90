@@ -5,7 +5,7 @@
 !>     call new_lattice(lattice, equilateral_basis(1.0e-5_wp), first=[-60, -60], extent=[121, 121], error=error)
 !>     call new_elastic_pair(pair, material_t(210e9_wp, 0.3_wp), material_t(rigid=.true.), error)
 !>     call new_normal_contact(contact, lattice, pair, initial_gap, candidate, error)
-!>     call contact%solve(load_control, 100.0_wp, 1e-8_wp, 60, state, error)
+!>     call contact%solve(force_control, 100.0_wp, 1e-8_wp, 60, state, error)
 module hexcontact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
@@ -18,10 +18,16 @@ module hexcontact
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
-  use hc_contact_state, only: contact_state_t, separated, stick, slip, load_control, approach_control
-  use hc_contact_residuals, only: normal_residual, force_residual
+  use hc_contact_state, only: contact_state_t, new_friction_state, separated, stick, slip, &
+                              load_target_t, force_control, displacement_control, about_z, n_motion
+  use hc_friction_law, only: coulomb_t
+  use hc_contact_residuals, only: normal_residual, tangential_residual, force_residual
+  use hc_friction_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
+  use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory
+  use hc_direct_friction, only: direct_friction_t, new_direct_friction
+  use hc_load_path, only: advance, touches_rim
   implicit none
   public
 end module hexcontact

@@ -1,4 +1,4 @@
-!> Conjugate gradients on a set of active nodes, with linear constraints.
+!> Conjugate gradients and GMRES on a set of active nodes, with linear constraints.
 !>
 !> Solves, for the unknowns on the active nodes (the others stay as they are),
 !>
@@ -9,14 +9,17 @@
 !> projecting the preconditioned residual,
 !>
 !>     z <- M r - M B (B^T M B)^-1 B^T M r.
+!>
+!> For a matrix that is not symmetric, and constraints C^T x whose multipliers act
+!> along other vectors B, GMRES does the same with (C^T M B)^-1 C^T.
 module hc_krylov
   use hc_precision, only: wp
-  use hc_error, only: error_t, status, raise
-  use hc_lapack, only: dposv
+  use hc_error, only: error_t
+  use hc_lapack, only: dgesv
   implicit none
   private
 
-  public :: linear_system_t, projected_cg, dot
+  public :: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, dot
 
   !> Terms of a sum that are added up by one thread: the result does not depend on their number.
   integer, parameter :: sum_block = 4096
@@ -46,17 +49,100 @@ module hc_krylov
     end subroutine linear_map
   end interface
 
+  !> Pivot of the scaled constraints below which they count as dependent.
+  real(wp), parameter :: dependence = 1.0e-12_wp
+
 contains
 
+  !> M B, the constraint vectors after the preconditioner, zero off the active nodes.
+  subroutine precondition_constraints(system, active, constraint, mb, error)
+    !> Operator and preconditioner
+    class(linear_system_t), intent(inout) :: system
+    !> Nodes that carry unknowns (n)
+    logical, intent(in) :: active(:)
+    !> Constraint vectors B (n, number of constraints), zero off the active nodes
+    real(wp), intent(in) :: constraint(:, :)
+    !> M B (n, number of constraints)
+    real(wp), allocatable, intent(out) :: mb(:, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    integer :: m
+
+    allocate (mb(size(constraint, 1), size(constraint, 2)))
+    do m = 1, size(constraint, 2)
+      call system%precondition(constraint(:, m), mb(:, m), error)
+      if (allocated(error)) return
+      where (.not. active) mb(:, m) = 0.0_wp
+    end do
+  end subroutine precondition_constraints
+
+  !> x <- x + M B (C^T M B)^-1 missing: make C^T x what it should be; mostly C is B.
+  !>
+  !> M B is about the traction that a rigid motion of the active nodes causes.
+  subroutine fulfil(rows, mb, missing, x, independent, n_threads)
+    !> C and M B
+    real(wp), intent(in) :: rows(:, :), mb(:, :)
+    !> What C^T x lacks
+    real(wp), intent(in) :: missing(:)
+    !> Unknowns
+    real(wp), intent(inout) :: x(:)
+    !> False where the constraints depend on each other: x is left alone
+    logical, intent(out) :: independent
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    real(wp) :: share(size(missing))
+    integer :: m
+
+    share = missing
+    call solve_gram(rows, mb, share, independent, n_threads)
+    if (.not. independent) return
+    do m = 1, size(missing)
+      x = x + share(m)*mb(:, m)
+    end do
+  end subroutine fulfil
+
+  !> share <- (C^T M B)^-1 share.
+  subroutine solve_gram(rows, mb, share, independent, n_threads)
+    !> C and M B
+    real(wp), intent(in) :: rows(:, :), mb(:, :)
+    !> Right-hand side and solution
+    real(wp), intent(inout) :: share(:)
+    !> The matrix can be inverted
+    logical, intent(out) :: independent
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    real(wp) :: gram(size(mb, 2), size(mb, 2)), scale(size(mb, 2))
+    integer :: m, k, info, pivot(size(mb, 2))
+
+    independent = .true.
+    if (size(mb, 2) == 0) return
+    do m = 1, size(mb, 2)
+      do k = 1, size(mb, 2)
+        gram(k, m) = dot(rows(:, k), mb(:, m), n_threads)
+      end do
+      scale(m) = gram(m, m)
+    end do
+    independent = all(scale > 0.0_wp)
+    if (.not. independent) return
+    scale = sqrt(scale)
+    do m = 1, size(mb, 2)
+      gram(:, m) = gram(:, m)/(scale*scale(m))
+    end do
+    share = share/scale
+    call dgesv(size(mb, 2), 1, gram, size(mb, 2), pivot, share, size(mb, 2), info)
+    independent = info == 0 .and. all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
+    share = share/scale
+  end subroutine solve_gram
+
   !> Preconditioned conjugate gradients with projection on the constraints.
-  subroutine projected_cg(system, active, constraint, rhs, x, ax, tolerance, max_iterations, &
+  subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, &
                           multiplier, residual, iterations, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
     logical, intent(in) :: active(:)
-    !> Constraint vectors (n, number of constraints, may be 0), zero off the active nodes
-    real(wp), intent(in) :: constraint(:, :)
+    !> Constraint vectors B (n, number of constraints, may be 0), zero off the active nodes, and M B
+    real(wp), intent(in) :: constraint(:, :), mb(:, :)
     !> Right-hand side (n)
     real(wp), intent(in) :: rhs(:)
     !> Unknowns (n), on entry a start that fulfils the constraints
@@ -73,22 +159,16 @@ contains
     real(wp), intent(out) :: residual
     !> Iterations taken
     integer, intent(out) :: iterations
-    !> Allocated on failure: the operator is not positive definite
+    !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: r(:), z(:), d(:), ad(:), mb(:, :)
+    real(wp), allocatable :: r(:), z(:), d(:), ad(:)
     real(wp) :: rz, rz_old, curvature, step, correction(size(constraint, 2))
     integer :: n, i, m, n_threads
 
     n = size(x)
     n_threads = system%n_threads
-    allocate (r(n), z(n), d(n), ad(n), mb(n, size(constraint, 2)))
-    do m = 1, size(constraint, 2)
-      call system%precondition(constraint(:, m), mb(:, m), error)
-      if (allocated(error)) return
-      where (.not. active) mb(:, m) = 0.0_wp
-    end do
-
+    allocate (r(n), z(n), d(n), ad(n))
     iterations = 0
     rz_old = 0.0_wp
     do m = 1, size(multiplier)
@@ -121,12 +201,8 @@ contains
       call system%product(d, ad, error)
       if (allocated(error)) return
       curvature = dot(d, ad, n_threads)
-      if (.not. curvature > 0.0_wp) then
-        ! nothing is left to gain in working precision
-        if (.not. rz > 0.0_wp) exit
-        call raise(error, status%no_convergence, 'the flexibility operator is not positive definite on the active nodes')
-        return
-      end if
+      ! nothing is left to gain in working precision
+      if (.not. curvature > 0.0_wp) exit
       step = rz/curvature
       !$omp parallel do schedule(static) num_threads(n_threads)
       do i = 1, n
@@ -137,6 +213,115 @@ contains
       iterations = iterations + 1
     end do
   end subroutine projected_cg
+
+  !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
+  subroutine projected_gmres(system, active, columns, rows, weight, rhs, x, ax, tolerance, max_iterations, &
+                             multiplier, independent, iterations, error)
+    !> Operator and preconditioner
+    class(linear_system_t), intent(inout) :: system
+    !> Nodes that carry unknowns (n)
+    logical, intent(in) :: active(:)
+    !> B, along which the multipliers act, and C of the constraints (n, number of constraints), zero off the active nodes
+    real(wp), intent(in) :: columns(:, :), rows(:, :)
+    !> Weight of each residual (n)
+    real(wp), intent(in) :: weight(:)
+    !> Right-hand side (n)
+    real(wp), intent(in) :: rhs(:)
+    !> Unknowns (n), on entry a start that fulfils the constraints
+    real(wp), intent(inout), contiguous :: x(:)
+    !> Product A x (n), everywhere
+    real(wp), intent(inout), contiguous :: ax(:)
+    !> The largest weighted residual that is allowed on an active node
+    real(wp), intent(in) :: tolerance
+    !> Iterations allowed
+    integer, intent(in) :: max_iterations
+    !> Multipliers of the constraints, on entry a start
+    real(wp), intent(inout) :: multiplier(:)
+    !> False where the constraints depend on each other: nothing was done
+    logical, intent(out) :: independent
+    !> Iterations taken
+    integer, intent(out) :: iterations
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), allocatable :: mb(:, :), v(:, :), z(:), image(:)
+    real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
+    real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
+    integer :: n, i, k
+
+    n = size(x)
+    iterations = 0
+    call precondition_constraints(system, active, columns, mb, error)
+    if (allocated(error)) return
+    allocate (v(n, max_iterations + 1), z(n), image(n))
+    v(:, 1) = merge(weight*(rhs - ax + matmul(columns, multiplier)), 0.0_wp, active)
+    length = sqrt(dot(v(:, 1), v(:, 1), system%n_threads))
+    independent = .true.
+    if (.not. length > 0.0_wp) return
+    v(:, 1) = v(:, 1)/length
+    g = 0.0_wp
+    g(1) = length
+    h = 0.0_wp
+
+    do k = 1, max_iterations
+      call expand(v(:, k), error)
+      if (allocated(error) .or. .not. independent) return
+      call system%product(z, image, error)
+      if (allocated(error)) return
+      v(:, k + 1) = merge(weight*(image - matmul(columns, share)), 0.0_wp, active)
+      do i = 1, k
+        h(i, k) = dot(v(:, i), v(:, k + 1), system%n_threads)
+        v(:, k + 1) = v(:, k + 1) - h(i, k)*v(:, i)
+      end do
+      h(k + 1, k) = sqrt(dot(v(:, k + 1), v(:, k + 1), system%n_threads))
+      if (h(k + 1, k) > 0.0_wp) v(:, k + 1) = v(:, k + 1)/h(k + 1, k)
+      do i = 1, k - 1
+        rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
+        h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
+        h(i, k) = rotated
+      end do
+      length = hypot(h(k, k), h(k + 1, k))
+      iterations = k
+      if (.not. length > 0.0_wp) exit
+      c(k) = h(k, k)/length
+      s(k) = h(k + 1, k)/length
+      h(k, k) = length
+      g(k + 1) = -s(k)*g(k)
+      g(k) = c(k)*g(k)
+      if (abs(g(k + 1)) <= tolerance) exit
+    end do
+
+    do i = iterations, 1, -1
+      y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
+    end do
+    image = matmul(v(:, :iterations), y(:iterations))
+    call expand(image, error)
+    if (allocated(error)) return
+    x = x + z
+    multiplier = multiplier + share
+    call system%product(x, ax, error)
+
+  contains
+
+    !> z = M (r + B share) with C^T z = 0, r the unweighted residual of a basis vector.
+    subroutine expand(vector, error)
+      real(wp), intent(in) :: vector(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: j
+
+      image = merge(vector/weight, 0.0_wp, active)
+      call system%precondition(image, z, error)
+      if (allocated(error)) return
+      where (.not. active) z = 0.0_wp
+      do j = 1, size(share)
+        share(j) = -dot(rows(:, j), z, system%n_threads)
+      end do
+      call solve_gram(rows, mb, share, independent, system%n_threads)
+      if (.not. independent) return
+      z = z + matmul(mb, share)
+    end subroutine expand
+
+  end subroutine projected_gmres
 
   !> r = rhs - A x + B m on the active nodes, zero elsewhere, and its largest element.
   subroutine constrained_residual(active, constraint, multiplier, rhs, ax, r, largest, n_threads)
@@ -178,22 +363,18 @@ contains
     !> Threads to use
     integer, intent(in) :: n_threads
 
-    real(wp) :: gram(size(mb, 2), size(mb, 2))
-    integer :: i, m, k, info
+    logical :: independent
+    integer :: i, m
 
     !$omp parallel do schedule(static) num_threads(n_threads)
     do i = 1, size(z)
       if (.not. active(i)) z(i) = 0.0_wp
     end do
     !$omp end parallel do
-    if (size(mb, 2) == 0) return
     do m = 1, size(mb, 2)
       share(m) = dot(constraint(:, m), z, n_threads)
-      do k = 1, size(mb, 2)
-        gram(k, m) = dot(constraint(:, k), mb(:, m), n_threads)
-      end do
     end do
-    call dposv('U', size(mb, 2), 1, gram, size(mb, 2), share, size(mb, 2), info)
+    call solve_gram(constraint, mb, share, independent, n_threads)
     do m = 1, size(mb, 2)
       !$omp parallel do schedule(static) num_threads(n_threads)
       do i = 1, size(z)

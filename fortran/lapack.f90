@@ -4,7 +4,7 @@ module hc_lapack
   implicit none
   private
 
-  public :: dgemv, dposv
+  public :: dgemv, dposv, dgesv, dgelss
 
   interface
     !> y = alpha A x + beta y
@@ -26,6 +26,26 @@ module hc_lapack
       real(wp), intent(inout) :: a(lda, *), b(ldb, *)
       integer, intent(out) :: info
     end subroutine dposv
+
+    !> Solve A X = B (LU with partial pivoting)
+    subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
+      import :: wp
+      implicit none
+      integer, intent(in) :: n, nrhs, lda, ldb
+      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+      integer, intent(out) :: ipiv(*), info
+    end subroutine dgesv
+
+    !> Solution of A X = B of least norm, of least squares where there is none (singular values)
+    subroutine dgelss(m, n, nrhs, a, lda, b, ldb, s, rcond, rank, work, lwork, info)
+      import :: wp
+      implicit none
+      integer, intent(in) :: m, n, nrhs, lda, ldb, lwork
+      real(wp), intent(in) :: rcond
+      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+      real(wp), intent(out) :: s(*), work(*)
+      integer, intent(out) :: rank, info
+    end subroutine dgelss
   end interface
 
 end module hc_lapack

@@ -1,10 +1,11 @@
-!> Fourier symbol of the normal flexibility on the lattice.
+!> Fourier symbols of the even kernels on the lattice.
 !>
 !> The pyramid is a box spline over the three edge directions d_q, so that its
-!> transform is cell_area * product_q sinc(k.d_q/2), and that of 1/r is
-!> 2 pi/|k|. On the lattice the symbol is the alias sum over reciprocal vectors,
+!> transform is cell_area * product_q sinc(k.d_q/2), and those of 1/r, x^2/r^3
+!> and xy/r^3 are 2 pi/|k|, 2 pi k_y^2/|k|^3 and -2 pi k_x k_y/|k|^3. On the
+!> lattice a symbol is the alias sum over reciprocal vectors,
 !>
-!>     symbol(k) = sum_G product_q sinc((k + G).d_q/2) * 2 pi/|k + G|,
+!>     symbol(k) = sum_G product_q sinc((k + G).d_q/2) * 2 pi/|k + G| [1, ...],
 !>
 !> in which sin((k + G).d_q/2) is that of k up to a sign. It diverges at k = 0:
 !> there the kernel is summed over a disc with the area of the grid instead.
@@ -13,21 +14,25 @@ module hc_lattice_symbol
   implicit none
   private
 
-  public :: normal_symbol
+  public :: kernel_symbols, symbol_1, symbol_xx, symbol_xy
+
+  !> Order of the symbols: those of K1, K_xx and K_xy.
+  integer, parameter :: symbol_1 = 1, symbol_xx = 2, symbol_xy = 3
 
   !> Reciprocal vectors on each side; the terms fall off like |G|^-3 at least.
   integer, parameter :: n_alias = 1
 
 contains
 
-  !> Symbol of K1 at one frequency of a periodic grid [m].
-  pure real(wp) function normal_symbol(basis, length, frequency)
+  !> Symbols of K1, K_xx and K_xy at one frequency of a periodic grid [m].
+  pure function kernel_symbols(basis, length, frequency) result(symbol)
     !> Basis vectors as columns [m]
     real(wp), intent(in) :: basis(2, 2)
     !> Number of columns and rows of the grid
     integer, intent(in) :: length(2)
     !> Frequency indices, of any sign
     integer, intent(in) :: frequency(2)
+    real(wp) :: symbol(3)
 
     real(wp) :: area, theta(2)
     integer :: wrapped(2)
@@ -35,40 +40,42 @@ contains
     area = basis(1, 1)*basis(2, 2) - basis(2, 1)*basis(1, 2)
     wrapped = modulo(frequency + (length - 1)/2, length) - (length - 1)/2
     if (all(wrapped == 0)) then
-      normal_symbol = 2.0_wp*pi*sqrt(area*product(real(length, wp))/pi)
+      symbol = 2.0_wp*pi*sqrt(area*product(real(length, wp))/pi)*[1.0_wp, 0.5_wp, 0.0_wp]
       return
     end if
     theta = 2.0_wp*pi*wrapped/length
-    normal_symbol = alias_sum(basis, area, theta)
+    symbol = alias_sum(basis, area, theta)
     ! On a Nyquist row k and -k are the same frequency: a cut-off sum has to be made even.
     if (any(2*wrapped == length)) then
       where (2*wrapped /= length) theta = -theta
-      normal_symbol = 0.5_wp*(normal_symbol + alias_sum(basis, area, theta))
+      symbol = 0.5_wp*(symbol + alias_sum(basis, area, theta))
     end if
-  end function normal_symbol
+  end function kernel_symbols
 
   !> Sum over reciprocal vectors; theta = k.basis in (-pi, pi].
-  pure real(wp) function alias_sum(basis, area, theta)
+  pure function alias_sum(basis, area, theta) result(total)
     !> Basis vectors as columns [m]
     real(wp), intent(in) :: basis(2, 2)
     !> Cell area [m^2]
     real(wp), intent(in) :: area
     !> Phases along the two basis vectors
     real(wp), intent(in) :: theta(2)
+    real(wp) :: total(3)
 
-    real(wp) :: phase(2), k(2), half(3), sine(3), term
+    real(wp) :: phase(2), k(2), half(3), sine(3), weight, k_squared
     integer :: i, j
 
     sine = [sin(0.5_wp*theta(1)), sin(0.5_wp*theta(2)), sin(0.5_wp*(theta(2) - theta(1)))]
-    alias_sum = 0.0_wp
+    total = 0.0_wp
     do j = -n_alias, n_alias
       do i = -n_alias, n_alias
         phase = theta + 2.0_wp*pi*[i, j]
         ! k from its products with the basis vectors
         k = [phase(1)*basis(2, 2) - phase(2)*basis(2, 1), phase(2)*basis(1, 1) - phase(1)*basis(1, 2)]/area
         half = 0.5_wp*[phase(1), phase(2), phase(2) - phase(1)]
-        term = sinc_ratio(sine(1), half(1), i)*sinc_ratio(sine(2), half(2), j)*sinc_ratio(sine(3), half(3), j - i)
-        alias_sum = alias_sum + term*2.0_wp*pi/norm2(k)
+        weight = sinc_ratio(sine(1), half(1), i)*sinc_ratio(sine(2), half(2), j)*sinc_ratio(sine(3), half(3), j - i)
+        k_squared = dot_product(k, k)
+        total = total + weight*2.0_wp*pi/sqrt(k_squared)*[1.0_wp, k(2)**2/k_squared, -k(1)*k(2)/k_squared]
       end do
     end do
   end function alias_sum

@@ -9,9 +9,25 @@ module hc_multilevel
   implicit none
   private
 
-  public :: prolong, restrict_field, restrict_mask
+  public :: level_count, prolong, restrict_field, restrict_mask
 
 contains
+
+  !> Number of lattices, the given one included, when no window gets smaller than it should.
+  pure integer function level_count(extent, smallest_side)
+    !> Number of columns and rows of the finest window
+    integer, intent(in) :: extent(2)
+    !> Nodes that a side should have at least
+    integer, intent(in) :: smallest_side
+    integer :: side
+
+    level_count = 1
+    side = minval(extent)
+    do while (side >= 2*smallest_side)
+      side = side/2
+      level_count = level_count + 1
+    end do
+  end function level_count
 
   !> Interpolate a field from the coarse to the fine lattice; zero outside the coarse window.
   pure subroutine prolong(coarse_lattice, coarse, fine_lattice, fine)

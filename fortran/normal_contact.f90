@@ -12,11 +12,11 @@ module hc_normal_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, load_control
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, force_control
   use hc_contact_residuals, only: normal_self_compliance, normal_residual, conclude
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
-  use hc_krylov, only: linear_system_t, projected_cg, dot
-  use hc_multilevel, only: prolong, restrict_field, restrict_mask
+  use hc_krylov, only: linear_system_t, projected_cg, precondition_constraints, dot
+  use hc_multilevel, only: level_count, prolong, restrict_field, restrict_mask
   implicit none
   private
 
@@ -85,7 +85,7 @@ contains
 
     call check_problem(lattice, initial_gap, candidate, error)
     if (allocated(error)) return
-    allocate (self%level(level_count(lattice%extent)))
+    allocate (self%level(level_count(lattice%extent, smallest_side)))
     do l = 1, size(self%level)
       associate (level => self%level(l))
         if (l == 1) then
@@ -109,20 +109,6 @@ contains
     end do
   end subroutine new_normal_contact
 
-  !> Number of lattices, the given one included.
-  pure integer function level_count(extent)
-    !> Number of columns and rows of the finest window
-    integer, intent(in) :: extent(2)
-    integer :: side
-
-    level_count = 1
-    side = minval(extent)
-    do while (side >= 2*smallest_side)
-      side = side/2
-      level_count = level_count + 1
-    end do
-  end function level_count
-
   !> Bytes that a problem takes, for a window of the given size.
   pure integer(selected_int_kind(18)) function normal_contact_memory(extent, n_threads)
     !> Number of columns and rows of the window
@@ -133,7 +119,7 @@ contains
     integer(long) :: finest
 
     ! fields: gap, candidates, state, and the vectors of the conjugate gradients
-    finest = fft_memory(extent, .true., n_threads) + preconditioner_memory(extent, n_threads) &
+    finest = fft_memory(extent, .true., n_threads) + preconditioner_memory(extent, n_threads, .false.) &
              + 14*8*int(extent(1), long)*extent(2)
     normal_contact_memory = finest + finest/3
   end function normal_contact_memory
@@ -141,7 +127,7 @@ contains
   !> Solve for a normal load or an approach.
   subroutine solve(self, control, target, tolerance, max_sweeps, state, error)
     class(normal_contact_t), intent(inout), target :: self
-    !> load_control or approach_control
+    !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
@@ -186,7 +172,7 @@ contains
   subroutine solve_level(level, control, target, tolerance, max_sweeps, start, state, error)
     !> The problem
     type(level_t), intent(inout) :: level
-    !> load_control or approach_control
+    !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
@@ -201,7 +187,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: p(:), w(:), gap(:), h(:), constraint(:, :)
+    real(wp), allocatable :: p(:), w(:), gap(:), h(:), constraint(:, :), mb(:, :)
     logical, allocatable :: candidate(:), active(:), previous(:)
     real(wp) :: delta, r, residual, inner_tolerance, multiplier(1)
     integer :: n, sweep, iterations, n_constraint
@@ -212,20 +198,20 @@ contains
     h = reshape(level%initial_gap, [n])
     candidate = reshape(level%candidate, [n])
     delta = minval(h, mask=candidate)
-    if (target <= merge(0.0_wp, delta, control == load_control)) then         ! nothing touches
-      state%approach = merge(delta, target, control == load_control)
-      state%gap = level%initial_gap - state%approach
+    if (target <= merge(0.0_wp, delta, control == force_control)) then         ! nothing touches
+      state%motion(normal) = merge(delta, target, control == force_control)
+      state%gap = level%initial_gap - state%motion(normal)
       call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance)
       return
     end if
 
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-    if (control /= load_control) candidate = candidate .and. h < target
+    if (control /= force_control) candidate = candidate .and. h < target
     p = reshape(start, [n])
     active = candidate .and. p > 0.0_wp
     if (.not. any(active)) active = candidate
     allocate (w(n), gap(n))
-    n_constraint = merge(1, 0, control == load_control)
+    n_constraint = merge(1, 0, control == force_control)
     allocate (constraint(n, n_constraint))
     delta = target
     residual = 1.0_wp
@@ -237,16 +223,18 @@ contains
         call restart(level, control, target, h, active, p, w, error)
         if (allocated(error)) return
         if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, active)
+        call precondition_constraints(level, active, constraint, mb, error)
+        if (allocated(error)) return
         inner_tolerance = max(inner_accuracy*min(residual, 1.0_wp), final_accuracy*tolerance)
       else
         ! the set has been found: the linear problem is worth solving to the end
         inner_tolerance = final_accuracy*tolerance
       end if
       inner_tolerance = inner_tolerance*level%compliance*maxval(p)
-      call projected_cg(level, active, constraint, merge(0.0_wp, delta, control == load_control) - h, p, w, &
+      call projected_cg(level, active, constraint, mb, merge(0.0_wp, delta, control == force_control) - h, p, w, &
                         inner_tolerance, max_iterations, multiplier(:n_constraint), residual, iterations, error)
       if (allocated(error)) return
-      if (control == load_control) delta = multiplier(1)
+      if (control == force_control) delta = multiplier(1)
       gap = h + w - delta
       residual = normal_residual(reshape(p, shape(level%candidate)), reshape(gap, shape(level%candidate)), &
                                  level%candidate, level%compliance)
@@ -269,7 +257,7 @@ contains
     end if
     state%pressure = reshape(p, shape(state%pressure))
     state%gap = reshape(gap, shape(state%gap))
-    state%approach = delta
+    state%motion(normal) = delta
     call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance)
   end subroutine solve_level
 
@@ -277,7 +265,7 @@ contains
   subroutine restart(level, control, target, h, active, p, w, error)
     !> The problem
     type(level_t), intent(inout) :: level
-    !> load_control or approach_control
+    !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
@@ -298,7 +286,7 @@ contains
     call level%product(p, w, error)
     if (allocated(error)) return
     ! the prescribed load, or else the least energy under the prescribed approach
-    if (control == load_control) then
+    if (control == force_control) then
       factor = target/(level%lattice%cell_area()*sum(p))
     else
       factor = dot(p, target - h, level%n_threads)/dot(p, w, level%n_threads)

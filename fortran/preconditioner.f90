@@ -10,26 +10,31 @@ module hc_preconditioner
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, convolution_memory
-  use hc_lattice_symbol, only: normal_symbol
+  use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
 
   public :: preconditioner_t, new_preconditioner, preconditioner_memory
 
-  !> Approximate inverse of the normal flexibility.
+  !> Blocks (onto, from) of the symmetric inverse.
+  integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
+
+  !> Approximate inverse of the normal or of the tangential flexibility.
   type :: preconditioner_t
     type(convolution_t), private :: convolution
+    !> Of the tangential flexibility
+    logical, private :: tangential = .false.
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
   contains
-    !> Pressure that causes a given closing of the gap, approximately
+    !> Traction that causes a given displacement, approximately
     procedure :: apply => apply_preconditioner
   end type preconditioner_t
 
 contains
 
   !> Plans and inverse symbol over a window.
-  subroutine new_preconditioner(self, lattice, pair, error, n_threads)
+  subroutine new_preconditioner(self, lattice, pair, error, n_threads, tangential)
     !> Preconditioner to be set up
     type(preconditioner_t), intent(out) :: self
     !> Lattice and window
@@ -40,34 +45,51 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
+    !> For shear tractions instead of the pressure
+    logical, intent(in), optional :: tangential
 
     integer, allocatable :: f(:, :)
-    integer :: length(2), b, i
-    real(wp) :: scale
+    integer :: length(2), b, i, n_component
+    real(wp) :: scale, k(3), matrix(3)
 
+    if (present(tangential)) self%tangential = tangential
+    n_component = merge(2, 1, self%tangential)
     length = grid_length(lattice%extent)
-    call new_convolution(self%convolution, lattice%extent, length, 1, 1, error, n_threads=n_threads)
+    call new_convolution(self%convolution, lattice%extent, length, merge(3, 1, self%tangential), n_component, error, &
+                         n_threads=n_threads)
     if (allocated(error)) return
-    scale = 1.0_wp/(pair%lambda_1*product(real(length, wp)))
-    !$omp parallel do num_threads(self%convolution%n_threads) private(f, i)
+    scale = 1.0_wp/product(real(length, wp))
+    !$omp parallel do num_threads(self%convolution%n_threads) private(f, i, k, matrix)
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
       do i = 1, size(f, 2)
         if (f(1, i) > length(1)/2) cycle
-        self%convolution%spectrum(i, b, 1) = scale/normal_symbol(lattice%basis, length, f(:, i))
+        k = kernel_symbols(lattice%basis, length, f(:, i))
+        if (self%tangential) then
+          ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
+          matrix = [pair%lambda_1*k(symbol_1) + pair%lambda_5*k(symbol_xx), pair%lambda_5*k(symbol_xy), &
+                    pair%lambda_1*k(symbol_1) + pair%lambda_5*(k(symbol_1) - k(symbol_xx))]
+          self%convolution%spectrum(i, b, :) = scale*[matrix(3), -matrix(2), matrix(1)] &
+                                               /(matrix(1)*matrix(3) - matrix(2)**2)
+        else
+          self%convolution%spectrum(i, b, 1) = scale/(pair%lambda_1*k(symbol_1))
+        end if
       end do
     end do
     !$omp end parallel do
-    self%cost = product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
+    self%cost = n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
   end subroutine new_preconditioner
 
   !> Bytes that the preconditioner takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, n_threads)
+  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, n_threads, tangential)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: n_threads
-    preconditioner_memory = convolution_memory(extent, grid_length(extent), 1, 1, n_threads)
+    !> For shear tractions instead of the pressure
+    logical, intent(in) :: tangential
+    preconditioner_memory = convolution_memory(extent, grid_length(extent), merge(3, 1, tangential), &
+                                               merge(2, 1, tangential), n_threads)
   end function preconditioner_memory
 
   !> Side of the periodic grid: an eighth more than the window.
@@ -77,14 +99,18 @@ contains
     grid_length = good_size(extent + (extent + 7)/8)
   end function grid_length
 
-  subroutine apply_preconditioner(self, closing, pressure)
+  subroutine apply_preconditioner(self, displacement, traction)
     class(preconditioner_t), intent(inout) :: self
-    !> Closing of the gap (n_col, n_row, 1) [m]
-    real(wp), intent(in), contiguous :: closing(:, :, :)
-    !> Pressure (n_col, n_row, 1) [Pa]
-    real(wp), intent(out), contiguous :: pressure(:, :, :)
+    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2) [m]
+    real(wp), intent(in), contiguous :: displacement(:, :, :)
+    !> Pressure, or shear tractions (n_col, n_row, 1 or 2) [Pa]
+    real(wp), intent(out), contiguous :: traction(:, :, :)
 
-    call self%convolution%convolve(reshape([1], [1, 1]), closing, pressure)
+    if (self%tangential) then
+      call self%convolution%convolve(tangential_block, displacement, traction)
+    else
+      call self%convolution%convolve(normal_block, displacement, traction)
+    end if
   end subroutine apply_preconditioner
 
 end module hc_preconditioner

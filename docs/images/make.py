@@ -16,10 +16,18 @@ def main() -> None:
         CASES / "crossed_cylinders.toml",
         overrides={"body.2.surface.angle": "45 deg", "grid.spacing": "0.05 mm"},
     ).run()
+    fretting = Case.from_toml(CASES / "dissimilar_fretting.toml", overrides={"grid.spacing": "1.75 um"}).run()
+    mindlin = Case.from_toml(CASES / "cattaneo_mindlin.toml").run()
+    loop = Case.from_toml(CASES / "mindlin_loop.toml").run()
     figures = {
         "hertz_spheres": plotting.overview(spheres),
         "contact_boundary": plotting.contact_boundary(coarse),
         "crossed_cylinders": plotting.overview(cylinders),
+        "dissimilar_fretting": plotting.overview(fretting, 25),
+        "fretting_zones": plotting.zones(fretting, [10, 11, 12, 15, 20, 25, 30, 35]),
+        "fretting_tractions": plotting.tractions(fretting, [10, 11, 15, 20, 25, 30, 35, 40]),
+        "cattaneo_mindlin": plotting.tractions(mindlin, [13, 19, 25, 31, 37]),
+        "mindlin_loop": plotting.loop(loop),
         **{name.replace("-", "_"): draw() for name, draw in plotting_influence.FIGURES.items()},
     }
     for name, figure in figures.items():

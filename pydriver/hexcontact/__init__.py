@@ -21,15 +21,18 @@ if TYPE_CHECKING:
     from .case import Case
     from .lattice import Lattice
     from .native import ElasticPair, FlexibilityOperator, NormalContact
+    from .native_friction import ContactState, FrictionalContact
     from .result import Result, Step
     from .store import open_result
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOME = {
     "Case": "case",
+    "ContactState": "native_friction",
     "ElasticPair": "native",
     "FlexibilityOperator": "native",
+    "FrictionalContact": "native_friction",
     "Lattice": "lattice",
     "NormalContact": "native",
     "Result": "result",
@@ -40,10 +43,12 @@ _MODULES = ("analytic", "influence", "plotting")
 
 __all__ = [
     "Case",
+    "ContactState",
     "ConvergenceError",
     "DeckError",
     "ElasticPair",
     "FlexibilityOperator",
+    "FrictionalContact",
     "HexcontactError",
     "Lattice",
     "NormalContact",

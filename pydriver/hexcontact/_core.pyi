@@ -1,4 +1,5 @@
 from typing import Any
 
 hc_f2py_api: Any
+hc_f2py_friction: Any
 hc_f2py_influence: Any

@@ -219,3 +219,71 @@ def goodman_stick_ratio(beta: float, friction_coefficient: float) -> float:
         return float(z / k - ratio * special.ellipkm1(k * k))  # K'(k) = K(m = 1 - k^2)
 
     return float(np.tanh(optimize.brentq(residual, 1e-150, 40.0, xtol=1e-15)))
+
+
+# ------------------------------------------------------------------------------ plane problems
+
+
+@dataclass(frozen=True)
+class PlaneCattaneo:
+    """Cylinders of alike materials pressed by P', then sheared across their axes by Q' (Cattaneo, Mindlin).
+
+    Plane strain; exact whatever Poisson's ratio is. The middle of a contact much longer than wide.
+
+    Parameters
+    ----------
+    friction_coefficient : float
+        mu > 0.
+    normal_load : float
+        P', N/m.
+    half_width : float
+        Half the width of the contact b, m.
+    """
+
+    friction_coefficient: float
+    normal_load: float
+    half_width: float
+
+    def stick_half_width(self, load: float) -> float:
+        """Half the width (m) of the stick strip under Q' (N/m): c = b sqrt(1 - Q'/mu P')."""
+        share = abs(load) / (self.friction_coefficient * self.normal_load)
+        if share > 1.0:
+            raise ValueError("the tangential load is larger than mu P'")
+        return float(self.half_width * np.sqrt(1.0 - share))
+
+    def traction(self, x: ArrayLike, load: float) -> Array:
+        """Shear traction (Pa) at distance x (m) from the middle under a first loading to Q' (N/m)."""
+        b, c = self.half_width, self.stick_half_width(load)
+        x2 = np.asarray(x, dtype=float) ** 2
+        slope = 2.0 * self.friction_coefficient * self.normal_load / (np.pi * b**2)
+        parts = [np.sqrt(np.maximum(half**2 - x2, 0.0)) for half in (b, c)]
+        return np.asarray(np.sign(load) * slope * (parts[0] - parts[1]))
+
+
+def goodman_stick_ratio_plane(beta: float, friction_coefficient: float) -> float:
+    """Stick ratio c/b of cylinders pressed monotonically where shear does not move the pressure.
+
+    Solves |beta| K(k) = mu K'(k), k = c/b (Spence). It follows from a flat punch, p = P'/(pi sqrt(b^2-x^2)),
+    of which all self-similar contacts are made: a bounded traction in the stick strip needs
+    integral_-c^c [|beta| p(x) - (mu/pi) integral_{c<|t|<b} sgn(t) p(t)/(t-x) dt]/sqrt(c^2-x^2) dx = 0.
+
+    Parameters
+    ----------
+    beta : float
+        Dundurs' constant, not 0.
+    friction_coefficient : float
+        mu > 0.
+
+    Returns
+    -------
+    float
+        c/b in (0, 1).
+    """
+    if beta == 0.0 or not friction_coefficient > 0.0:
+        raise ValueError("beta must not be 0 and the friction coefficient must be positive")
+    ratio = friction_coefficient / abs(beta)
+
+    def residual(z: float) -> float:  # m = k^2 = 1/(1 + exp(-z)) resolves both ends
+        return float(special.ellipk(special.expit(z)) - ratio * special.ellipk(special.expit(-z)))
+
+    return float(np.sqrt(special.expit(optimize.brentq(residual, -700.0, 36.0, xtol=1e-14))))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import deck as decks
 from . import grid as grids
-from . import native
+from . import native, native_friction
 from .case_arguments import as_toml, body_keys, given, with_radians
 from .case_checks import algorithm_of, field_problems, touching_problems
 from .deck import Deck
@@ -70,7 +70,10 @@ class SolverSettings:
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """What is kept of a run; see [output] in the deck reference. No fields: pressure, gap and zone."""
+    """What is kept of a run; see [output] in the deck reference.
+
+    No fields: all that the algorithm yields, except for the displacements of the bodies.
+    """
 
     file: Path | None = None
     fields: tuple[str, ...] = ()
@@ -283,7 +286,7 @@ class Case:
         self.output = OutputSettings(
             Path(deck.output.file) if deck.output.file else None, deck.output.fields or (), deck.output.every
         )
-        mu = 0.0 if algorithm == "frictionless" else self.friction_coefficient
+        mu = self.friction_coefficient if self.frictional else None
         self.load_steps, of_history = load_steps(deck.load, mu)
         problems += of_history + field_problems(deck, algorithm)
         self._surface_gap: Separation | None = None
@@ -306,6 +309,11 @@ class Case:
         )
         self.window_fixed = grids.is_fixed(deck.grid)
         self.lattice = self._size(deck.grid, source, lattice)
+
+    @property
+    def frictional(self) -> bool:
+        """Whether shear tractions are solved for."""
+        return self.solver.algorithm != "frictionless"
 
     # --- what solving needs ---------------------------------------------------------------------------------
 
@@ -356,14 +364,15 @@ class Case:
 
     def method_for(self, lattice: Lattice) -> Method:
         """Return the method to use on a window, "direct" or "fft"; decides what "auto" means."""
-        small = lattice.size <= MOST_DIRECT_NODES
-        return (
-            "direct" if self.solver.method == "direct" or (self.solver.method == "auto" and small) else "fft"
-        )
+        if self.solver.method == "auto":
+            # with friction transforms are faster on any window, without it they need a few nodes for that
+            return "direct" if lattice.size <= MOST_DIRECT_NODES and not self.frictional else "fft"
+        return "direct" if self.solver.method == "direct" else "fft"
 
     def memory_needed(self, lattice: Lattice) -> int:
         """Return the memory (bytes) that solving on a window takes."""
-        return native.memory_needed(self.method_for(lattice), lattice.n_row, lattice.n_col)
+        method, shape = self.method_for(lattice), lattice.shape
+        return (native_friction if self.frictional else native).memory_needed(method, *shape)
 
     def run(
         self,

@@ -18,8 +18,8 @@ FRICTIONLESS_FIELDS = (
 
 def algorithm_of(deck: Deck) -> tuple[str, list[Problem]]:
     """Return the algorithm that a deck asks for, and what stands against it."""
-    given, mu = deck.solver.algorithm, deck.friction.coefficient if deck.friction else None
-    algorithm = given or ("incremental" if mu else "frictionless")
+    mu = deck.friction.coefficient if deck.friction else None
+    algorithm = deck.solver.algorithm or ("incremental" if mu else "frictionless")
     problems = []
     if algorithm == "frictionless" and mu:
         sentence = 'expected 0, since solver.algorithm = "frictionless"'
@@ -29,10 +29,6 @@ def algorithm_of(deck: Deck) -> tuple[str, list[Problem]]:
             f'missing; expected a number of at least 0 (or inf), since solver.algorithm = "{algorithm}"'
         )
         problems.append(Problem(("friction", "coefficient"), MISSING, sentence))
-    if algorithm != "frictionless":
-        # The one place that holds friction back.
-        key, value = (("solver", "algorithm"), given) if given else (("friction", "coefficient"), mu)
-        problems.append(Problem(key, value, "this version solves frictionless contact only"))
     return algorithm, problems
 
 

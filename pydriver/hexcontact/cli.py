@@ -5,6 +5,7 @@ Every command imports what it needs when it runs, so that ``hexcontact --help`` 
 
 from __future__ import annotations
 
+import enum
 import functools
 import os
 import signal
@@ -17,12 +18,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, TypeVar
 
 import typer
 
-from . import __version__
+from . import __version__, plot_choices
 from .errors import DeckError, HexcontactError, ResourceError
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from .case import Case
     from .result import Result
     from .store import Store
@@ -159,6 +158,14 @@ Settings = Annotated[
 _PICTURES = (".png", ".pdf", ".svg")
 
 
+class Arrows(enum.StrEnum):
+    """Arrows that a zone map may have."""
+
+    none = "none"
+    traction = "traction"
+    slip = "slip"
+
+
 def _case(deck: Path, settings: list[str] | None) -> Case:
     from .case import Case
 
@@ -224,7 +231,11 @@ def run(
             _leave(store, 130 if isinstance(signaled, KeyboardInterrupt) else 143)
         finally:
             signal.signal(signal.SIGTERM, previous)
-    picture = _draw(_open(store.path), "overview", -1, store.path.with_suffix(".png")) if plot else None
+    picture = None
+    if plot:
+        from .plot_command import picture_of
+
+        picture = picture_of([_open(store.path)], "overview", store.path.with_suffix(".png"), {})
     if not quiet:
         _summarize(case, histories, target, picture)
 
@@ -234,7 +245,7 @@ def _summarize(case: Case, histories: list[Any], target: Path, picture: Path | N
 
     console, last = summary.console(), histories[-1]
     if len(histories) > 1:
-        console.print(summary.table("History", summary.HISTORY_HEADERS, summary.history_rows(histories)))
+        console.print(summary.history_table(histories, console))
     console.print(summary.pairs(f"Last load step of {case.title!r}" if case.title else "Last load step",
                                 summary.step_rows(last)))  # fmt: skip
     if rows := summary.hertz_rows(case, last):
@@ -246,12 +257,13 @@ def _summarize(case: Case, histories: list[Any], target: Path, picture: Path | N
 @_guarded
 def check(deck: DeckFile, settings: Settings = None) -> None:
     """Read a deck, report everything that is wrong with it, and say what would be run."""
-    from . import solve, summary
+    from . import summary
+    from .window import require_memory
 
     case = _case(deck, settings)
     console = summary.console()
     console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
-    solve.require_memory(case, case.lattice)
+    require_memory(case, case.lattice)
     _target(case, deck)
     console.print(f"{deck} is ready to run", soft_wrap=True)
 
@@ -303,7 +315,7 @@ def info(file: ResultFile) -> None:
     case, console = summary.case_of(result), summary.console()
     histories = result.history.to_dict("records")
     console.print(summary.pairs(result.case_title, summary.file_rows(result)))
-    console.print(summary.table("History", summary.HISTORY_HEADERS, summary.history_rows(histories)))
+    console.print(summary.history_table(histories, console))
     console.print(summary.pairs("Last load step", summary.step_rows(histories[-1])))
     if case is not None and (rows := summary.hertz_rows(case, histories[-1])):
         console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
@@ -315,23 +327,46 @@ def _open(path: Path) -> Result:
     return open_result(path)
 
 
-@app.command(epilog="Example: hexcontact plot hertz_spheres.nc --what section --output section.pdf")
+@app.command(
+    help=plot_choices.help_text(),
+    epilog="Example: hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
+)
 @_guarded
 def plot(
-    file: Annotated[
-        Path | None,
-        typer.Argument(metavar="[FILE]", help="The result, a netCDF file.", show_default=False),
-    ] = None,
-    what: Annotated[
-        str,
-        typer.Option(
-            "--what",
-            "-w",
-            help="overview, pressure, section, boundary or history; all: each in a file. Without FILE: "
-            "pyramid (Figure 5.6) or load-shapes (Figure 7.3).",
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE",
+            help="The result, a netCDF file; several for zones, outlines and compliance.",
+            show_default=False,
         ),
-    ] = "overview",
-    step: Annotated[int, typer.Option("--step", "-s", help="Load step, the first is 1; -1: the last.")] = -1,
+    ] = None,
+    what: Annotated[str, typer.Option("--what", "-w", help="Which picture; see above.")] = "overview",
+    step: Annotated[
+        str | None,
+        typer.Option(
+            "--step",
+            "-s",
+            metavar="N,...",
+            help="Load step, the first is 1; -1, the default: the last. Some "
+            "pictures show several: 10,20,30.",
+        ),
+    ] = None,
+    angle: Annotated[
+        str | None,
+        typer.Option(metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."),
+    ] = None,
+    through: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."),
+    ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="What the history is drawn over, as tangential_load_x."),
+    ] = None,
+    arrows: Annotated[
+        Arrows | None, typer.Option(help="Arrows on zone maps: shear traction, or slip in the step.")
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -339,43 +374,31 @@ def plot(
         ),
     ] = None,
 ) -> None:
-    """Draw a result, or what the influence functions and load shapes look like."""
-    from . import plotting_influence
-    from .plotting import FIGURES
+    """Draw a result, or what belongs to none; its help is made of the choices there are."""
+    from . import plot_command as command
 
-    general = plotting_influence.FIGURES
-    if what not in (known := [*FIGURES, "all", *general]):
-        from .messages import did_you_mean, listed
-
-        raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
-    if (file is None) != (what in general):
-        expected = "expected no FILE" if file else "expected the FILE of a result"
-        raise DeckError(f"--what {what}: {expected}")
-    if file is None:
-        print(f"written: {_save(general[what], what, output or Path(f'{what}.png'))}")
+    command.refuse_unknown(what, bool(files))
+    given = {
+        "step": None if step is None else command.steps_of(step),
+        "angle": None if angle is None else command.angle_of(angle),
+        "through": None if through is None else command.point_of(through),
+        "over": over,
+        "arrows": None if arrows is None else arrows.value,
+    }
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if not files:
+        if chosen:
+            raise DeckError(f"--{next(iter(chosen))}: not an option of --what {what}")
+        print(f"written: {command.general_picture(what, output or Path(f'{what}.png'))}")
         return
-    result, first = _open(file), output or file.with_suffix(".png")
-    for name in FIGURES if what == "all" else [what]:
-        named = what == "all" or output is None
-        picture = first.with_stem(f"{first.stem}_{name}") if named else first
-        print(f"written: {_draw(result, name, step, picture)}")
-
-
-def _draw(result: Result, what: str, step: int, picture: Path) -> Path:
-    """Draw one picture of a result into a file."""
-    from .plotting import FIGURES
-
-    of_step = () if what == "history" else (step,)
-    return _save(lambda: FIGURES[what](result, *of_step), f"{what} of {result.path}", picture)
-
-
-def _save(draw: Callable[[], Figure], what: str, picture: Path) -> Path:
-    """Write a picture."""
-    try:
-        draw().savefig(picture, dpi=200)
-    except (IndexError, ValueError) as error:  # no such step, nothing in contact, no such kind of file
-        raise DeckError(f"cannot draw {what}: {error}") from error
-    return picture
+    results, first = [_open(file) for file in files], output or files[0].with_suffix(".png")
+    if what == "all":
+        if len(files) > 1:
+            raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
+        print("\n".join(command.all_pictures(results[0], first, chosen)))
+        return
+    picture = first if output else first.with_stem(f"{first.stem}_{what}")
+    print(f"written: {command.picture_of(results, what, picture, chosen)}")
 
 
 @app.command(epilog="Example: hexcontact verify")

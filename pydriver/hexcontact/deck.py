@@ -138,17 +138,17 @@ class Solver(Table):
     """How the contact problem is solved."""
 
     algorithm: Annotated[str, Word(ALGORITHMS)] | None = Field(
-        None, description="frictionless without a [friction] table, else incremental"
+        None, description="incremental where there is friction, else frictionless"
     )
     method: Annotated[str, Word(METHODS)] = Field(
         "auto",
-        description="direct: LAPACK on the full matrix; fft: matrix-free; auto: by the size of the window",
+        description="direct: LAPACK on the full matrix; fft: matrix-free; auto: fft, but direct on a small window without friction",
     )
     tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-14, at_most=0.1)] = Field(
         1e-8, description="bound on every residual at the end of every load step"
     )
     coupling: Annotated[str, Word(("full", "goodman"))] = Field(
-        "full", description="goodman: shear does not move the pressure"
+        "full", description="goodman: shear does not move the pressure (for comparison)"
     )
 
 
@@ -243,7 +243,7 @@ class Output(Table):
     file: Annotated[str, Text()] | None = Field(None, description="netCDF file of the result")
     fields: (
         Annotated[tuple[str, ...], Several(Word(FIELDS), "field names", '["pressure", "gap", "zone"]')] | None
-    ) = Field(None, description="fields to keep; pressure, gap and zone if absent")
+    ) = Field(None, description="fields to keep; all but the displacements of the bodies if absent")
     every: Count = Field(
         1, description="keep the fields of every n-th step (the history always holds all steps)"
     )

@@ -126,6 +126,14 @@ def edge_radius(
     return float(np.sqrt(-start / slope * scale)) if slope < 0.0 < start else float("nan")
 
 
+def pressure_center(x: Array, y: Array, pressure: Array) -> tuple[float, float]:
+    """Return the centroid of a pressure (m); nan if there is none."""
+    total = float(pressure.sum())
+    if not total > 0.0:
+        return float("nan"), float("nan")
+    return float((pressure * x).sum()) / total, float((pressure * y).sum()) / total
+
+
 def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
     """Ellipse with the second moments of the nodes of a zone (a uniform ellipse has variance a^2/4 along a).
 

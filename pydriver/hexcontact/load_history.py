@@ -8,7 +8,7 @@ reference.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -70,6 +70,24 @@ class LoadStep:
     y: Target
     twist: Target
 
+    @property
+    def targets(self) -> tuple[Target, Target, Target, Target]:
+        """What drives z, x, y and the twist, in this order."""
+        return self.z, self.x, self.y, self.twist
+
+    def values(self, begun: Mapping[str, float]) -> tuple[float, ...]:
+        """Return the values to prescribe for z, x, y and the twist.
+
+        Parameters
+        ----------
+        begun : mapping of str to float
+            Loads and motions when the segment began, by the names of `hexcontact.deck.LOADS`.
+        """
+        return tuple(
+            target.at(begun[LOADS[motion][target.control == "displacement"]])
+            for motion, target in zip(MOTIONS, self.targets, strict=True)
+        )
+
 
 class _Stretch(NamedTuple):
     """A segment as it is run: its key in the deck, and its label."""
@@ -88,7 +106,7 @@ START = {
 
 
 def load_steps(
-    loads: Sequence[Load], friction_coefficient: float
+    loads: Sequence[Load], friction_coefficient: float | None
 ) -> tuple[tuple[LoadStep, ...], list[Problem]]:
     """Unroll the [[load]] segments.
 
@@ -96,8 +114,8 @@ def load_steps(
     ----------
     loads : sequence of Load
         The segments, each valid on its own.
-    friction_coefficient : float
-        Coefficient of friction; inf allowed.
+    friction_coefficient : float or None
+        Coefficient of friction; inf allowed. None: tangential loads and motions are not solved for at all.
 
     Returns
     -------
@@ -184,14 +202,18 @@ def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virg
     return Target(goal.control, begin + fraction * (goal.value - begin))
 
 
-def _overload(key: tuple[str | int, ...], segment: Segment, step: LoadStep, mu: float) -> Iterator[Problem]:
+def _overload(
+    key: tuple[str | int, ...], segment: Segment, step: LoadStep, mu: float | None
+) -> Iterator[Problem]:
     """Yield the tangential loads of a step that friction cannot carry, as far as the deck alone tells."""
     tangential: tuple[tuple[Motion, Target], ...] = ("x", step.x), ("y", step.y), ("twist", step.twist)
-    if mu == 0:
+    if not mu:
         for motion, target in tangential:
-            name = LOADS[motion][0 if target.control == "force" else 1]
+            by_force = target.control == "force"
+            name = LOADS[motion][0 if by_force else 1]
             given = getattr(segment, name)
-            if target.value != 0 and given is not None:
+            # without friction, but solved for all the same, the surfaces may be moved over each other
+            if target.value != 0 and given is not None and (by_force or mu is None):
                 yield Problem((*key, name), given, "expected 0, since the contact is frictionless")
         return
     if step.z.control != "force" or any(target.from_start for _, target in (("z", step.z), *tangential)):

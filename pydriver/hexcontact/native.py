@@ -34,7 +34,7 @@ def raise_for(code: int, message: bytes) -> None:
         raise _ERRORS.get(code, HexcontactError)(message.decode().strip())
 
 
-def _field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
+def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
     """Return finite values over the window as one contiguous vector."""
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.shape != lattice.shape:
@@ -44,7 +44,8 @@ def _field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64
     return array.ravel()
 
 
-def _method(name: str) -> int:
+def method_code(name: str) -> int:
+    """Return the number of a method in the core."""
     if name not in _METHODS:
         raise DeckError(f"method = {name!r}: expected 'direct' or 'fft'")
     return _METHODS[name]
@@ -137,7 +138,7 @@ class FlexibilityOperator:
         self.lattice = lattice
         extent = [lattice.n_col, lattice.n_row]
         self._handle, code, message = _api.create_operator(
-            _method(method), lattice.basis.T, extent, pair.as_array(), threads
+            method_code(method), lattice.basis.T, extent, pair.as_array(), threads
         )
         raise_for(code, message)
         weakref.finalize(self, _api.free_handle, self._handle)
@@ -160,7 +161,8 @@ class FlexibilityOperator:
         zero = np.zeros(self.lattice.shape)
         named = {"pressure": pressure, "traction_x": traction_x, "traction_y": traction_y}
         columns = [
-            _field(zero if value is None else value, self.lattice, name) for name, value in named.items()
+            checked_field(zero if value is None else value, self.lattice, name)
+            for name, value in named.items()
         ]
         traction = np.array(columns).T
         displacement, code, message = _api.apply_operator(self._handle, traction)
@@ -242,12 +244,12 @@ class NormalContact:
         self._mask = mask
         self._outside = np.asarray(initial_gap, dtype=np.float64)[~mask]
         self._handle, code, message = _api.create_normal_contact(
-            _method(method),
+            method_code(method),
             lattice.basis.T,
             [lattice.col_first, lattice.row_first],
             [lattice.n_col, lattice.n_row],
             pair.as_array(),
-            _field(gap, lattice, "initial_gap"),
+            checked_field(gap, lattice, "initial_gap"),
             mask.ravel().astype(np.int32),
             threads,
         )
@@ -331,4 +333,4 @@ def memory_needed(
     threads
         Threads that will be used.
     """
-    return int(_api.memory_needed(_method(method), [n_col, n_row], int(operator_only), threads))
+    return int(_api.memory_needed(method_code(method), [n_col, n_row], int(operator_only), threads))

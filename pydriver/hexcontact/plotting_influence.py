@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from .analytic import hertz_sphere
-from .plotting import EXACT, GUIDE, STYLE
+from .plotting_style import EXACT, GUIDE, STYLE
 
 Array = NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     if math.isnan(value):
         return "-"
     if value == 0 or math.isinf(value):
-        return f"{value:g} {unit}".rstrip()
+        return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
     rounded = float(f"{value:.{digits - 1}e}")
     power = 3 * math.floor(math.log10(abs(rounded)) / 3)
     if not unit or power not in _PREFIXES:
@@ -95,30 +95,34 @@ class Lines(Reporter):
 
 
 class Bar(Reporter):
-    """A progress bar with the latest step beside it."""
+    """A progress bar with the latest step below it."""
 
     @contextlib.contextmanager
     def watching(self, title: str, steps: int) -> Iterator[None]:
         """Show the bar; it vanishes at the end."""
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
-        from rich.progress import TimeElapsedColumn as Elapsed
+        from rich.console import Console, Group
+        from rich.live import Live
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            SpinnerColumn,
+            TextColumn,
+            TimeElapsedColumn,
+        )
+        from rich.text import Text
 
-        columns = [
-            SpinnerColumn(),
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            Elapsed(),
-        ]
-        latest = TextColumn("{task.fields[latest]}", style="dim")
-        with Progress(*columns, latest, console=Console(stderr=True), transient=True) as self._bar:
-            self._task = self._bar.add_task(title, total=steps, latest="")
+        columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()]
+        self._bar = Progress(*columns, TimeElapsedColumn())
+        self._task = self._bar.add_task(title, total=steps)
+        self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
+        with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
             yield
 
     def finished(self, step: Step) -> None:
         """Move the bar on by one step."""
-        self._bar.update(self._task, advance=1, latest=describe(step.history, short=True))
+        self._latest.plain = "  " + describe(step.history, short=True)
+        self._bar.update(self._task, advance=1)
 
 
 def reporter(quiet: bool = False, stream: IO[str] | None = None) -> Reporter:
@@ -129,19 +133,89 @@ def reporter(quiet: bool = False, stream: IO[str] | None = None) -> Reporter:
     return Bar() if stream is sys.stderr and stream.isatty() else Lines(stream)
 
 
-def describe(history: Any, short: bool = False) -> str:
+# --- what is said about a step --------------------------------------------------------------------
+
+LOADS_AND_MOTIONS = {  # with friction: what it is called, unit
+    "normal_load": ("P", "N"),
+    "tangential_load_x": ("Qx", "N"),
+    "tangential_load_y": ("Qy", "N"),
+    "torque": ("Mz", "N m"),
+    "approach": ("approach", "m"),
+    "shift_x": ("shift x", "m"),
+    "shift_y": ("shift y", "m"),
+    "twist": ("twist", "rad"),
+}
+RESIDUALS = {  # by the symbol of the theory
+    "R_n": "residual_normal",
+    "R_t": "residual_tangential",
+    "R_P": "residual_force",
+    "R_Q": "residual_shear_force",
+    "R_M": "residual_torque",
+}
+_NOTICED = 1e-6  # share of the normal load or approach from which something tangential is worth showing
+_NOISE = 1e-9  # ... below which it is written as zero
+
+
+def _scale(name: str, history: Mapping[str, Any]) -> float:
+    """Return what a load or motion of a step is to be compared with to tell whether it is noise."""
+    load, approach = abs(history["normal_load"]), abs(history["approach"])
+    length = history["contact_radius"]
+    if name in ("normal_load", "approach"):
+        return 0.0
+    if name == "torque":
+        return float(load * length)
+    if name == "twist":
+        return float(approach / length) if length else math.inf
+    return float(load if name.startswith("tangential") else approach)
+
+
+def worth_showing(histories: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return those of `LOADS_AND_MOTIONS` to show: the normal ones, and others that are more than noise."""
+    shown = {"normal_load", "approach"}
+    for history in histories:
+        shown |= {
+            name
+            for name in LOADS_AND_MOTIONS.keys() - shown
+            if abs(history.get(name, 0.0)) > _NOTICED * _scale(name, history)
+        }
+    return [name for name in LOADS_AND_MOTIONS if name in shown]
+
+
+def load_or_motion(name: str, history: Mapping[str, Any]) -> str:
+    """Write one of `LOADS_AND_MOTIONS`, noise as zero."""
+    value = float(history[name])
+    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, LOADS_AND_MOTIONS[name][1])
+
+
+def stick_share(history: Mapping[str, Any]) -> str:
+    """Write how much of the contact area sticks."""
+    area = history["contact_area"]
+    return f"{100 * history['stick_area'] / area:.1f} %" if area else "-"
+
+
+def residuals(history: Mapping[str, Any]) -> dict[str, float]:
+    """Return the residuals that there are, by the symbol of the theory."""
+    found = {sign: float(history.get(name, math.nan)) for sign, name in RESIDUALS.items()}
+    return {sign: value for sign, value in found.items() if not math.isnan(value)}
+
+
+def is_frictional(history: Mapping[str, Any]) -> bool:
+    """Tell whether a step was solved with friction."""
+    return "stick_area" in history
+
+
+def describe(history: Mapping[str, Any], short: bool = False) -> str:
     """Return a line of text about a step from its history."""
-    parts = [
-        str(history.get("label", "")),
-        f"P {quantity(history['normal_load'], 'N')}",
-        f"approach {quantity(history['approach'], 'm')}",
-        f"p_max {quantity(history['max_pressure'], 'Pa')}",
-    ]
+    parts = [str(history.get("label", ""))]
+    for name in worth_showing([history]):
+        parts.append(f"{LOADS_AND_MOTIONS[name][0]} {load_or_motion(name, history)}")
+    if is_frictional(history):
+        parts += [f"stick {stick_share(history)}", f"R {max(residuals(history).values()):.1e}"]
+    else:
+        parts.append(f"p_max {quantity(history['max_pressure'], 'Pa')}")
+        if not short:
+            parts.append(f"radius {quantity(history['contact_radius'], 'm')}")
+            parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
     if not short:
-        parts += [
-            f"radius {quantity(history['contact_radius'], 'm')}",
-            f"R_n {history['residual_normal']:.1e}",
-            f"R_P {history['residual_force']:.1e}",
-            quantity(history["seconds"], "s", 3),
-        ]
+        parts.append(quantity(history["seconds"], "s", 3))
     return "  ".join(part for part in parts if part)

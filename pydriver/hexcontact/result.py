@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from .lattice import Lattice
 
 _COORDINATES = ("step", "row", "col", "x", "y")
+_TOLD = (  # of the last step when a result is printed
+    *("normal_load", "tangential_load_x", "tangential_load_y", "approach", "shift_x", "shift_y"),
+    *("contact_radius", "stick_radius", "max_pressure", "residual_normal", "residual_tangential"),
+)
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
     *("lattice_spacing", "lattice_basis", "lattice_origin"),
@@ -403,9 +407,9 @@ class Result:
             f", {sizes['row']} x {sizes['col']} nodes, spacing {spacing:.6g} m",
         ]
         last = self.dataset.isel(step=-1)
-        for name in ("normal_load", "approach", "contact_radius", "max_pressure", "residual_normal"):
+        for name in _TOLD:
             if name in self.dataset and not math.isnan(value := float(last[name])):
-                lines.append(f"  {name:<16} {value:.6g} {VARIABLES[name].units.replace('1', '')}".rstrip())
+                lines.append(f"  {name:<19} {value:.6g} {VARIABLES[name].units.replace('1', '')}".rstrip())
         fields = [name for name in FIELDS if name in self.dataset]
         lines.append(f"  fields: {', '.join(fields)}")
         return "\n".join(lines)

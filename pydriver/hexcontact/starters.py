@@ -41,7 +41,7 @@ _DECK = """# {about}
 # Numbers carry their unit; bare numbers are SI. All keys: docs/deck.md.
 # Check it with "hexcontact check {name}.toml", run it with "hexcontact run {name}.toml".
 title = "{title}"
-{bodies}
+{bodies}{friction}
 [grid]
 {fineness:<33} {comment}
 # extent = ["2 mm", "2 mm"]       # the window fits itself to the contact; this fixes it
@@ -52,11 +52,15 @@ title = "{title}"
 
 [[load]]                          # add more [[load]] tables for a history
 {load}
-steps = {steps}
-
+{steps}
 # [output]
 # file = "{name}.nc"
 # fields = ["pressure", "gap", "zone"]
+"""
+
+_FRICTION = """
+[friction]
+coefficient = 0.3                 # inf: no slip; without this table the contact is frictionless
 """
 
 _SMOOTH = "nodes_in_radius = 20"
@@ -75,6 +79,7 @@ class _Starter(NamedTuple):
     load: str
     steps: int = 1
     sharp: bool = False
+    friction: str = ""
 
 
 _STARTERS = {
@@ -86,6 +91,25 @@ _STARTERS = {
         'normal_load = "100 N"             # or approach = "5 um"\n'
         'ramp = "cubic"                    # the contact radius grows evenly; without it, the load does',
         steps=5,
+    ),
+    "fretting": _Starter(
+        "A sphere pressed on a flat, then sheared to and fro: stick, slip and a loop of force over shift.",
+        "Sphere on flat, pressed and sheared",
+        _BODIES,
+        'surface = { shape = "sphere", radius = "10 mm" }',
+        'normal_load = "100 N"\n'
+        "steps = 5\n"
+        'label = "press"\n'
+        "\n"
+        "[[load]]\n"
+        "repeat = 1                        # turns\n"
+        "path = [                          # friction carries up to 0.3 x 100 N\n"
+        '  { tangential_load_x = "24 N", steps = 8, label = "to" },      # or shift_x = "1 um"\n'
+        '  { tangential_load_x = "-24 N", steps = 12, label = "fro" },\n'
+        '  { tangential_load_x = "24 N", steps = 12, label = "back" },\n'
+        "]",
+        steps=0,
+        friction=_FRICTION,
     ),
     "paraboloid": _Starter(
         "A surface with two radii of curvature on a flat: Hertz's elliptic contact.",
@@ -161,5 +185,6 @@ def text(name: str) -> str:
         fineness=_SHARP if starter.sharp else _SMOOTH,
         comment=_SHARP_COMMENT if starter.sharp else _SMOOTH_COMMENT,
         load=starter.load,
-        steps=starter.steps,
+        steps=f"steps = {starter.steps}\n" if starter.steps else "",
+        friction=starter.friction,
     )

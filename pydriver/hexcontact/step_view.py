@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
@@ -9,14 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .result import Result
+from .variables import NOT_KEPT
 
 if TYPE_CHECKING:
     import xarray
 
     from .analytic import EllipticContact
 
+    Results = Result | xarray.Dataset | Sequence[Result | xarray.Dataset]
+
 Array = NDArray[np.float64]
 
+STICK = 1  # value of zone at a sticking node
+SIMILAR = 1e-9  # |beta| up to which shear and pressure do not feel each other
 _PREFIX = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
@@ -51,7 +58,11 @@ class StepView:
     Parameters
     ----------
     title : str
-        Title of the case with the step (of several) and its normal load.
+        Title of the case with the step (of several) and its loads.
+    number : int
+        Number of the step.
+    data : xarray.Dataset
+        All quantities of the step; the attributes are those of the result.
     x, y, pressure : ndarray, shape (n_row, n_col)
         Coordinates of the nodes and contact pressure.
     contact : ndarray of bool, shape (n_row, n_col)
@@ -67,6 +78,8 @@ class StepView:
     """
 
     title: str
+    number: int
+    data: xarray.Dataset
     x: Array
     y: Array
     pressure: Array
@@ -95,18 +108,20 @@ class StepView:
         if not np.isfinite(pressure).any():
             raise ValueError(f"the pressure of step {int(one['step'])} was not kept (output.every)")
         x, y = dataset["x"].values, dataset["y"].values
-        known = _hertz(dataset, float(one["normal_load"]))
-        if known is None:
+        gap, load = QuadraticGap.of(dataset), float(one["normal_load"])
+        if gap is None:
             weight = max(float(pressure.sum()), np.finfo(float).tiny)
             center = (float((pressure * x).sum() / weight), float((pressure * y).sum() / weight))
         else:
-            center = known[1]
+            center = gap.center
         named = [str(dataset.attrs.get("title", ""))]
         if dataset.sizes["step"] > 1:
             named.append(f"step {int(one['step'])}")
-        title = ", ".join(filter(None, named)) + f" (P = {worded(float(one['normal_load']), 'N')})"
+        title = ", ".join(filter(None, named)) + f" ({_loads(one)})"
         return cls(
             title=title.lstrip(),
+            number=int(one["step"]),
+            data=one,
             x=x,
             y=y,
             pressure=pressure,
@@ -114,18 +129,71 @@ class StepView:
             spacing=float(dataset.attrs["lattice_spacing"]),
             basis=np.asarray(dataset.attrs["lattice_basis"], dtype=float).reshape(2, 2),
             center=center,
-            hertz=known[0] if known else None,
+            hertz=gap.contact(load) if gap and load > 0.0 else None,
         )
 
-    def at(self, x: Array, y: Array) -> Array:
-        """Pressure at points of the plane (m): linear on the lattice's triangles, 0 outside the window."""
+    @property
+    def friction(self) -> float:
+        """Coefficient of friction; 0 for a contact that was solved without friction."""
+        if self.data.attrs.get("algorithm", "frictionless") == "frictionless":
+            return 0.0
+        return float(self.data.attrs.get("friction_coefficient", 0.0))
+
+    @property
+    def hertz_holds(self) -> bool:
+        """Whether the pressure is that of Hertz: no friction, or similar bodies."""
+        similar = abs(float(self.data.attrs.get("dundurs_beta", 1.0))) <= SIMILAR
+        return self.hertz is not None and (self.friction == 0.0 or similar)
+
+    @property
+    def tangential_load(self) -> float:
+        """Tangential load, N: its size, negative if its larger component is."""
+        x, y = (float(self.data.get(f"tangential_load_{axis}", 0.0)) for axis in "xy")
+        return math.copysign(math.hypot(x, y), x if abs(x) > abs(y) else y)
+
+    def field(self, name: str) -> Array:
+        """Values of a field at the nodes.
+
+        Raises
+        ------
+        ValueError
+            If the result, or this step of it, does not hold the field.
+        """
+        words = name.replace("_", " ")
+        if name not in self.data:
+            if self.friction == 0.0 and name.startswith(("traction", "slip", "accumulated")):
+                raise ValueError(f"a contact without friction has no {words}")
+            raise ValueError(f"the {words} was not kept (output.fields)")
+        values = self.data[name].values
+        if (values == NOT_KEPT).all() if name == "zone" else not np.isfinite(values).any():
+            raise ValueError(f"the {words} of step {self.number} was not kept (output.every)")
+        return np.asarray(values, dtype=float)
+
+    @property
+    def stick(self) -> NDArray[np.bool_]:
+        """Nodes that stick.
+
+        Raises
+        ------
+        ValueError
+            If the contact has no friction, or its zones were not kept.
+        """
+        if self.friction == 0.0:
+            raise ValueError("a contact without friction has no stick and slip zones")
+        return np.asarray(self.field("zone") == STICK)
+
+    def at(self, x: Array, y: Array, values: Array | None = None) -> Array:
+        """Pressure, or the field with these values at the nodes, at points of the plane (m).
+
+        It is linear on the triangles of the lattice as in the solution, and 0 outside the window.
+        """
         origin = np.array([self.x[0, 0], self.y[0, 0]])
         points = np.stack([np.ravel(x), np.ravel(y)], axis=1) - origin
         col, row = np.linalg.solve(self.basis.T, points.T)
         col, row = np.round(col, 9), np.round(row, 9)  # a node is a node
         i, j = np.floor(col).astype(int), np.floor(row).astype(int)
         u, v = col - i, row - j
-        padded = np.pad(self.pressure, 1)
+        padded = np.pad(self.pressure if values is None else values, 1)
 
         def node(dj: int, di: int) -> Array:
             n_row, n_col = padded.shape
@@ -145,31 +213,77 @@ class StepView:
         return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
 
 
+def _loads(one: xarray.Dataset) -> str:
+    """Name the loads of a step: the normal load, and those that friction has to work for."""
+    normal = float(one["normal_load"])
+    carried = min(float(one.attrs.get("friction_coefficient", 1.0)), 1.0) * normal
+    named = [f"$P$ = {worded(normal, 'N')}"]
+    for sign, name, unit, least in (
+        ("Q_x", "tangential_load_x", "N", 1e-3 * carried),
+        ("Q_y", "tangential_load_y", "N", 1e-3 * carried),
+        ("M_z", "torque", "N m", 5e-3 * carried * float(one.get("contact_radius", 1.0))),
+    ):
+        value = float(one.get(name, 0.0))
+        if abs(value) > least:
+            named.append(f"${sign}$ = {worded(value, unit)}")
+    return ", ".join(named)
+
+
+def as_list(results: Results) -> list[Result | xarray.Dataset]:
+    """Return the results as a list, also if it is only one."""
+    return list(results) if isinstance(results, Sequence) else [results]
+
+
 def dataset_of(result: Result | xarray.Dataset) -> xarray.Dataset:
     """Return the dataset of a result, or the dataset itself."""
     return cast("xarray.Dataset", getattr(result, "dataset", result))
 
 
-def _hertz(dataset: xarray.Dataset, load: float) -> tuple[EllipticContact, tuple[float, float]] | None:
-    """Hertz solution and its center, if the initial gap is quadratic (sphere, cylinder, paraboloid)."""
-    modulus = dataset.attrs.get("effective_modulus")
-    if modulus is None or "initial_gap" not in dataset or not load > 0.0:
-        return None
-    gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
-    if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
-        return None
-    size = max(np.ptp(x), np.ptp(y))
-    u, v = (x - x.mean()) / size, (y - y.mean()) / size
-    forms = np.stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2], axis=1)
-    coefficients = np.linalg.lstsq(forms, gap, rcond=None)[0]
-    if np.abs(forms @ coefficients - gap).max() > 1e-9 * np.ptp(gap):
-        return None
-    hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
-    from .analytic import hertz_ellipse
+@dataclass(frozen=True)
+class QuadraticGap:
+    """An initial gap that is a quadratic form: sphere, cylinder, paraboloid.
 
-    try:
-        contact = hertz_ellipse(float(modulus), hessian, normal_load=load)
-    except ValueError:  # a line contact
-        return None
-    lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
-    return contact, (float(x.mean() + lowest[0]), float(y.mean() + lowest[1]))
+    Attributes
+    ----------
+    modulus : float
+        E*, Pa.
+    hessian : ndarray, shape (2, 2)
+        Its second derivatives, 1/m.
+    center : tuple of float
+        Where it is smallest, m.
+    """
+
+    modulus: float
+    hessian: Array
+    center: tuple[float, float]
+
+    @classmethod
+    def of(cls, dataset: xarray.Dataset) -> QuadraticGap | None:
+        """Look at the gap of a result; None if it is of another kind, or the contact is along a line."""
+        modulus = dataset.attrs.get("effective_modulus")
+        if modulus is None or "initial_gap" not in dataset:
+            return None
+        gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
+        if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
+            return None
+        size = max(np.ptp(x), np.ptp(y))
+        u, v = (x - x.mean()) / size, (y - y.mean()) / size
+        forms = np.stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2], axis=1)
+        coefficients = np.linalg.lstsq(forms, gap, rcond=None)[0]
+        if np.abs(forms @ coefficients - gap).max() > 1e-9 * np.ptp(gap):
+            return None
+        hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
+        from .analytic import hertz_ellipse
+
+        try:
+            hertz_ellipse(float(modulus), hessian, normal_load=1.0)
+        except ValueError:  # a line contact
+            return None
+        lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
+        return cls(float(modulus), hessian, (float(x.mean() + lowest[0]), float(y.mean() + lowest[1])))
+
+    def contact(self, load: float) -> EllipticContact:
+        """Return Hertz's solution under a load (N) above 0."""
+        from .analytic import hertz_ellipse
+
+        return hertz_ellipse(self.modulus, self.hessian, normal_load=load)

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .errors import HexcontactError
-from .progress import quantity
+from .progress import (
+    LOADS_AND_MOTIONS,
+    is_frictional,
+    load_or_motion,
+    quantity,
+    residuals,
+    stick_share,
+    worth_showing,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -22,12 +31,12 @@ History = Mapping[str, Any]
 Row = tuple[str, ...]
 
 _MOST_ROWS = 24  # steps shown of a long history
-_SHOWN = {
-    "normal_load": "N",
-    "approach": "m",
+_FURTHER = {  # shown of a load step besides loads and motions
     "max_pressure": "Pa",
+    "max_traction": "Pa",
     "contact_radius": "m",
     "elastic_energy": "J",
+    "dissipated_energy": "J",
 }
 
 
@@ -39,7 +48,7 @@ def console() -> Console:
     return Console(highlight=False, markup=False, emoji=False, width=width)
 
 
-def table(title: str, headers: Sequence[str], rows: Iterable[Row]) -> Table:
+def table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: bool = False) -> Table:
     """Return a table of numbers; names and labels are text, which may wrap on a narrow terminal."""
     from rich import box
     from rich.table import Table
@@ -47,7 +56,7 @@ def table(title: str, headers: Sequence[str], rows: Iterable[Row]) -> Table:
 
     shown = Table(
         title=Text(title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, show_header=any(headers),
-        pad_edge=False,
+        pad_edge=False, collapse_padding=tight,
     )  # fmt: skip
     for header in headers:
         text = header in ("", "label")
@@ -67,26 +76,54 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
 
 def case_rows(case: Case) -> list[Row]:
     """Return what would be run."""
-    from .solve import memory_needed
+    from .window import memory_needed
 
     lattice = case.lattice
     span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)  # the window may be too large to fill
-    pressed = [step.z.value for step in case.load_steps if step.z.control == "force"]
     return [
         *((f"body {number}", _body(body)) for number, body in ((1, case.body_1), (2, case.body_2))),
-        ("pair", f"E* = {quantity(case.pair.effective_modulus, 'Pa')}, beta = {case.pair.beta:.4g}"),
-        ("friction", f"{case.friction_coefficient:g}" if case.solver.algorithm != "frictionless" else "none"),
+        (
+            "pair",
+            f"E* = {quantity(case.pair.effective_modulus, 'Pa')}, beta = {case.pair.beta:.4g}, "
+            f"gamma = {case.pair.gamma:.4g}",
+        ),
+        ("friction", _friction(case)),
         ("spacing", quantity(lattice.spacing, "m")),
         (
             "window",
             f"{lattice.n_row} x {lattice.n_col} nodes ({lattice.size:,}), {quantity(span[0], 'm')} x "
             f"{quantity(span[1], 'm')}, {'fixed' if case.window_fixed else 'grows with the contact'}",
         ),
-        ("load steps", str(len(case.load_steps))),
-        ("largest load", quantity(max(pressed), "N") if pressed else "follows from the approach"),
+        ("load steps", _history(case)),
+        ("largest load", _largest(case)),
         ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
         ("memory", f"{quantity(memory_needed(case, lattice), 'B', 3)}"),
     ]  # fmt: skip
+
+
+def _friction(case: Case) -> str:
+    if not case.frictional:
+        return "none"
+    mu = case.friction_coefficient
+    law = "no slip (coefficient inf)" if math.isinf(mu) else f"coefficient {mu:g}"
+    goodman = ", shear does not move the pressure" * (case.solver.coupling == "goodman")
+    return f"{law}, {case.solver.algorithm}{goodman}"
+
+
+def _history(case: Case) -> str:
+    segments = case.load_steps[-1].segment + 1
+    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "")
+
+
+def _largest(case: Case) -> str:
+    """Return the largest load along each direction, as far as the deck tells."""
+    largest = {}
+    for direction in ("z", "x", "y"):
+        targets = [getattr(step, direction) for step in case.load_steps]
+        largest[direction] = max((abs(t.value) for t in targets if t.control == "force"), default=0.0)
+    normal = quantity(largest["z"], "N") if largest["z"] else "follows from the approach"
+    along = [f"{quantity(largest[axis], 'N')} along {axis}" for axis in ("x", "y") if largest[axis]]
+    return ", ".join([normal, *along])
 
 
 def _body(body: Body) -> str:
@@ -121,52 +158,63 @@ def _surface(surface: Surface | None) -> str:
 
 def step_rows(history: History) -> list[Row]:
     """Return what a load step came to, with its residuals."""
-    rows = [
-        (name.replace("_", " "), quantity(history[name], unit))
-        for name, unit in _SHOWN.items()
-        if name in history
+    rows = [(_words(name), load_or_motion(name, history)) for name in worth_showing([history])]
+    rows += [
+        (_words(name), quantity(history[name], unit)) for name, unit in _FURTHER.items() if name in history
     ]
-    residuals = ", ".join(f"{sign} = {value:.1e}" for sign, value in _residuals(history).items())
-    return [*rows, ("residuals", residuals), ("work", _work(history))]
+    if is_frictional(history):
+        rows.append(("stick", _stick(history)))
+    found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
+    return [*rows, ("residuals", found), ("work", _work(history))]
 
 
-def _residuals(history: History) -> dict[str, float]:
-    """Return the residuals that there are, by the symbol of the theory."""
-    names = {"R_n": "normal", "R_t": "tangential", "R_P": "force", "R_Q": "shear_force", "R_M": "torque"}
-    found = {sign: float(history.get(f"residual_{name}", math.nan)) for sign, name in names.items()}
-    return {sign: value for sign, value in found.items() if not math.isnan(value)}
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _stick(history: History) -> str:
+    """Return size and place of the stick zone in words."""
+    if not history["stick_area"]:
+        return "nowhere"
+    center = [float(history[f"stick_center_{axis}"]) for axis in "xy"]
+    near = 1e-6 * history["contact_radius"]  # as good as zero
+    place = ", ".join(quantity(0.0 if abs(value) < near else value, "m") for value in center)
+    return f"{stick_share(history)} of the contact area, about ({place})"
 
 
 def _work(history: History) -> str:
+    cuts = history.get("cuts", 0)
+    halved = f"halved {cuts} time{'s' * (cuts > 1)}, " if cuts else ""
     return (
-        f"{history['sweeps']} iterations, {history['operator_applications']:.3g} operator applications, "
-        f"{quantity(history['seconds'], 's', 3)}"
+        f"{history['sweeps']} iterations, {halved}{history['operator_applications']:.3g} operator "
+        f"applications, {quantity(history['seconds'], 's', 3)}"
     )
 
 
-def history_rows(histories: Sequence[History]) -> list[Row]:
-    """Return a row for each load step; of a long history only some steps, the last among them.
+def history_table(histories: Sequence[History], console: Console) -> Table:
+    """Return a table of the load steps; of a long history only some steps, the last among them.
 
-    The residual is the largest of a step.
+    The residual is the largest of a step. What a narrow console has no room for is left out.
     """
     stride = max(1, math.ceil(len(histories) / _MOST_ROWS))
     chosen = [k for k in range(len(histories)) if (len(histories) - 1 - k) % stride == 0]
-    return [
-        (
-            f"{k + 1}",
-            str(h.get("label", "")),
-            quantity(h["normal_load"], "N"),
-            quantity(h["approach"], "m"),
-            quantity(h["max_pressure"], "Pa"),
-            quantity(h["contact_radius"], "m"),
-            f"{max(_residuals(h).values(), default=math.nan):.1e}",
-            quantity(h["seconds"], "s", 3),
-        )
-        for k, h in ((k, histories[k]) for k in chosen)
-    ]
-
-
-HISTORY_HEADERS = ("step", "label", "load", "approach", "p_max", "radius", "residual", "time")
+    columns: dict[str, Callable[[History], str]] = {"label": lambda h: str(h.get("label", ""))}
+    for name in worth_showing(histories):
+        columns[LOADS_AND_MOTIONS[name][0]] = functools.partial(load_or_motion, name)
+    if is_frictional(histories[-1]):
+        columns["stick"] = stick_share
+    else:
+        columns["p_max"] = lambda h: quantity(h["max_pressure"], "Pa")
+        columns["radius"] = lambda h: quantity(h["contact_radius"], "m")
+    columns["residual"] = lambda h: f"{max(residuals(h).values(), default=math.nan):.1e}"
+    columns["time"] = lambda h: quantity(h["seconds"], "s", 3)
+    for spare in ("", "time", "label", "residual"):
+        columns.pop(spare, None)
+        rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
+        shown = table("History", ("step", *columns), rows, tight=True)
+        if console.measure(shown, options=console.options.update_width(1000)).maximum <= console.width:
+            break
+    return shown
 
 
 # --- against Hertz --------------------------------------------------------------------------------
@@ -192,7 +240,7 @@ def hertz_rows(case: Case, history: History) -> list[Row]:
     surfaces = [body.surface for body in (case.body_1, case.body_2) if body.surface is not None]
     curvatures = [curvature for surface in surfaces if (curvature := surface.curvature) is not None]
     quadratic = len(curvatures) == len(surfaces)
-    if case.solver.algorithm != "frictionless" or load <= 0 or not quadratic:
+    if case.frictional or load <= 0 or not quadratic:
         return []
     import numpy as np
 
@@ -235,8 +283,16 @@ def file_rows(result: Result) -> list[Row]:
         ("load steps", f"{len(result)} ({state})"),
         ("window", f"{sizes['row']} x {sizes['col']} nodes"),
         ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
+        ("algorithm", _algorithm(attributes)),
         ("fields", ", ".join(fields)),
     ]
+
+
+def _algorithm(attributes: Mapping[str, Any]) -> str:
+    algorithm = str(attributes.get("algorithm", "unknown"))
+    if algorithm in ("static", "incremental"):
+        algorithm += f", friction coefficient {float(attributes['friction_coefficient']):g}"
+    return algorithm + ", coupling goodman" * (attributes.get("coupling") == "goodman")
 
 
 def case_of(result: Result) -> Case | None:

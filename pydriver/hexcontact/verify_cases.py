@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable
 
@@ -43,13 +44,11 @@ def materials() -> Comparison:
     return found
 
 
-def _frictionless(name: str) -> Callable[[], Comparison]:
-    """Return the check `name` of `verify_normal`, imported when it runs."""
+def _of(module: str, name: str) -> Callable[[], Comparison]:
+    """Return the check `name` of a module of this package, imported when it runs."""
 
     def run() -> Comparison:
-        from . import verify_normal
-
-        check: Callable[[], Comparison] = getattr(verify_normal, name)
+        check: Callable[[], Comparison] = getattr(importlib.import_module(f"hexcontact.{module}"), name)
         return check()
 
     return run
@@ -69,31 +68,141 @@ _ALL = (
         "table-9.2",
         "Two spheres on five meshes (Tables 9.1 and 9.2)",
         "Frictionless contact of two spheres; on each mesh the discrete solution is unique.",
-        _frictionless("table_9_2"),
+        _of("verify_normal", "table_9_2"),
     ),
     Check(
         "convergence",
         "Convergence of the frictionless sphere",
         "Errors against Hertz on lattices with a/l_e spacings in the contact radius.",
-        _frictionless("convergence"),
+        _of("verify_normal", "convergence"),
     ),
     Check(
         "crossed-cylinders",
         "Crossed cylinders without friction (section 9.3)",
         "Contact ellipse of two cylinders whose axes enclose an angle, against Hertz.",
-        _frictionless("crossed_cylinders"),
+        _of("verify_normal", "crossed_cylinders"),
     ),
     Check(
         "profiles",
         "Cone, powers and punches",
         "Axisymmetric contacts with closed solutions.",
-        _frictionless("profiles"),
+        _of("verify_normal", "profiles"),
     ),
     Check(
         "control",
         "Load control and approach control",
         "The same problem driven by its load or by its approach, by both methods.",
-        _frictionless("control"),
+        _of("verify_normal", "control"),
+    ),
+    Check(
+        "methods",
+        "Direct and fft with friction",
+        "The same histories by both methods.",
+        _of("verify_methods", "methods"),
+    ),
+    Check(
+        "table-9.3",
+        "Dissimilar spheres pressed with friction (section 9.2, Table 9.3)",
+        "Static and incremental solutions for P = 10 and 31.5 N, on the lattices of the reference table and "
+        "extrapolated to many load steps.",
+        _of("verify_dissimilar", "table_9_3"),
+    ),
+    Check(
+        "goodman",
+        "Dissimilar spheres, uncoupled (section 9.2)",
+        "The stick radius where shear does not move the pressure, against Spence's formula.",
+        _of("verify_dissimilar", "goodman"),
+    ),
+    Check(
+        "rigid-plane",
+        "Sphere with ν = 0 pressed on a rigid plane",
+        "The strongest coupling of pressure and shear, β = 1/2.",
+        _of("verify_dissimilar", "rigid_plane"),
+    ),
+    Check(
+        "stick-radius",
+        "Stick radius of self-similar contacts",
+        "The stick radius under a growing load depends on β and μ only; here from a flat punch.",
+        _of("verify_no_slip", "stick_radii"),
+    ),
+    Check(
+        "flat-punch-no-slip",
+        "Flat punch without slip",
+        "A rigid flat punch that cannot slip (Mossakovskii).",
+        _of("verify_no_slip", "flat_punch"),
+    ),
+    Check(
+        "sphere-no-slip",
+        "Sphere without slip",
+        "A sphere pressed in many steps that cannot slip (Mossakovskii, Spence).",
+        _of("verify_no_slip", "sphere"),
+    ),
+    Check(
+        "unloading",
+        "Dissimilar sphere pressed and let go",
+        "Normal unloading with friction: slip reverses from the edge inwards.",
+        _of("verify_unloading", "unloading"),
+    ),
+    Check(
+        "crossed-cylinders-friction",
+        "Crossed cylinders with friction (section 9.3, Figure 9.4)",
+        "Contact and stick ellipses, static and incremental.",
+        _of("verify_crossed", "crossed_cylinders"),
+    ),
+    Check(
+        "cattaneo-mindlin",
+        "Alike spheres sheared (section 13.1, Figure 13.2)",
+        "Stick radius, shift and tractions at Q/μP = 0.1 ... 0.9 against Cattaneo and Mindlin.",
+        _of("verify_tangential", "cattaneo_mindlin"),
+    ),
+    Check(
+        "loop",
+        "Hysteresis loop at constant normal load",
+        "Spheres sheared to and fro, against Mindlin and Deresiewicz.",
+        _of("verify_tangential", "loop"),
+    ),
+    Check(
+        "prescribed-shift",
+        "Prescribed shift",
+        "Spheres shifted by given amounts up to full slip.",
+        _of("verify_tangential", "prescribed_shift"),
+    ),
+    Check("torsion", "Torsion", "Spheres twisted, against Lubkin.", _of("verify_tangential", "torsion")),
+    Check(
+        "long-contact",
+        "Middle of a long contact, sheared (Figure 13.3)",
+        "Tractions in the mid-plane against the plane solution of Cattaneo and Mindlin.",
+        _of("verify_plane", "cattaneo"),
+    ),
+    Check(
+        "long-contact-dissimilar",
+        "Middle of a long contact of dissimilar bodies, pressed, then sheared",
+        "Stick in the mid-plane against the plane solution.",
+        _of("verify_plane", "dissimilar"),
+    ),
+    Check(
+        "fretting",
+        "Dissimilar spheres pressed, then sheared (section 13.2.2, Tables 13.3 to 13.5)",
+        "The 40 load steps of the text.",
+        _of("verify_fretting", "fretting"),
+    ),
+    Check(
+        "fretting-fine-steps",
+        "Dissimilar spheres pressed, then sheared in finer steps",
+        "The path of section 13.2.2 in 185 steps.",
+        _of("verify_fretting", "refined_path"),
+    ),
+    Check(
+        "stick-outlines",
+        "Stick zones, coupled and uncoupled (Figure 13.5)",
+        "The history of section 13.2.2 by both kinds of coupling.",
+        _of("verify_fretting", "stick_outlines"),
+    ),
+    Check(
+        "compliance",
+        "Initial tangential compliance against β (Figure 13.4)",
+        "The first small shear after pressing dissimilar spheres.",
+        _of("verify_fretting", "compliance"),
     ),
 )
 

@@ -193,7 +193,8 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
         for letter, value in (("a", nodes.semi_major), ("b", nodes.semi_minor)):
             row = reference(case, f"{letter} (moment ellipse of contact nodes)")
             found.add(where, f"{letter}, moments of the nodes", "mm", value, row=row, relative=1e-6)
-        found.add(where, "E_e of (9.5)", "-", _ellipse_error(s, nodes))
+        error = ellipse_error(s.x, s.y, s.contact, s.spacing, nodes)
+        found.add(where, "E_e of (9.5)", "-", error)
 
         s = solve(first, second, spacing=hertz.semi_minor / 24, normal_load=1e4)
         where, case = f"{phi}°, b/l_e = 24", f"9.3 phi={phi} mu=0"
@@ -219,15 +220,17 @@ def crossed_cylinders(angles: Sequence[int] = (90, 60, 45, 30)) -> Comparison:
     return found
 
 
-def _ellipse_error(solved: Solved, ellipse: estimators.Ellipse) -> float:
+def ellipse_error(
+    x: Array, y: Array, zone: NDArray[np.bool_], spacing: float, ellipse: estimators.Ellipse
+) -> float:
     """E_e: mean distance from the ellipse of the boundary nodes, moved out by l_e/2, divided by b."""
-    rim = estimators.boundary(solved.contact)
-    x, y = solved.x[rim] - ellipse.center[0], solved.y[rim] - ellipse.center[1]
+    rim = estimators.boundary(zone)
+    x, y = x[rim] - ellipse.center[0], y[rim] - ellipse.center[1]
     cosine, sine = math.cos(ellipse.angle), math.sin(ellipse.angle)
     u, v = (x * cosine + y * sine) / ellipse.semi_major, (y * cosine - x * sine) / ellipse.semi_minor
     way = np.hypot(u, v)  # 1 on the ellipse
     steepness = np.hypot(u / ellipse.semi_major, v / ellipse.semi_minor) / way
-    return float(np.mean(np.abs((way - 1.0) / steepness + 0.5 * solved.spacing)) / ellipse.semi_minor)
+    return float(np.mean(np.abs((way - 1.0) / steepness + 0.5 * spacing)) / ellipse.semi_minor)
 
 
 # ----------------------------------------------------------------------------------- other profiles

@@ -11,6 +11,9 @@ program tester
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
   use test_contact, only: collect_contact
+  use test_friction, only: collect_friction
+  use test_load_path, only: collect_load_path
+  use test_direct_friction, only: collect_direct_friction
   implicit none
 
   type(suite_t), allocatable :: suites(:)
@@ -23,7 +26,10 @@ program tester
     new_suite('pyramid_influence', collect_pyramid_influence), &
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
-    new_suite('contact', collect_contact) &
+    new_suite('contact', collect_contact), &
+    new_suite('friction', collect_friction), &
+    new_suite('load_path', collect_load_path), &
+    new_suite('direct_friction', collect_direct_friction) &
   ]
   call run_suites(suites, n_failed)
   if (n_failed > 0) stop 1, quiet=.true.

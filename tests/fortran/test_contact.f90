@@ -4,9 +4,9 @@ module test_contact
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_contact_state, only: contact_state_t, load_control, approach_control
+  use hc_contact_state, only: contact_state_t, force_control, displacement_control, normal
   use hc_contact_residuals, only: normal_residual, force_residual
-  use hc_krylov, only: linear_system_t, projected_cg, dot
+  use hc_krylov, only: linear_system_t, projected_cg, precondition_constraints, fulfil, dot
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use testing, only: test_t, new_test, check, check_raised, check_true
@@ -32,6 +32,7 @@ contains
     tests = [ &
       new_test('dot', test_dot), &
       new_test('projected_cg', test_projected_cg), &
+      new_test('three_constraints', test_three_constraints), &
       new_test('residuals', test_residuals), &
       new_test('hertz', test_hertz), &
       new_test('any_approach', test_any_approach), &
@@ -60,6 +61,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(dense_system_t) :: system
     real(wp) :: x(5), ax(5), multiplier(1), residual, constraint(5, 1)
+    real(wp), allocatable :: mb(:, :)
     integer :: iterations, i
 
     system%matrix = 1.0_wp
@@ -69,7 +71,9 @@ contains
     x = [6.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     ax = matmul(system%matrix, x)
     constraint(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp]
-    call projected_cg(system, constraint(:, 1) > 0.0_wp, constraint, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, 9.0_wp], x, ax, &
+    call precondition_constraints(system, constraint(:, 1) > 0.0_wp, constraint, mb, error)
+    if (allocated(error)) return
+    call projected_cg(system, constraint(:, 1) > 0.0_wp, constraint, mb, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, 9.0_wp], x, ax, &
                       1.0e-12_wp, 20, multiplier, residual, iterations, error)
     if (allocated(error)) return
     ! i x_i + 6 = b_i + m on the active nodes and sum x = 6: m (1 + 1/2 + 1/4) = 6 + sum (6 - b_i)/i
@@ -81,6 +85,56 @@ contains
     if (allocated(error)) return
     call check_true(error, iterations <= 3 .and. residual <= 1.0e-12_wp, 'as many iterations as unknowns at most')
   end subroutine test_projected_cg
+
+  !> Three constraints on four unknowns: the solution fulfils its own equations; dependent ones are told.
+  subroutine test_three_constraints(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), rhs(5), multiplier(3), residual, constraint(5, 3)
+    real(wp), allocatable :: mb(:, :)
+    real(wp), parameter :: wanted(3) = [6.0_wp, -1.0_wp, 2.0_wp]
+    logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
+    logical :: independent
+    integer :: iterations, i
+
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    rhs = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp]
+    constraint(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp]
+    constraint(:, 2) = [0.0_wp, 1.0_wp, 0.0_wp, -2.0_wp, 0.0_wp]
+    constraint(:, 3) = [3.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
+    call precondition_constraints(system, active, constraint, mb, error)
+    if (allocated(error)) return
+    call check(error, mb(:, 3), [1.5_wp, 0.0_wp, 0.0_wp, 0.2_wp, -1.0_wp/6.0_wp], 1.0e-15_wp, 'M B')
+    if (allocated(error)) return
+    x = [0.0_wp, 0.0_wp, 7.0_wp, 0.0_wp, 0.0_wp]
+    call fulfil(constraint, mb, wanted, x, independent, 1)
+    call check_true(error, independent, 'independent constraints')
+    if (allocated(error)) return
+    call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
+    if (allocated(error)) return
+    ax = matmul(system%matrix, x)
+    call projected_cg(system, active, constraint, mb, rhs, x, ax, 1.0e-12_wp, 20, multiplier, residual, iterations, error)
+    if (allocated(error)) return
+    call check(error, matmul(transpose(constraint), x), wanted, 1.0e-12_wp, 'constraints')
+    if (allocated(error)) return
+    call check(error, x(3), 7.0_wp, 0.0_wp, 'an unknown that is fixed')
+    if (allocated(error)) return
+    call check(error, merge(matmul(system%matrix, x) - rhs - matmul(constraint, multiplier), 0.0_wp, active), &
+               [(0.0_wp, i=1, 5)], 1.0e-11_wp, 'equations')
+    if (allocated(error)) return
+
+    constraint(:, 3) = 2.0_wp*constraint(:, 1)
+    call precondition_constraints(system, active, constraint, mb, error)
+    if (allocated(error)) return
+    ax = x
+    call fulfil(constraint, mb, wanted, x, independent, 1)
+    call check_true(error, .not. independent, 'constraints that depend on each other')
+    if (allocated(error)) return
+    call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')
+  end subroutine test_three_constraints
 
   subroutine dense_product(self, x, y, error)
     class(dense_system_t), intent(inout) :: self
@@ -156,18 +210,18 @@ contains
     if (allocated(error)) return
     call new_normal_contact(contact, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error)
     if (allocated(error)) return
-    call contact%solve(load_control, 4.0_wp/3.0_wp, 1.0e-9_wp, 50, state, error)
+    call contact%solve(force_control, 4.0_wp/3.0_wp, 1.0e-9_wp, 50, state, error)
     if (allocated(error)) return
     call check_true(error, state%converged .and. state%residual_normal <= 1.0e-9_wp, 'converged')
     if (allocated(error)) return
     call check(error, maxval(state%pressure), 2.0_wp/pi, 1.0e-4_wp, 'largest pressure')
     if (allocated(error)) return
-    call check(error, state%approach, 1.0_wp, 2.0e-4_wp, 'approach')
+    call check(error, state%motion(normal), 1.0_wp, 2.0e-4_wp, 'approach')
     if (allocated(error)) return
     ! control of the approach leads to the same solution
-    call contact%solve(approach_control, state%approach, 1.0e-9_wp, 50, again, error)
+    call contact%solve(displacement_control, state%motion(normal), 1.0e-9_wp, 50, again, error)
     if (allocated(error)) return
-    call check(error, again%normal_load, 4.0_wp/3.0_wp, 1.0e-8_wp, 'load under a given approach')
+    call check(error, again%load(normal), 4.0_wp/3.0_wp, 1.0e-8_wp, 'load under a given approach')
     if (allocated(error)) return
     call check(error, reshape(again%pressure, [3721]), reshape(state%pressure, [3721]), 1.0e-8_wp, 'same pressure')
   end subroutine test_hertz
@@ -188,13 +242,13 @@ contains
     if (allocated(error)) return
     load = 0.0_wp
     do i = 1, 200
-      call contact%solve(approach_control, 0.01_wp*i, 1.0e-8_wp, 50, state, error)
+      call contact%solve(displacement_control, 0.01_wp*i, 1.0e-8_wp, 50, state, error)
       if (allocated(error)) return
-      call check_true(error, state%converged .and. state%normal_load > load, 'converged, and the load rises')
+      call check_true(error, state%converged .and. state%load(normal) > load, 'converged, and the load rises')
       if (allocated(error)) return
       call check_true(error, state%operator_applications < 30.0_wp, 'no work wasted')
       if (allocated(error)) return
-      load = state%normal_load
+      load = state%load(normal)
     end do
   end subroutine test_any_approach
 
@@ -213,12 +267,12 @@ contains
     gap = 0.0_wp
     call new_normal_contact(contact, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error)
     if (allocated(error)) return
-    call contact%solve(load_control, 1.0_wp, 1.0e-8_wp, 50, state, error)
+    call contact%solve(force_control, 1.0_wp, 1.0e-8_wp, 50, state, error)
     if (allocated(error)) return
     radius = sqrt(lattice%cell_area()*count(candidate)/pi)
     call check_true(error, state%converged, 'converged')
     if (allocated(error)) return
-    call check(error, 2.0_wp*radius*state%approach, 1.0_wp, 5.0e-3_wp, 'approach')
+    call check(error, 2.0_wp*radius*state%motion(normal), 1.0_wp, 5.0e-3_wp, 'approach')
     if (allocated(error)) return
     call check_true(error, all((state%pressure > 0.0_wp) .eqv. candidate), 'contact on the punch and nowhere else')
   end subroutine test_flat_punch
@@ -246,16 +300,16 @@ contains
       if (allocated(error)) return
       call new_direct_contact(direct, lattice, pair, gap, candidate, error)
       if (allocated(error)) return
-      call contact%solve(load_control, 1.0_wp, 1.0e-10_wp, 80, state, error)
+      call contact%solve(force_control, 1.0_wp, 1.0e-10_wp, 80, state, error)
       if (allocated(error)) return
-      call direct%solve(load_control, 1.0_wp, 1.0e-10_wp, 80, exact, error)
+      call direct%solve(force_control, 1.0_wp, 1.0e-10_wp, 80, exact, error)
       if (allocated(error)) return
       call check_true(error, state%converged .and. exact%converged, 'both converge')
       if (allocated(error)) return
       call check(error, reshape(state%pressure, [625]), reshape(exact%pressure, [625]), &
                  1.0e-8_wp*maxval(exact%pressure), 'pressure')
       if (allocated(error)) return
-      call check(error, state%approach, exact%approach, 1.0e-9_wp, 'approach')
+      call check(error, state%motion(normal), exact%motion(normal), 1.0e-9_wp, 'approach')
       if (allocated(error)) return
     end do
   end subroutine test_methods_agree
@@ -275,14 +329,14 @@ contains
     call random_number(noise)
     call new_direct_contact(direct, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap + 0.1_wp*noise, candidate, error)
     if (allocated(error)) return
-    call direct%solve(load_control, 1.0_wp, 1.0e-10_wp, 80, expected, error)
+    call direct%solve(force_control, 1.0_wp, 1.0e-10_wp, 80, expected, error)
     if (allocated(error)) return
     do i = 1, 3
       start = .false.
       start(1, 1) = .true.
       if (i == 2) start = .not. start
       if (i == 3) start = noise < 0.5_wp
-      call direct%solve(load_control, 1.0_wp, 1.0e-10_wp, 80, state, error, start)
+      call direct%solve(force_control, 1.0_wp, 1.0e-10_wp, 80, state, error, start)
       if (allocated(error)) return
       call check_true(error, state%converged, 'converged')
       if (allocated(error)) return
@@ -312,18 +366,18 @@ contains
     if (allocated(error)) return
     call new_direct_contact(direct, lattice, pair, gap, candidate, error)
     if (allocated(error)) return
-    call contact%solve(load_control, 0.0_wp, 1.0e-8_wp, 50, state(1), error)
+    call contact%solve(force_control, 0.0_wp, 1.0e-8_wp, 50, state(1), error)
     if (allocated(error)) return
-    call contact%solve(approach_control, 0.05_wp, 1.0e-8_wp, 50, state(2), error)
+    call contact%solve(displacement_control, 0.05_wp, 1.0e-8_wp, 50, state(2), error)
     if (allocated(error)) return
-    call direct%solve(load_control, 0.0_wp, 1.0e-8_wp, 50, state(3), error)
+    call direct%solve(force_control, 0.0_wp, 1.0e-8_wp, 50, state(3), error)
     if (allocated(error)) return
-    call direct%solve(approach_control, 0.05_wp, 1.0e-8_wp, 50, state(4), error)
+    call direct%solve(displacement_control, 0.05_wp, 1.0e-8_wp, 50, state(4), error)
     if (allocated(error)) return
     do i = 1, 4
       call check_true(error, state(i)%converged .and. all(state(i)%zone == 0), 'converged without contact')
       if (allocated(error)) return
-      call check(error, state(i)%approach, merge(0.1_wp, 0.05_wp, modulo(i, 2) == 1), 1.0e-15_wp, 'approach')
+      call check(error, state(i)%motion(normal), merge(0.1_wp, 0.05_wp, modulo(i, 2) == 1), 1.0e-15_wp, 'approach')
       if (allocated(error)) return
       call check(error, minval(state(i)%gap), merge(0.0_wp, 0.05_wp, modulo(i, 2) == 1), 1.0e-15_wp, 'gap')
       if (allocated(error)) return
@@ -346,7 +400,7 @@ contains
       call new_normal_contact(contact, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error, &
                               n_threads=2*i - 1)
       if (allocated(error)) return
-      call contact%solve(load_control, 1.0_wp, 1.0e-8_wp, 50, state(i), error)
+      call contact%solve(force_control, 1.0_wp, 1.0e-8_wp, 50, state(i), error)
       if (allocated(error)) return
     end do
     call check(error, reshape(state(2)%pressure, [3721]), reshape(state(1)%pressure, [3721]), &
@@ -369,13 +423,13 @@ contains
     if (allocated(error)) return
     call new_normal_contact(contact, lattice, pair, gap, candidate, error)
     if (allocated(error)) return
-    call contact%solve(load_control, 1.0_wp, 1.0e-8_wp, 1, state, error)
+    call contact%solve(force_control, 1.0_wp, 1.0e-8_wp, 1, state, error)
     if (allocated(error)) return
     call check_true(error, .not. state%converged .and. state%residual_normal > 1.0e-8_wp, 'one sweep does not suffice')
     if (allocated(error)) return
     call new_direct_contact(direct, lattice, pair, gap, candidate, error)
     if (allocated(error)) return
-    call direct%solve(load_control, 1.0_wp, 1.0e-8_wp, 1, state, error)
+    call direct%solve(force_control, 1.0_wp, 1.0e-8_wp, 1, state, error)
     if (allocated(error)) return
     call check_true(error, .not. state%converged .and. state%residual_normal > 1.0e-8_wp, 'one solve does not suffice')
   end subroutine test_not_converged

@@ -9,7 +9,7 @@ module test_flexibility
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_contact_residuals, only: normal_self_compliance
-  use hc_lattice_symbol, only: normal_symbol
+  use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   use hc_triangle_integrals, only: linear_load_displacement
   use hc_preconditioner, only: preconditioner_t, new_preconditioner
   use testing, only: test_t, new_test, check, check_raised, check_true
@@ -49,7 +49,10 @@ contains
       new_test('wrong_shapes', test_wrong_shapes), &
       new_test('self_compliance', test_self_compliance), &
       new_test('symbol', test_symbol), &
-      new_test('preconditioner', test_preconditioner) &
+      new_test('shear_symbol', test_shear_symbol), &
+      new_test('preconditioner', test_preconditioner), &
+      new_test('shear_preconditioner', test_shear_preconditioner), &
+      new_test('preconditioner_definite', test_preconditioner_definite) &
     ]
   end subroutine collect_flexibility
 
@@ -289,24 +292,50 @@ contains
                1.5_wp*sqrt(3.0_wp)*log(3.0_wp), 1.0e-14_wp, 'self-compliance')
   end subroutine test_self_compliance
 
-  !> Long waves: 2 pi/|k|; the symbol is even, also on Nyquist rows.
+  !> Long waves: 2 pi/|k|, 2 pi k_y^2/|k|^3 and -2 pi k_x k_y/|k|^3; the symbols are even, also on Nyquist rows.
   subroutine test_symbol(error)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: basis(2, 2), k
     integer :: i, j
 
     basis = equilateral_basis(1.0_wp)
-    ! the frequency (1, 0) has the wave number 2 pi/(512 sin 60)
+    ! the wave vector of the frequency (1, 0) is normal to the second basis vector: k = |k| (sqrt(3)/2, -1/2)
     k = 2*pi/(512*0.5_wp*sqrt(3.0_wp))
-    call check(error, normal_symbol(basis, [512, 512], [1, 0])*k/(2*pi), 1.0_wp, 1.0e-4_wp, 'long wave')
+    call check(error, kernel_symbols(basis, [512, 512], [1, 0])*k/(2*pi), [1.0_wp, 0.25_wp, 0.25_wp*sqrt(3.0_wp)], &
+               1.0e-4_wp, 'long wave')
+    if (allocated(error)) return
+    ! and that of (0, 1) is normal to the first one, along y
+    call check(error, kernel_symbols(basis, [512, 512], [0, 1])*k/(2*pi), [1.0_wp, 1.0_wp, 0.0_wp], 1.0e-4_wp, &
+               'long wave along y')
     do i = 0, 11
       do j = 0, 9
         if (allocated(error)) return
-        call check(error, normal_symbol(basis, [12, 10], [i, j]), normal_symbol(basis, [12, 10], [-i, -j]), &
+        call check(error, kernel_symbols(basis, [12, 10], [i, j]), kernel_symbols(basis, [12, 10], [-i, -j]), &
                    1.0e-13_wp, 'even symbol')
       end do
     end do
   end subroutine test_symbol
+
+  !> The shear flexibility is positive definite at every frequency, from nu = -1 to 0.5 for both bodies.
+  subroutine test_shear_symbol(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: k(3), xx, xy, yy
+    real(wp), parameter :: gamma(3) = [-0.5_wp, 0.0_wp, 1.0_wp]
+    integer :: i, j, m
+
+    do m = 1, 3
+      do j = 0, 8
+        do i = 0, 11
+          k = kernel_symbols(equilateral_basis(0.3_wp), [12, 9], [i, j])
+          xx = k(symbol_1) + gamma(m)*k(symbol_xx)
+          xy = gamma(m)*k(symbol_xy)
+          yy = k(symbol_1) + gamma(m)*(k(symbol_1) - k(symbol_xx))
+          call check_true(error, xx > 0.0_wp .and. xx*yy - xy**2 > 0.01_wp*xx*yy, 'positive definite')
+          if (allocated(error)) return
+        end do
+      end do
+    end do
+  end subroutine test_shear_symbol
 
   !> In the middle of the window the preconditioner undoes the operator within a few per cent.
   subroutine test_preconditioner(error)
@@ -333,5 +362,64 @@ contains
     call preconditioner%apply(closing, back)
     call check(error, reshape(back, [size(back)]), reshape(traction, [size(back)]), 0.05_wp, 'traction')
   end subroutine test_preconditioner
+
+  !> The same for shear tractions, with the coupling of x and y.
+  subroutine test_shear_preconditioner(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(fft_flexibility_t) :: fft
+    type(preconditioner_t) :: preconditioner
+    type(elastic_pair_t) :: pair
+    real(wp), dimension(65, 65, 2) :: traction, displacement, back
+    real(wp) :: x(65, 65), y(65, 65)
+
+    pair = elastic_pair_t(0.7_wp, 0.1_wp, 0.6_wp)
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-32, -32], [65, 65], error)
+    if (allocated(error)) return
+    call new_fft_flexibility(fft, lattice, pair, error)
+    if (allocated(error)) return
+    call new_preconditioner(preconditioner, lattice, pair, error, tangential=.true.)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    traction(:, :, 1) = cos(0.9_wp*x + 0.5_wp*y)*exp(-(x**2 + y**2)/100.0_wp)
+    traction(:, :, 2) = sin(0.4_wp*x - 1.1_wp*y)*exp(-(x**2 + y**2)/100.0_wp)
+    call fft%apply([along_x, along_y], traction, [along_x, along_y], displacement, error)
+    if (allocated(error)) return
+    call preconditioner%apply(displacement, back)
+    call check(error, reshape(back, [size(back)]), reshape(traction, [size(back)]), 0.05_wp, 'shear traction')
+  end subroutine test_shear_preconditioner
+
+  !> Both preconditioners are symmetric and positive definite, column by column of their matrices.
+  subroutine test_preconditioner_definite(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(preconditioner_t) :: preconditioner
+    type(elastic_pair_t) :: pair
+    integer, parameter :: n_col = 9, n_row = 6
+    real(wp), allocatable :: matrix(:, :), unit(:), answer(:, :, :), values(:), work(:)
+    integer :: n_component, n, k, info
+
+    pair = elastic_pair_t(0.7_wp, 0.3_wp, 0.7_wp)
+    call new_lattice(lattice, equilateral_basis(0.2_wp), [-4, 7], [n_col, n_row], error)
+    if (allocated(error)) return
+    do n_component = 1, 2
+      call new_preconditioner(preconditioner, lattice, pair, error, tangential=n_component == 2)
+      if (allocated(error)) return
+      n = n_col*n_row*n_component
+      if (allocated(matrix)) deallocate (matrix, unit, answer, values, work)
+      allocate (matrix(n, n), unit(n), answer(n_col, n_row, n_component), values(n), work(8*n))
+      do k = 1, n
+        unit = 0.0_wp
+        unit(k) = 1.0_wp
+        call preconditioner%apply(reshape(unit, shape(answer)), answer)
+        matrix(:, k) = reshape(answer, [n])
+      end do
+      call check(error, maxval(abs(matrix - transpose(matrix))), 0.0_wp, 1.0e-14_wp*maxval(matrix), 'asymmetry')
+      if (allocated(error)) return
+      call dsyev('N', 'U', n, matrix, n, values, work, size(work), info)
+      call check_true(error, info == 0 .and. minval(values) > 0.001_wp*maxval(values), 'positive definite')
+      if (allocated(error)) return
+    end do
+  end subroutine test_preconditioner_definite
 
 end module test_flexibility

@@ -132,30 +132,43 @@ def test_overrides_are_part_of_the_deck_that_the_case_keeps(tmp_path: Path) -> N
         Case.from_toml(path, {"grid.nodes_across": None, "grid.spacing": -1})
 
 
-def test_what_this_version_does_not_solve_is_refused_in_one_sentence() -> None:
+def test_friction_chooses_the_algorithm() -> None:
+    def case(coefficient: str, solver: str = "") -> Case:
+        return Case.from_text(f"{DECK}\n[friction]\ncoefficient = {coefficient}\n[solver]\n{solver}")
+
+    for coefficient in ("0.3", "inf"):
+        chosen = case(coefficient)
+        assert (chosen.solver.algorithm, chosen.frictional) == ("incremental", True)
+        assert chosen.friction_coefficient == float(coefficient)
+    assert not case("0").frictional
+    for algorithm in ("static", "incremental"):
+        for coefficient in ("0", "0.3", "inf"):
+            assert case(coefficient, f'algorithm = "{algorithm}"').solver.algorithm == algorithm
+    assert case("0.3", 'coupling = "goodman"').solver.coupling == "goodman"
+    assert "incremental" in repr(case("0.3"))
+
+
+def test_friction_and_algorithm_have_to_agree() -> None:
     friction = "\n[friction]\ncoefficient = 0.3\n"
-    for text, sentence in [
-        (
-            DECK + friction,
-            "deck:18: friction.coefficient = 0.3: this version solves frictionless contact only",
-        ),
-        (
-            DECK + friction + '[solver]\nalgorithm = "static"\n',
-            'deck:20: solver.algorithm = "static": this version solves frictionless contact only',
-        ),
-        (
-            DECK + friction + '[solver]\nalgorithm = "frictionless"\n',
-            'deck:18: friction.coefficient = 0.3: expected 0, since solver.algorithm = "frictionless"',
-        ),
-    ]:
-        with pytest.raises(DeckError) as error:
-            Case.from_text(text)
-        assert str(error.value) == sentence
-    assert Case.from_text(DECK + "\n[friction]\ncoefficient = 0\n").solver.algorithm == "frictionless"
+    with pytest.raises(DeckError) as error:
+        Case.from_text(DECK + friction + '[solver]\nalgorithm = "frictionless"\n')
+    assert str(error.value) == (
+        'deck:18: friction.coefficient = 0.3: expected 0, since solver.algorithm = "frictionless"'
+    )
     with pytest.raises(
         DeckError, match=r'friction.coefficient: missing; .* since solver.algorithm = "static"'
     ):
         Case.from_text(DECK + '\n[solver]\nalgorithm = "static"\n')
+
+
+def test_without_friction_surfaces_may_be_moved_over_each_other_where_that_is_followed() -> None:
+    frictionless = {"nodes_across": 21, "friction_coefficient": 0.0, "normal_load": None}
+    followed = {**frictionless, "algorithm": "incremental"}
+    moved, pulled = [{"normal_load": 100.0, key: 1e-6} for key in ("shift_x", "tangential_load_x")]
+    assert sphere_on_flat(**followed, loads=[moved]).load_steps[0].x.value == 1e-6
+    sentence = "expected 0, since the contact is frictionless"
+    assert f"load.1.shift_x = 1e-06: {sentence}" in complaint(**frictionless, loads=[moved])
+    assert f"load.1.tangential_load_x = 1e-06: {sentence}" in complaint(**followed, loads=[pulled])
 
 
 def test_fields_that_a_frictionless_run_does_not_have_are_refused() -> None:

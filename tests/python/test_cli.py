@@ -275,7 +275,7 @@ def test_info_tells_the_story(solved: Path) -> None:
     for words in (
         "A sphere",
         "2 (complete)",
-        "hexcontact 0.1.0",
+        f"hexcontact {hexcontact.__version__}",
         "press",
         "100.0 N",
         "Against Hertz",

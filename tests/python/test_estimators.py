@@ -99,3 +99,12 @@ def test_no_ellipse() -> None:
     saddle = np.where(np.hypot(x, y) < 12, np.sqrt(np.maximum(1 + (x / 12) ** 2 - (y / 13) ** 2, 0)), 0.0)
     with pytest.raises(ValueError, match="does not vanish on an ellipse"):
         estimators.edge_ellipse(x, y, saddle, 1.0)
+
+
+def test_pressure_center() -> None:
+    x, y = lattice(12, 0.5)
+    around_node = np.maximum(4 - ((x - 0.75) ** 2 + (y - 0.5 * HEIGHT) ** 2), 0.0)  # symmetric about a node
+    assert estimators.pressure_center(x, y, around_node) == pytest.approx((0.75, 0.5 * HEIGHT), abs=1e-14)
+    two = np.where(np.hypot(x, y) < 0.1, 1.0, np.where(np.hypot(x - 4.0, y) < 0.1, 3.0, 0.0))
+    assert estimators.pressure_center(x, y, two) == pytest.approx((3.0, 0.0), abs=1e-14)
+    assert np.isnan(estimators.pressure_center(x, y, np.zeros_like(x))).all()

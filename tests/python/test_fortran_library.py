@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/fortran.md").read_text()
-PROGRAM = ROOT / "docs/example.f90"
+PROGRAMS = [ROOT / "docs/example.f90", ROOT / "docs/example_friction.f90"]
 # meson and ninja lie beside this interpreter
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 
@@ -31,10 +31,11 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_example_links_and_prints_what_the_page_shows(prefix: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.stem)
+def test_example_links_and_prints_what_the_page_shows(program: Path, prefix: Path, tmp_path: Path) -> None:
     pkgconfig = str(prefix / "lib/pkgconfig")
     flags = run("pkg-config", "--cflags", "--libs", "hexcontact", PKG_CONFIG_PATH=pkgconfig).split()
-    run("gfortran", "-std=f2018", "-Wall", "-Werror", PROGRAM, "-o", "example", *flags, folder=tmp_path)
+    run("gfortran", "-std=f2018", "-Wall", "-Werror", program, "-o", "example", *flags, folder=tmp_path)
     assert f"\n{run(tmp_path / 'example', LD_LIBRARY_PATH=str(prefix / 'lib'))}```" in PAGE
 
 
@@ -45,5 +46,6 @@ def test_library_knows_nothing_of_python(prefix: Path) -> None:
     assert not list((prefix / "include").rglob("*f2py*"))
 
 
-def test_page_shows_the_program_that_is_tested() -> None:
-    assert PROGRAM.read_text() in PAGE
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.stem)
+def test_page_shows_the_program_that_is_tested(program: Path) -> None:
+    assert program.read_text() in PAGE

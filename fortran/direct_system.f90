@@ -1,0 +1,224 @@
+!> The linear problem of the direct method: an area in contact, with stick and slip frozen.
+module hc_direct_system
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lapack, only: dgesv, dgelss
+  use hc_flexibility_dense, only: dense_flexibility_t
+  use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
+  use hc_friction_law, only: normal_to
+  use hc_friction_problem, only: friction_problem_t
+  use hc_driven_motions, only: driven_motions_t, new_driven_motions
+  implicit none
+  private
+
+  public :: iterate_t, infinite, unloaded, solve_area
+
+  !> A compliance that leaves no traction across the direction of slip.
+  real(wp), parameter :: infinite = huge(1.0_wp)
+  !> Singular value, relative to the largest, below which a rigid motion is not determined.
+  real(wp), parameter :: undetermined = 1.0e-12_wp
+  !> Part of a load, relative to the sum of all tractions, that counts as rounding error.
+  real(wp), parameter :: carried = 1.0e-8_wp
+
+  !> An iterate; over the nodes of the window.
+  type :: iterate_t
+    !> Nodes that may come into contact, nodes in contact
+    logical, allocatable :: candidate(:), contact(:)
+    !> Initial gap (n) and relative displacement at the beginning of the step (n, 2) [m]
+    real(wp), allocatable :: initial_gap(:), reference(:, :)
+    !> Pressure (n) and shear traction (n, 2) [Pa]
+    real(wp), allocatable :: p(:), q(:, :)
+    !> Gap (n) and slip of the step (n, 2) under them [m]
+    real(wp), allocatable :: gap(:), ds(:, :)
+    !> Approach, shifts [m] and twist [rad]
+    real(wp) :: motion(n_motion) = 0.0_wp
+    !> Frozen state of the nodes in contact: stick or slip, its direction (n, 2) and
+    !> compliance across it; a node with an infinite one has no traction across
+    integer, allocatable :: zone(:)
+    real(wp), allocatable :: direction(:, :), compliance(:)
+    !> The tractions carry all prescribed loads
+    logical :: carried = .true.
+    !> Linear systems solved so far
+    integer :: solves = 0
+  end type iterate_t
+
+contains
+
+  !> Gap and slip that the motions alone would cause, without tractions (n, 3) [m].
+  pure function unloaded(problem, it)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Iterate
+    type(iterate_t), intent(in) :: it
+    real(wp) :: unloaded(size(it%p), 3)
+
+    unloaded(:, normal) = it%initial_gap - it%motion(normal)
+    unloaded(:, along_x:) = -reshape(problem%rigid_displacement(it%motion), [size(it%p), 2]) - it%reference
+  end function unloaded
+
+  !> Tractions and motions with g = 0 on the contact, ds = 0 in stick, t.ds + D tau = 0 in slip.
+  !>
+  !> The unknowns are p on the contact, q_x and q_y in stick, tau in slip, in this order, and the changes
+  !> of the rigid motions whose loads are prescribed. Unknown k acts with `traction(:, k)`, and its row
+  !> adds up the displacements by `weight(:, k)`: they differ by the mu e in q = mu p e + tau t. Lengths are
+  !> divided by the self-compliance of a node, so that every number is a pressure.
+  subroutine solve_area(problem, flexibility, target, it, error)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Its explicit matrix
+    type(dense_flexibility_t), intent(in) :: flexibility
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(driven_motions_t) :: driven
+    real(wp), allocatable :: matrix(:, :), rhs(:, :), weight(:, :), traction(:, :), resultant(:, :), rigid(:, :), &
+                             direction(:, :)
+    integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), pivot(:)
+    real(wp) :: load(n_motion)
+    integer :: i, k, n, n_p, n_free, info, stat
+
+    contact = pack([(i, i=1, size(it%p))], it%contact)
+    stuck = pack(contact, it%zone(contact) == stick)
+    sliding = pack(contact, it%zone(contact) == slip .and. it%compliance(contact) < infinite)
+    node = [contact, stuck, stuck, sliding]
+    call new_driven_motions(driven, problem, target, reshape(it%contact, problem%lattice%extent))
+    n = size(node)
+    n_p = size(contact)
+    n_free = size(driven%motion) + merge(1, 0, target%control(normal) == force_control)
+    allocate (matrix(n, n), rhs(n, 0:n_free), weight(3, n), resultant(n, n_free), pivot(n), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the matrix of the contact area: use method "fft"')
+      return
+    end if
+    weight = 0.0_wp
+    weight(normal, :n_p) = 1.0_wp
+    weight(along_x, n_p + 1:n_p + size(stuck)) = 1.0_wp
+    weight(along_y, n_p + size(stuck) + 1:n_p + 2*size(stuck)) = 1.0_wp
+    do k = n_p + 2*size(stuck) + 1, n
+      weight(along_x:, k) = normal_to(it%direction(node(k), :))
+    end do
+    traction = weight
+    do k = 1, n_p
+      if (it%zone(node(k)) == stick .or. problem%friction%no_slip) cycle
+      traction(along_x:, k) = problem%friction%coefficient*it%direction(node(k), :)
+    end do
+
+    rigid = unloaded(problem, it)
+    do k = 1, n
+      rhs(k, 0) = -dot_product(weight(:, k), rigid(node(k), :))/problem%normal_compliance
+    end do
+    if (n_free > size(driven%motion)) then
+      load(1) = target%value(normal)/problem%lattice%cell_area()
+      rhs(:, 1) = weight(normal, :)
+      resultant(:, 1) = traction(normal, :)
+    end if
+    do i = 1, size(driven%motion)
+      k = n_free - size(driven%motion) + i
+      load(k) = driven%load(i, problem, target)
+      direction = reshape(driven%direction(i, problem), [size(it%p), 2])
+      rhs(:, k) = sum(weight(along_x:, :)*transpose(direction(node, :)), dim=1)
+      resultant(:, k) = sum(traction(along_x:, :)*transpose(direction(node, :)), dim=1)
+    end do
+    call assemble(problem, flexibility, node, n_p, weight, traction, matrix)
+    do k = n_p + 2*size(stuck) + 1, n
+      matrix(k, k) = matrix(k, k) + it%compliance(node(k))/problem%normal_compliance
+    end do
+    call dgesv(n, 1 + n_free, matrix, n, pivot, rhs, n, info)
+    if (info /= 0) then
+      call raise(error, status%no_convergence, 'the matrix of the contact area is singular')
+      return
+    end if
+
+    call fulfil_loads(problem, driven, load(:n_free), resultant, rhs, it, error)
+    if (allocated(error)) return
+    it%p = 0.0_wp
+    it%q = 0.0_wp
+    it%p(contact) = rhs(:n_p, 0)
+    do k = 1, n
+      it%q(node(k), :) = it%q(node(k), :) + rhs(k, 0)*traction(along_x:, k)
+    end do
+  end subroutine solve_area
+
+  !> Find the motions whose loads are prescribed from these loads.
+  !>
+  !> Motions that the loads do not determine stay as they are (without a node in stick, say).
+  subroutine fulfil_loads(problem, driven, load, resultant, rhs, it, error)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Tangential motions driven by their loads
+    type(driven_motions_t), intent(in) :: driven
+    !> Loads over the cell area, the tangential ones last [Pa]
+    real(wp), intent(in) :: load(:)
+    !> Loads of unit unknowns (size(rhs, 1), size(load))
+    real(wp), intent(in) :: resultant(:, :)
+    !> Unknowns at the present motions, and those of unit motions; on return the first are at the new motions
+    real(wp), intent(inout) :: rhs(:, 0:)
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp) :: stiffness(n_motion, n_motion), change(n_motion, 1), singular(n_motion), work(64)
+    integer :: n, m, rank, info
+
+    n = size(load)
+    if (n == 0) return
+    stiffness(:n, :n) = matmul(transpose(resultant), rhs(:, 1:))
+    change(:n, 1) = load - matmul(rhs(:, 0), resultant)
+    call dgelss(n, n, 1, stiffness, n_motion, change, n_motion, singular, undetermined, rank, work, size(work), info)
+    if (info /= 0) then
+      call raise(error, status%no_convergence, 'the rigid motions of the contact cannot be found')
+      return
+    end if
+    rhs(:, 0) = rhs(:, 0) + matmul(rhs(:, 1:), change(:n, 1))
+    it%carried = maxval(abs(load - matmul(rhs(:, 0), resultant))) <= carried*sum(abs(rhs(:, 0)))
+
+    change(:n, 1) = change(:n, 1)*problem%normal_compliance
+    m = size(driven%motion)
+    if (n > m) it%motion(normal) = it%motion(normal) + change(1, 1)
+    call driven%set_motions(driven%multipliers(it%motion) + change(n - m + 1:n, 1), it%motion)
+  end subroutine fulfil_loads
+
+  !> Matrix of the nodes' mutual influence: weight.K.traction, divided by the self-compliance.
+  subroutine assemble(problem, flexibility, node, n_p, weight, traction, matrix)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Its explicit matrix
+    type(dense_flexibility_t), intent(in) :: flexibility
+    !> Node of each unknown
+    integer, intent(in) :: node(:)
+    !> Number of pressures; they come first
+    integer, intent(in) :: n_p
+    !> Displacements that each row adds up, traction of each unknown (3, size(node))
+    real(wp), intent(in) :: weight(:, :), traction(:, :)
+    !> Matrix
+    real(wp), intent(out) :: matrix(:, :)
+    integer :: column, from, onto, first, source, k, n
+
+    n = problem%lattice%size()
+    !$omp parallel do private(from, onto, first, source, k) if (size(node) > 500)
+    do column = 1, size(node)
+      matrix(:, column) = 0.0_wp
+      do from = normal, along_y
+        if (abs(traction(from, column)) <= 0.0_wp) cycle
+        source = (from - 1)*n + node(column)
+        ! Goodman: the gap does not feel shear tractions
+        first = merge(n_p + 1, 1, problem%goodman .and. from /= normal)
+        do k = first, size(node)
+          do onto = normal, along_y
+            if (abs(weight(onto, k)) <= 0.0_wp) cycle
+            matrix(k, column) = matrix(k, column) + weight(onto, k)*traction(from, column) &
+                                *flexibility%matrix((onto - 1)*n + node(k), source)
+          end do
+        end do
+      end do
+      matrix(:, column) = matrix(:, column)/problem%normal_compliance
+    end do
+    !$omp end parallel do
+  end subroutine assemble
+
+end module hc_direct_system

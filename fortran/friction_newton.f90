@@ -1,0 +1,136 @@
+!> Newton's method for pressure and shear traction at once.
+!>
+!> Where the two act strongly on each other (dissimilar materials and much
+!> friction), sweeps that find one after the other keep exchanging nodes at the
+!> edge of the contact. Here contact area, stick, slip and both tractions come from
+!> one linear problem with the rigid motions, solved by GMRES. It is not
+!> symmetric, because the pressure of a slipping node carries mu p e along.
+module hc_friction_newton
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: normal, force_control
+  use hc_driven_motions, only: driven_motions_t
+  use hc_friction_iterate, only: iterate_t
+  use hc_friction_sweep, only: inner_accuracy, final_accuracy
+  use hc_friction_systems, only: coupled_system_t
+  use hc_krylov, only: projected_gmres, precondition_constraints, fulfil
+  implicit none
+  private
+
+  public :: coupled_sweep
+
+  !> Directions that GMRES keeps.
+  integer, parameter :: max_directions = 60
+
+contains
+
+  !> One step of Newton's method.
+  subroutine coupled_sweep(now, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout), target :: now
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(coupled_system_t) :: system
+    real(wp), allocatable :: x(:), ax(:), rhs(:), weight(:), columns(:, :), rows(:, :), shear_columns(:, :), plane(:)
+    logical, allocatable :: active(:), shear_active(:)
+    real(wp), allocatable :: shear_missing(:)
+    type(driven_motions_t) :: driven
+    real(wp) :: missing(4), multiplier(4), goal
+    integer :: n, m, k, n_shear, iterations
+    logical :: independent
+
+    n = size(now%p)
+    now%contact = now%contact_area(now%h + now%closing + now%w - now%motion(normal))
+    now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
+    call now%classify(.false., shear_active)
+    system%operators => now%operators
+    system%shear => now%shear
+    system%n_threads = now%operators%n_threads
+    allocate (active(3*n), x(3*n), ax(3*n), rhs(3*n), weight(3*n), plane(2*n))
+    active(:n) = now%contact
+    active(n + 1:) = shear_active
+    allocate (system%slope(n), source=0.0_wp)
+    if (.not. now%problem%friction%no_slip) then
+      where (now%contact .and. .not. shear_active(n + 1:)) system%slope = now%problem%friction%coefficient
+    end if
+    x(:n) = now%p
+    call now%shear%to_frame(now%q, x(n + 1:))
+    ! what p carries along is not counted twice
+    x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
+    where (.not. shear_active) x(n + 1:) = 0.0_wp
+
+    call now%constraints(shear_active, driven, shear_columns, shear_missing)
+    n_shear = size(shear_missing)
+    m = n_shear
+    if (now%target%control(normal) == force_control) m = m + 1
+    allocate (columns(3*n, m), rows(3*n, m), source=0.0_wp)
+    columns(n + 1:, :n_shear) = shear_columns
+    rows(n + 1:, :n_shear) = shear_columns
+    do k = 1, n_shear
+      ! the traction mu p e belongs to the pressure
+      plane = driven%direction(k, now%problem)
+      rows(:n, k) = system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
+    end do
+    missing(:n_shear) = shear_missing
+    multiplier(:n_shear) = driven%multipliers(now%motion)
+    if (m > n_shear) then
+      columns(:n, m) = merge(1.0_wp, 0.0_wp, now%contact)
+      rows(:, m) = columns(:, m)
+      missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - sum(now%p)
+      multiplier(m) = now%motion(normal)
+    end if
+    call adjust(system, active, columns(:, :m), rows(:, :m), missing(:m), x, independent, error)
+    if (allocated(error)) return
+    if (independent) then
+      call system%product(x, ax, error)
+      if (allocated(error)) return
+      rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
+      plane = now%origin + now%prescribed_displacement()
+      call now%shear%to_frame(plane, rhs(n + 1:))
+      weight(:n) = 1.0_wp/(now%problem%normal_compliance*maxval(now%p))
+      weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
+      goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
+                 final_accuracy*now%tolerance)
+      goal = goal*real(count(active), wp)**0.25_wp
+      call projected_gmres(system, active, columns, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
+                           independent, iterations, error)
+      if (allocated(error)) return
+    end if
+    now%sliding = .not. independent
+    if (now%sliding) return
+
+    call driven%set_motions(multiplier(:n_shear), now%motion)
+    if (m > n_shear) now%motion(normal) = multiplier(m)
+    now%p = x(:n)
+    x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
+    call now%shear%to_plane(x(n + 1:), now%q)
+    ! from here on w and u are those of all tractions together
+    now%w = ax(:n)
+    now%closing = 0.0_wp
+    ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*x(n + 1:2*n)
+    call now%shear%to_plane(ax(n + 1:), now%u)
+    now%dragged = 0.0_wp
+    call now%find_residuals()
+    now%first = .false.
+  end subroutine coupled_sweep
+
+  !> Make the unknowns carry the prescribed loads.
+  subroutine adjust(system, active, columns, rows, missing, x, independent, error)
+    type(coupled_system_t), intent(inout) :: system
+    logical, intent(in) :: active(:)
+    !> B and C of the constraints
+    real(wp), intent(in) :: columns(:, :), rows(:, :)
+    !> What C^T x lacks
+    real(wp), intent(in) :: missing(:)
+    real(wp), intent(inout) :: x(:)
+    logical, intent(out) :: independent
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: mb(:, :)
+
+    call precondition_constraints(system, active, columns, mb, error)
+    if (allocated(error)) return
+    call fulfil(rows, mb, missing, x, independent, system%n_threads)
+  end subroutine adjust
+
+end module hc_friction_newton

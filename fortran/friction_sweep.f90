@@ -1,0 +1,201 @@
+!> A sweep over pressure and shear traction.
+!>
+!> Two steps of a semismooth Newton method: the pressure under the present shear
+!> traction, by active sets as without friction; then the shear traction under that
+!> pressure, with stick, slip and the direction of slip taken from the last
+!> iterate (see friction_law). Both linear problems are solved by projected
+!> conjugate gradients, no more accurately than the sets deserve; the rigid motions
+!> come out as multipliers of the prescribed loads.
+module hc_friction_sweep
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
+  use hc_driven_motions, only: driven_motions_t
+  use hc_friction_iterate, only: iterate_t, gap_residual, cautious
+  use hc_krylov, only: projected_cg, precondition_constraints, fulfil
+  implicit none
+  private
+
+  public :: staggered_sweep, inner_accuracy, final_accuracy
+
+  !> Accuracy of a linear solution, relative to the residual at its start.
+  real(wp), parameter :: inner_accuracy = 0.1_wp
+  !> Accuracy of the last linear solution, relative to the tolerance.
+  real(wp), parameter :: final_accuracy = 0.2_wp
+  !> Component across the direction of slip, relative to the largest traction, that is taken for an answer.
+  real(wp), parameter :: beyond_reason = 5.0_wp
+  !> Sweeps after which a residual that falls less than this is taken for a circle.
+  integer, parameter :: patience = 6
+  real(wp), parameter :: stalling = 0.7_wp
+  !> The share of a step that is taken then falls by this factor from 1/2 on, down to this.
+  real(wp), parameter :: less = 0.9_wp, least_share = 0.1_wp
+  !> Residual from which on Newton's method is left alone.
+  real(wp), parameter :: settled = 1.0e-2_wp
+  !> Sweeps after which a whole step is taken again with half the classification parameter, and how small that gets.
+  integer, parameter :: tired = 10
+  real(wp), parameter :: least_caution = 1.0e-3_wp
+  integer, parameter :: max_iterations = 400
+  !> Contact areas that are tried before the shear traction is looked at again.
+  integer, parameter :: max_areas = 2, max_areas_alone = 60
+
+contains
+
+  !> One sweep: pressure, then shear traction, each with what it does to the other.
+  subroutine staggered_sweep(now, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout) :: now
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    call press(now, error)
+    if (allocated(error)) return
+    if (now%dragging) then
+      call now%operators%apply([normal], now%p, [along_x, along_y], now%dragged, error)
+      if (allocated(error)) return
+    end if
+    call shear_off(now, error)
+    if (allocated(error)) return
+    if (now%pressing) then
+      call now%operators%apply([along_x, along_y], now%on_cone(), [normal], now%closing, error)
+      if (allocated(error)) return
+    end if
+    call now%find_residuals()
+    now%first = .false.
+  end subroutine staggered_sweep
+
+  !> Pressure under the present shear traction.
+  subroutine press(now, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout) :: now
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
+    logical, allocatable :: contact(:)
+    real(wp) :: goal, residual, multiplier(1), missing(1), cell_area
+    integer :: n, area, n_constraint, iterations
+    logical :: changed, independent
+
+    n = size(now%p)
+    cell_area = now%problem%lattice%cell_area()
+    n_constraint = merge(1, 0, now%target%control(normal) == force_control)
+    allocate (constraint(n, n_constraint))
+    do area = 1, merge(max_areas, max_areas_alone, now%pressing)
+      gap = now%h + now%closing + now%w - now%motion(normal)
+      if (now%first .and. area == 1) then
+        contact = now%contact
+        changed = .true.
+      else
+        now%residual_normal = gap_residual(now%problem, now%p, gap)
+        if (now%residual_normal <= final_accuracy*now%tolerance) return
+        contact = now%contact_area(gap)
+        changed = any(contact .neqv. now%contact)
+      end if
+
+      if (changed .or. .not. allocated(mb)) then
+        now%contact = contact
+        if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, contact)
+        call precondition_constraints(now%pressure, contact, constraint, mb, error)
+        if (allocated(error)) return
+      end if
+      if (changed) then
+        now%p = merge(max(now%p, 0.0_wp), 0.0_wp, contact)
+        if (n_constraint == 1) then
+          missing = now%target%value(normal)/cell_area - sum(now%p)
+          call fulfil(constraint, mb, missing, now%p, independent, now%pressure%n_threads)
+        end if
+        call now%pressure%product(now%p, now%w, error)
+        if (allocated(error)) return
+      end if
+      rhs = -now%h - now%closing
+      if (n_constraint == 0) rhs = rhs + now%motion(normal)
+      goal = final_accuracy*now%tolerance
+      if (changed) goal = max(inner_accuracy*min(now%residual_normal, 1.0_wp), goal)
+      call projected_cg(now%pressure, contact, constraint, mb, rhs, now%p, now%w, &
+                        goal*now%problem%normal_compliance*maxval(abs(now%p)), max_iterations, &
+                        multiplier(:n_constraint), residual, iterations, error)
+      if (allocated(error)) return
+      if (n_constraint == 1) now%motion(normal) = multiplier(1)
+    end do
+  end subroutine press
+
+  !> Shear traction under the present pressure.
+  subroutine shear_off(now, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout) :: now
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :), moved(:), q(:)
+    logical, allocatable :: active(:)
+    real(wp), allocatable :: u(:), missing(:), multiplier(:)
+    type(driven_motions_t) :: driven
+    real(wp) :: goal, residual, motion(n_motion)
+    integer :: n, iterations
+    logical :: independent, holding
+
+    n = size(now%p)
+    if (.not. now%problem%friction%resists()) then
+      now%q = 0.0_wp
+      return
+    end if
+    allocate (x(2*n), ax(2*n), rhs(2*n), moved(2*n), q(2*n))
+    q = now%q
+    holding = .false.
+    do
+      call now%classify(holding, active)
+      call now%shear%to_frame(now%q, x)
+      call now%constraints(active, driven, constraint, missing)
+      multiplier = driven%multipliers(now%motion)
+      call precondition_constraints(now%shear, active, constraint, mb, error)
+      if (allocated(error)) return
+      call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
+      if (independent) then
+        call now%shear%product(x, ax, error)
+        if (allocated(error)) return
+        ! motions that are prescribed are known; the others are multipliers
+        moved = now%origin - now%dragged + now%prescribed_displacement()
+        call now%shear%to_frame(moved, rhs)
+        ! Newton's method alone converges the faster the more accurate its steps are
+        goal = min(now%residual_tangential, 1.0_wp)
+        goal = goal*merge(inner_accuracy, min(inner_accuracy, max(goal, 1.0e-3_wp)), now%pressing)
+        goal = max(goal, final_accuracy*now%tolerance)
+        goal = goal*now%problem%tangential_compliance*now%traction_scale()
+        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal, max_iterations, multiplier, &
+                          residual, iterations, error)
+        if (allocated(error)) return
+      end if
+      now%sliding = .not. independent
+      if (size(missing) == 0 .or. holding .or. any(active(n + 1:))) exit
+      ! where all nodes slip, only their directions resist a load: not beyond reason
+      if (independent .and. maxval(abs(x(:n))) <= beyond_reason*now%traction_scale()) exit
+      holding = .true.
+      now%caution = max(cautious*now%caution, least_caution)
+      now%q = q
+    end do
+    if (now%sliding) return
+    u = now%u
+    motion = now%motion
+    call driven%set_motions(multiplier, now%motion)
+    call now%shear%to_plane(x, now%q)
+    ax(:n) = ax(:n) - now%shear%compliance*x(:n)
+    call now%shear%to_plane(ax, now%u)
+    call now%find_residuals()
+    now%n_sweep = now%n_sweep + 1
+    if (mod(now%n_sweep, tired) == 0) then
+      now%caution = max(0.5_wp*now%caution, least_caution)
+      now%best = huge(1.0_wp)
+    end if
+    if (now%n_sweep <= patience .or. now%residual_tangential <= max(stalling*now%best, settled)) then
+      now%best = min(now%best, now%residual_tangential)
+      now%share = 0.5_wp
+    else
+      ! Newton's method goes in circles: what lies between carries the same loads
+      now%q = q + now%share*(now%q - q)
+      now%u = u + now%share*(now%u - u)
+      now%motion = motion + now%share*(now%motion - motion)
+      now%share = max(less*now%share, least_share)
+    end if
+  end subroutine shear_off
+
+end module hc_friction_sweep

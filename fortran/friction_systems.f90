@@ -1,0 +1,334 @@
+!> The two linear problems inside a frictional contact, for conjugate gradients.
+!>
+!> Pressure: w = K p on the nodes in contact. Shear: every node in contact has
+!> a frame (t, e); a sticking node carries both components of q, a slipping one
+!> tau in q = mu p e + tau t and the compliance D along t. The matrix
+!>
+!>     R^T T R + D,     R: frame -> (x, y)
+!>
+!> is symmetric positive definite on these unknowns. Its preconditioner is the
+!> inverse symbol, except where D is much larger than the elastic compliance of
+!> a node: there it is 1/D, and in between
+!>
+!>     M = sqrt(chi) R^T T^-1 R sqrt(chi) + (1 - chi)/D.
+!>
+!> A field with two components is one vector, first the one, then the other.
+module hc_friction_systems
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: normal, along_x, along_y
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
+  use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
+  use hc_krylov, only: linear_system_t
+  implicit none
+  private
+
+  public :: operators_t, new_operators, operators_memory
+  public :: pressure_system_t, shear_system_t, new_shear_system, coupled_system_t, blend_end
+
+  !> Components of the shear traction
+  integer, parameter :: shear(2) = [along_x, along_y]
+  !> The blend goes from the one preconditioner to the other while D grows by this factor,
+  real(wp), parameter :: blend_range = 16.0_wp
+  !> up to this many elastic compliances of a node.
+  real(wp), parameter :: blend_end = 8.0_wp
+
+  !> Operator and preconditioners over one window, and the work they did.
+  type :: operators_t
+    type(fft_flexibility_t) :: flexibility
+    type(preconditioner_t) :: normal, tangential
+    !> Threads that share the vector operations
+    integer :: n_threads = 1
+    !> Work of the preconditioners, in applications of the full operator
+    real(wp) :: preconditioning = 0.0_wp
+  contains
+    !> Displacements that given components of the traction cause along others
+    procedure :: apply => apply_operators
+    !> All work so far, in applications of the full operator
+    procedure :: work
+  end type operators_t
+
+  !> Pressure on the nodes in contact.
+  type, extends(linear_system_t) :: pressure_system_t
+    type(operators_t), pointer :: operators => null()
+  contains
+    procedure :: product => pressure_product
+    procedure :: precondition => pressure_precondition
+  end type pressure_system_t
+
+  !> Shear traction in the frames of the nodes.
+  type, extends(linear_system_t) :: shear_system_t
+    type(operators_t), pointer :: operators => null()
+    !> Direction e of each node; t is a quarter turn ahead
+    real(wp), allocatable :: direction(:, :)
+    !> Compliance D along t, 0 in stick [m/Pa]
+    real(wp), allocatable :: compliance(:)
+    !> sqrt(chi) of each node
+    real(wp), allocatable :: weight(:)
+    !> Elastic compliance 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa]
+    real(wp) :: elastic_compliance = 0.0_wp
+    real(wp), allocatable, private :: from(:), onto(:)
+  contains
+    procedure :: product => shear_product
+    procedure :: precondition => shear_precondition
+    !> Components along x and y from those in the frames, and back
+    procedure :: to_plane, to_frame
+    !> Work the weights out from the compliances
+    procedure :: blend
+  end type shear_system_t
+
+  !> Pressure and shear traction together: the pressure of a slipping node carries mu p e along.
+  !>
+  !> Its matrix is not symmetric. A vector is the pressure, then the shear in the frames.
+  type, extends(linear_system_t) :: coupled_system_t
+    type(operators_t), pointer :: operators => null()
+    !> Frames and compliances of the nodes
+    type(shear_system_t), pointer :: shear => null()
+    !> mu at slipping nodes, 0 elsewhere
+    real(wp), allocatable :: slope(:)
+  contains
+    procedure :: product => coupled_product
+    procedure :: precondition => coupled_precondition
+  end type coupled_system_t
+
+contains
+
+  !> Operator and preconditioners over a window.
+  subroutine new_operators(self, lattice, pair, error, n_threads)
+    !> Operators to be set up
+    type(operators_t), intent(out) :: self
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads to use; absent or 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+
+    call new_fft_flexibility(self%flexibility, lattice, pair, error, n_threads=n_threads)
+    if (allocated(error)) return
+    call new_preconditioner(self%normal, lattice, pair, error, n_threads)
+    if (allocated(error)) return
+    call new_preconditioner(self%tangential, lattice, pair, error, n_threads, tangential=.true.)
+    self%n_threads = self%flexibility%convolution%n_threads
+  end subroutine new_operators
+
+  !> Bytes that operator and preconditioners take, for a window of the given size.
+  pure integer(selected_int_kind(18)) function operators_memory(extent, n_threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+
+    operators_memory = fft_memory(extent, .false., n_threads) + preconditioner_memory(extent, n_threads, .false.) &
+                       + preconditioner_memory(extent, n_threads, .true.)
+  end function operators_memory
+
+  !> A product of some components, on vectors.
+  subroutine apply_operators(self, from, traction, onto, displacement, error)
+    class(operators_t), intent(inout) :: self
+    !> Components that act: normal, along_x, along_y
+    integer, intent(in) :: from(:)
+    !> Their values, one after the other [Pa]
+    real(wp), intent(in), contiguous, target :: traction(:)
+    !> Components that are wanted
+    integer, intent(in) :: onto(:)
+    !> Their values, one after the other [m]
+    real(wp), intent(out), contiguous, target :: displacement(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), pointer, contiguous :: acting(:, :, :), wanted(:, :, :)
+
+    associate (n => self%flexibility%lattice%extent)
+      acting(1:n(1), 1:n(2), 1:size(from)) => traction
+      wanted(1:n(1), 1:n(2), 1:size(onto)) => displacement
+    end associate
+    call self%flexibility%apply(from, acting, onto, wanted, error)
+  end subroutine apply_operators
+
+  pure real(wp) function work(self)
+    class(operators_t), intent(in) :: self
+    work = self%flexibility%applications + self%preconditioning
+  end function work
+
+  !> Apply a preconditioner to vectors, and count it.
+  subroutine precondition(operators, preconditioner, n_component, x, y)
+    type(operators_t), intent(inout) :: operators
+    type(preconditioner_t), intent(inout) :: preconditioner
+    integer, intent(in) :: n_component
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    real(wp), pointer, contiguous :: displacement(:, :, :), traction(:, :, :)
+
+    associate (n => operators%flexibility%lattice%extent)
+      displacement(1:n(1), 1:n(2), 1:n_component) => x
+      traction(1:n(1), 1:n(2), 1:n_component) => y
+    end associate
+    call preconditioner%apply(displacement, traction)
+    operators%preconditioning = operators%preconditioning + preconditioner%cost
+  end subroutine precondition
+
+  subroutine pressure_product(self, x, y, error)
+    class(pressure_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%operators%apply([normal], x, [normal], y, error)
+  end subroutine pressure_product
+
+  subroutine pressure_precondition(self, x, y, error)
+    class(pressure_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    call precondition(self%operators, self%operators%normal, 1, x, y)
+  end subroutine pressure_precondition
+
+  !> A shear system in which every node sticks.
+  subroutine new_shear_system(self, operators)
+    !> System to be set up
+    type(shear_system_t), intent(out) :: self
+    !> Operator and preconditioners
+    type(operators_t), intent(inout), target :: operators
+    integer :: n
+
+    n = operators%flexibility%lattice%size()
+    self%operators => operators
+    self%n_threads = operators%n_threads
+    associate (pair => operators%flexibility%pair)
+      self%elastic_compliance = (2.0_wp*pair%lambda_1 + pair%lambda_5)*operators%flexibility%lattice%spacing()
+    end associate
+    allocate (self%direction(2, n), self%compliance(n), source=0.0_wp)
+    allocate (self%weight(n), source=1.0_wp)
+    allocate (self%from(2*n), self%onto(2*n))
+    self%direction(1, :) = 1.0_wp
+  end subroutine new_shear_system
+
+  !> chi falls with log D from 1 to 0; the symbol does not see the softest nodes at all.
+  subroutine blend(self)
+    class(shear_system_t), intent(inout) :: self
+    real(wp) :: ratio
+    integer :: i
+
+    do i = 1, size(self%weight)
+      ratio = self%compliance(i)/(blend_end*self%elastic_compliance)
+      if (ratio <= 1.0_wp/blend_range) then
+        self%weight(i) = 1.0_wp
+      else if (ratio >= 1.0_wp) then
+        self%weight(i) = 0.0_wp
+      else
+        self%weight(i) = sqrt(-log(ratio)/log(blend_range))
+      end if
+    end do
+  end subroutine blend
+
+  !> Components along x and y from those along t and e.
+  subroutine to_plane(self, frame, plane)
+    class(shear_system_t), intent(in) :: self
+    !> Components along t and e (2 n)
+    real(wp), intent(in) :: frame(:)
+    !> Components along x and y (2 n)
+    real(wp), intent(out) :: plane(:)
+    integer :: i, n
+
+    n = size(frame)/2
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, n
+      plane(i) = -self%direction(2, i)*frame(i) + self%direction(1, i)*frame(n + i)
+      plane(n + i) = self%direction(1, i)*frame(i) + self%direction(2, i)*frame(n + i)
+    end do
+    !$omp end parallel do
+  end subroutine to_plane
+
+  !> Components along t and e from those along x and y.
+  subroutine to_frame(self, plane, frame)
+    class(shear_system_t), intent(in) :: self
+    !> Components along x and y (2 n)
+    real(wp), intent(in) :: plane(:)
+    !> Components along t and e (2 n)
+    real(wp), intent(out) :: frame(:)
+    integer :: i, n
+
+    n = size(plane)/2
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, n
+      frame(i) = -self%direction(2, i)*plane(i) + self%direction(1, i)*plane(n + i)
+      frame(n + i) = self%direction(1, i)*plane(i) + self%direction(2, i)*plane(n + i)
+    end do
+    !$omp end parallel do
+  end subroutine to_frame
+
+  subroutine shear_product(self, x, y, error)
+    class(shear_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n
+
+    n = size(x)/2
+    call self%to_plane(x, self%from)
+    call self%operators%apply(shear, self%from, shear, self%onto, error)
+    if (allocated(error)) return
+    call self%to_frame(self%onto, y)
+    y(:n) = y(:n) + self%compliance*x(:n)
+  end subroutine shear_product
+
+  subroutine shear_precondition(self, x, y, error)
+    class(shear_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n, i
+
+    n = size(x)/2
+    y(:n) = self%weight*x(:n)
+    y(n + 1:) = self%weight*x(n + 1:)
+    call self%to_plane(y, self%from)
+    call precondition(self%operators, self%operators%tangential, 2, self%from, self%onto)
+    call self%to_frame(self%onto, y)
+    do i = 1, n
+      y(i) = self%weight(i)*y(i)
+      y(n + i) = self%weight(i)*y(n + i)
+      if (self%weight(i) < 1.0_wp) y(i) = y(i) + (1.0_wp - self%weight(i)**2)/self%compliance(i)*x(i)
+    end do
+  end subroutine shear_precondition
+
+  subroutine coupled_product(self, x, y, error)
+    class(coupled_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: frame(:), traction(:), moved(:)
+    integer :: n
+
+    n = size(x)/3
+    allocate (frame, source=x(n + 1:))
+    frame(n + 1:) = frame(n + 1:) + self%slope*x(:n)
+    allocate (traction(3*n), moved(3*n))
+    traction(:n) = x(:n)
+    call self%shear%to_plane(frame, traction(n + 1:))
+    call self%operators%apply([normal, along_x, along_y], traction, [normal, along_x, along_y], moved, error)
+    if (allocated(error)) return
+    y(:n) = moved(:n)
+    call self%shear%to_frame(moved(n + 1:), y(n + 1:))
+    y(n + 1:2*n) = y(n + 1:2*n) + self%shear%compliance*x(n + 1:2*n)
+  end subroutine coupled_product
+
+  subroutine coupled_precondition(self, x, y, error)
+    class(coupled_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n
+
+    n = size(x)/3
+    call precondition(self%operators, self%operators%normal, 1, x(:n), y(:n))
+    call self%shear%precondition(x(n + 1:), y(n + 1:), error)
+  end subroutine coupled_precondition
+
+end module hc_friction_systems

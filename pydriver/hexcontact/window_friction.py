@@ -1,0 +1,182 @@
+"""Contact with friction on one window of the lattice, and the state of a run as its records keep it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .estimators import area_radius
+from .load_history import LoadStep
+from .messages import listed
+from .progress import RESIDUALS, quantity
+from .result import Step
+from .window import Array, Window
+
+if TYPE_CHECKING:
+    from .lattice import Lattice
+    from .native_friction import ContactState, FrictionalContact
+
+_SCALARS = (  # of a state, besides the residuals, that have the names of the history
+    *("normal_load", "tangential_load_x", "tangential_load_y", "torque"),
+    *("approach", "shift_x", "shift_y", "twist", "dissipated_energy", "operator_applications"),
+)
+_NEAR_SLIDING = 0.99  # share of mu P from which full slip may carry a tangential load
+
+
+class FrictionWindow(Window["ContactState"]):
+    """Contact with friction; a step starts from the state at the end of the step before."""
+
+    state = (
+        *("pressure", "traction_x", "traction_y", "gap", "zone"),
+        *("relative_displacement_x", "relative_displacement_y"),
+        *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
+    )
+    arrays = 50  # the states before and after, both once more on their way into the core and out of it
+
+    def _set_up(self, gap: Array) -> None:
+        from .native_friction import FrictionalContact
+
+        self._contact: FrictionalContact = FrictionalContact(
+            self.lattice,
+            self.case.pair,
+            gap,
+            self.candidate,
+            friction_coefficient=self.case.friction_coefficient,
+            coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
+            method=self.case.method_for(self.lattice),
+        )
+
+    def _let_go(self) -> None:
+        del self._contact
+
+    def advance(
+        self, state: ContactState | None, target: LoadStep, values: tuple[float, ...]
+    ) -> ContactState:
+        """Go on from a state to new loads and motions."""
+        return self._contact.advance(
+            self._contact.virgin() if state is None else state,
+            [motion.control for motion in target.targets],
+            values,
+            static=self.case.solver.algorithm == "static",
+            tolerance=self.case.solver.tolerance,
+        )
+
+    def outgrown(self, solution: ContactState) -> bool:
+        """Tell whether the contact reached the rim, be it in a part of the step only.
+
+        Where an attempt that failed puts pressure means nothing.
+        """
+        return solution.converged and solution.touches_rim
+
+    def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
+        """Return a state on this window; what the new nodes have been through follows from it."""
+        return None if state is None else self._contact.extended(state, lattice)
+
+    # --- what a step leaves -------------------------------------------------------------------------------
+
+    def _more_fields(self, solution: ContactState) -> dict[str, NDArray[Any]]:
+        known = ("pressure", "gap", "zone")
+        return {name: getattr(solution, name) for name in self.state if name not in known}
+
+    def _more_history(self, solution: ContactState, before: ContactState | None) -> dict[str, float]:
+        static = self.case.solver.algorithm == "static"  # nothing has gone before
+        spent_before = 0.0 if before is None or static else before.dissipated_energy
+        return {
+            **{name: getattr(solution, name) for name in (*_SCALARS, *RESIDUALS.values())},
+            **self._stick_measures(solution.zone == 1),
+            "max_traction": float(np.hypot(solution.traction_x, solution.traction_y).max()),
+            "dissipated_energy_step": solution.dissipated_energy - spent_before,
+            "elastic_energy": self._elastic_energy(solution),
+            "sweeps": solution.sweeps,
+            "cuts": solution.cuts,
+        }
+
+    def _stick_measures(self, stick: NDArray[np.bool_]) -> dict[str, float]:
+        """Return size and place of the stick zone; NaN for its place where there is none."""
+        x, y = self.lattice.x[stick], self.lattice.y[stick]
+        some = x.size > 0
+        return {
+            "stick_area": self.lattice.cell_area * x.size,
+            "stick_radius": area_radius(stick, self.lattice.cell_area),
+            "stick_center_x": float(x.mean()) if some else math.nan,
+            "stick_center_y": float(y.mean()) if some else math.nan,
+            "stick_min_x": float(x.min()) if some else math.nan,
+            "stick_max_x": float(x.max()) if some else math.nan,
+            "stick_min_y": float(y.min()) if some else math.nan,
+            "stick_max_y": float(y.max()) if some else math.nan,
+        }
+
+    def _elastic_energy(self, solution: ContactState) -> float:
+        """U = sum A_p (p w + q . (u1 - u2))/2, with u1 - u2 = s + shift + twist x r."""
+        inside = solution.zone > 0
+        x, y = self.lattice.x[inside], self.lattice.y[inside]
+        moved_x = solution.relative_displacement_x[inside] + solution.shift_x - solution.twist * y
+        moved_y = solution.relative_displacement_y[inside] + solution.shift_y + solution.twist * x
+        work = (
+            solution.pressure[inside] @ self.closing(solution)[inside]
+            + solution.traction_x[inside] @ moved_x
+            + solution.traction_y[inside] @ moved_y
+        )
+        return 0.5 * self.lattice.cell_area * float(work)
+
+    # --- what stops a run ---------------------------------------------------------------------------------
+
+    def complaint(self, solution: ContactState, target: LoadStep, values: tuple[float, ...]) -> str:
+        """Name gross sliding as such, else what was tried; and the residuals."""
+        segment = f" ({target.label})" if target.label else ""
+        step = f"step {target.index + 1} of {len(self.case.load_steps)}{segment}"
+        tried = [f"{solution.sweeps} iterations"]
+        if solution.cuts:
+            tried.append(f"halving the step {solution.cuts} time{'s' * (solution.cuts > 1)}")
+        z, x, y, twist = (motion.control == "force" for motion in target.targets)
+        shown = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
+        residuals = listed([
+            f"{sign} = {getattr(solution, name):.2e}" for sign, name in RESIDUALS.items() if shown[sign]
+        ], "and")  # fmt: skip
+        after = f"after {listed(tried, 'and')} the residuals are {residuals}"
+        shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
+        bound = self.case.friction_coefficient * values[0] if z else math.nan
+        # below the bound a force alone always finds a balance, whatever an attempt that failed looks like
+        if solution.sliding and (torque or shear > _NEAR_SLIDING * bound or (shear and not z)):
+            wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
+            wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
+            known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})" if z else ""
+            return (
+                f"{step}: gross sliding: no sticking node is left and friction cannot carry the "
+                f"{listed(wanted, 'and the')}{known}; {after}; expected a smaller load, or a prescribed "
+                "motion in its place (shift_x, shift_y, twist)"
+            )
+        return (
+            f"{step} did not converge: {after}; solver.tolerance = {self.case.solver.tolerance:g} was "
+            "expected; more steps in this segment may help, or a larger tolerance"
+        )
+
+
+def state_of(step: Step) -> ContactState:
+    """Return the state of a contact with friction at the end of a step, as the run had it.
+
+    Parameters
+    ----------
+    step : Step
+        A step of a frictional run, or its record in the journal; all its fields are needed.
+
+    Raises
+    ------
+    ValueError
+        If a field or a value is missing, as in a frictionless run.
+    """
+    from .native_friction import ContactState
+
+    needed = {*FrictionWindow.state, *_SCALARS, *RESIDUALS.values(), "sweeps", "cuts"}
+    if missing := needed - step.fields.keys() - step.history.keys():
+        raise ValueError(
+            f"step {step.number} holds no state of a contact with friction: it lacks "
+            f"{', '.join(sorted(missing))}"
+        )
+    state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
+    state |= {name: float(step.history[name]) for name in (*_SCALARS, *RESIDUALS.values())}
+    state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
+    return ContactState(**state)  # a finished step has converged, and away from the rim

@@ -1,0 +1,376 @@
+!> Load steps that are cut in half, with a method that cannot go far at a time, and with the real one.
+module test_load_path
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
+    normal, along_x, along_y, about_z
+  use hc_friction_law, only: coulomb_t
+  use hc_friction_problem, only: friction_problem_t, friction_solver_t, new_friction_problem
+  use hc_frictional_contact, only: frictional_contact_t
+  use hc_load_path, only: advance, touches_rim
+  use test_friction, only: new_sphere
+  use testing, only: test_t, new_test, check, check_true
+  implicit none
+  private
+
+  public :: collect_load_path
+
+  !> One node in contact, that slips by -Q meters; converges only close to the start.
+  type, extends(friction_solver_t) :: short_sighted_t
+    !> How far load or motion may be from the start's
+    real(wp) :: reach = huge(1.0_wp)
+    !> Pressed harder than this, the rim is in contact
+    real(wp) :: rim_load = huge(1.0_wp)
+    !> Targets so far, and whether the relative displacement was counted from zero
+    integer :: calls = 0
+    real(wp) :: value(4, 50) = 0.0_wp
+    logical :: from_zero(50) = .false.
+  contains
+    procedure :: solve_step
+    procedure :: displacements
+  end type short_sighted_t
+
+  !> The real method, with the targets that it has reached.
+  type, extends(frictional_contact_t) :: recorder_t
+    integer :: n_done = 0
+    real(wp) :: done(4, 64) = 0.0_wp
+  contains
+    procedure :: solve_step => record_step
+  end type recorder_t
+
+  integer, parameter :: f = force_control, d = displacement_control
+
+contains
+
+  subroutine collect_load_path(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('whole', test_whole), &
+      new_test('halved', test_halved), &
+      new_test('bounded', test_bounded), &
+      new_test('static', test_static), &
+      new_test('motions', test_motions), &
+      new_test('rim', test_rim), &
+      new_test('half_steps', test_half_steps), &
+      new_test('any_start', test_any_start) &
+    ]
+  end subroutine collect_load_path
+
+  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(short_sighted_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+
+    self%calls = self%calls + 1
+    self%value(:, self%calls) = target%value
+    self%from_zero(self%calls) = all(abs(reference) <= 0.0_wp)
+    call new_friction_state(state, self%problem%lattice)
+    state%load = merge(target%value, 0.0_wp, target%control == f)
+    state%motion = merge(target%value, 0.0_wp, target%control == d)
+    state%pressure(2, 2) = target%value(normal)/self%problem%lattice%cell_area()
+    if (target%value(normal) > self%rim_load) state%pressure(1, 3) = 1.0_wp
+    state%traction(2, 2, 1) = target%value(along_x)/self%problem%lattice%cell_area()
+    state%relative_displacement(:, :, 1) = -target%value(along_x)
+    state%slip_increment(2, 2, :) = state%relative_displacement(2, 2, :) - reference(2, 2, :)
+    state%sweeps = min(3, max_sweeps)
+    state%operator_applications = 2.0_wp
+    state%residual_normal = maxval(abs(target%value - merge(start%load, start%motion, target%control == f)))
+    state%converged = state%residual_normal <= self%reach
+    if (tolerance < 0.0_wp) allocate (error)
+  end subroutine solve_step
+
+  subroutine displacements(self, pressure, traction, displacement, error)
+    class(short_sighted_t), intent(inout) :: self
+    real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+
+    displacement(:, :, 1) = self%problem%normal_compliance*pressure
+    displacement(:, :, 2:) = self%problem%tangential_compliance*traction
+    if (size(displacement) == 0) allocate (error)
+  end subroutine displacements
+
+  !> The method, and the state before the first load.
+  subroutine set_up(solver, state, error)
+    type(short_sighted_t), intent(out) :: solver
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    real(wp) :: gap(4, 5)
+    logical :: candidate(4, 5)
+
+    call new_lattice(lattice, equilateral_basis(0.3_wp), [0, 0], [4, 5], error)
+    if (allocated(error)) return
+    gap = 0.0_wp
+    candidate = .true.
+    call new_friction_problem(solver%problem, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), gap, candidate, &
+                              coulomb_t(0.5_wp), .false., error)
+    if (allocated(error)) return
+    call new_friction_state(state, lattice)
+  end subroutine set_up
+
+  !> A step within reach is made at once; slip path and energy add up over steps there and back.
+  subroutine test_whole(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    call advance(solver, state, load_target_t(value=[8.0_wp, 3.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    call check(error, [next%accumulated_slip(2, 2), next%dissipated_energy], [3.0_wp, 9.0_wp], 1.0e-14_wp, 'first step')
+    if (allocated(error)) return
+    state = next
+    call advance(solver, state, load_target_t(value=[8.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    ! another 4 m back, at the load -1
+    call check(error, [next%accumulated_slip(2, 2), next%dissipated_energy], [7.0_wp, 13.0_wp], 1.0e-14_wp, 'second step')
+    if (allocated(error)) return
+    call check(error, next%slip_increment(2, 2, 1), 4.0_wp, 1.0e-15_wp, 'slip of the step')
+    if (allocated(error)) return
+    call check(error, solver%calls, 2, 'solutions')
+    if (allocated(error)) return
+    call check(error, next%cuts, 0, 'cuts')
+    if (allocated(error)) return
+    call check_true(error, solver%from_zero(1) .and. .not. solver%from_zero(2), 'each step starts from the last')
+  end subroutine test_whole
+
+  !> Halved until it converges; slip, path, energy and work are those of all parts.
+  subroutine test_halved(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    solver%reach = 2.5_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    call check_true(error, next%converged, 'converged')
+    if (allocated(error)) return
+    call check(error, solver%calls, 6, 'solutions')
+    if (allocated(error)) return
+    call check(error, solver%value(1, :6), [8.0_wp, 4.0_wp, 2.0_wp, 4.0_wp, 6.0_wp, 8.0_wp], 0.0_wp, 'normal loads')
+    if (allocated(error)) return
+    call check(error, solver%value(2, :6), [4.0_wp, 2.0_wp, 1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp], 0.0_wp, 'tangential loads')
+    if (allocated(error)) return
+    call check_true(error, all(solver%from_zero(:3)) .and. .not. any(solver%from_zero(4:6)), 'each part starts from the last')
+    if (allocated(error)) return
+    call check(error, next%cuts, 2, 'cuts')
+    if (allocated(error)) return
+    call check(error, next%sweeps, 18, 'sweeps of all attempts')
+    if (allocated(error)) return
+    call check(error, next%operator_applications, 12.0_wp, 0.0_wp, 'work of all attempts')
+    if (allocated(error)) return
+    call check(error, [next%slip_increment(2, 2, 1), sum(next%slip_increment)], [-4.0_wp, -4.0_wp], 1.0e-15_wp, &
+               'slip of the whole step, in contact only')
+    if (allocated(error)) return
+    ! loads 1, 2, 3, 4 over 1 m each
+    call check(error, [next%accumulated_slip(2, 2), next%dissipated_energy], [4.0_wp, 10.0_wp], 1.0e-14_wp, 'path and energy')
+  end subroutine test_halved
+
+  !> As many cuts as are allowed, then a state that says so; the state handed in is as it was.
+  subroutine test_bounded(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    call advance(solver, state, load_target_t(value=[1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    state = next
+    solver%calls = 0
+    solver%reach = 0.1_wp
+    call advance(solver, state, load_target_t(value=[9.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 3, next, error)
+    if (allocated(error)) return
+    call check_true(error, .not. next%converged, 'not converged')
+    if (allocated(error)) return
+    call check(error, next%residual_normal, 1.0_wp, 1.0e-14_wp, 'residual of the last attempt')
+    if (allocated(error)) return
+    call check(error, solver%value(1, :solver%calls), [9.0_wp, 5.0_wp, 3.0_wp, 2.0_wp], 0.0_wp, 'normal loads')
+    if (allocated(error)) return
+    call check(error, next%cuts, 3, 'cuts')
+    if (allocated(error)) return
+    call check(error, [state%load(normal), state%pressure(2, 2)*solver%problem%lattice%cell_area()], [1.0_wp, 1.0_wp], &
+               1.0e-15_wp, 'state before')
+    if (allocated(error)) return
+    call check_true(error, state%converged, 'state before converged')
+  end subroutine test_bounded
+
+  !> A static load counts from the undeformed bodies, also where its parts serve as starts.
+  subroutine test_static(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    call advance(solver, state, load_target_t(value=[8.0_wp, 3.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    state = next
+    solver%calls = 0
+    solver%reach = 2.0_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]), .true., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    call check_true(error, next%converged .and. all(solver%from_zero(:solver%calls)), 'counted from zero')
+    if (allocated(error)) return
+    call check(error, solver%value(2, :solver%calls), [-1.0_wp, 1.0_wp, -1.0_wp], 0.0_wp, 'parts')
+    if (allocated(error)) return
+    call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
+               [1.0_wp, 1.0_wp, 1.0_wp], 1.0e-14_wp, 'slip, path and energy')
+  end subroutine test_static
+
+  !> Motions are interpolated from the motions of the state, loads from its loads.
+  subroutine test_motions(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    state%load = [2.0_wp, 7.0_wp, 0.0_wp, -3.0_wp]
+    state%motion = [5.0_wp, 0.0_wp, 1.0_wp, 2.0_wp]
+    solver%reach = 2.0_wp
+    call advance(solver, state, load_target_t([f, d, f, d], [4.0_wp, 4.0_wp, -2.0_wp, 3.0_wp]), .false., 1.0e-8_wp, 40, 6, &
+                 next, error)
+    if (allocated(error)) return
+    call check(error, solver%value(:, 2), [3.0_wp, 2.0_wp, -1.0_wp, 2.5_wp], 0.0_wp, 'half of the way')
+    if (allocated(error)) return
+    call check(error, next%motion([along_x, about_z]), [4.0_wp, 3.0_wp], 0.0_wp, 'motions reached')
+    if (allocated(error)) return
+    call check(error, next%load([normal, along_y]), [4.0_wp, -2.0_wp], 0.0_wp, 'loads reached')
+  end subroutine test_motions
+
+  !> Contact at the rim of the window ends the advance, wherever it is.
+  subroutine test_rim(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    solver%reach = 2.5_wp
+    solver%rim_load = 3.0_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    call check_true(error, touches_rim(next) .and. .not. touches_rim(state), 'contact at the rim')
+    if (allocated(error)) return
+    call check(error, next%load(normal), 4.0_wp, 0.0_wp, 'the first part that reaches the rim is the last')
+  end subroutine test_rim
+
+  !> Too few sweeps for a whole step, but enough for its parts: the solution is that of explicit parts.
+  subroutine test_half_steps(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(recorder_t) :: contact
+    type(contact_state_t) :: virgin, pressed, cut, parts, next
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.4_wp, tolerance = 1.0e-10_wp
+    type(load_target_t) :: target
+    integer :: sweeps, i
+
+    call new_sphere(contact%frictional_contact_t, 10, 0.4_wp, -0.25_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, contact%problem%lattice)
+    call advance(contact, virgin, load_target_t(value=[load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., tolerance, 60, 0, pressed, error)
+    if (allocated(error)) return
+    target = load_target_t([f, f, f, d], [1.3_wp*load, 0.6_wp*mu*load, 0.5_wp*mu*load, 0.0_wp])
+    do sweeps = 2, 59
+      contact%n_done = 0
+      call advance(contact, pressed, target, .false., tolerance, sweeps, 6, cut, error)
+      if (allocated(error)) return
+      if (cut%converged) exit
+    end do
+    call check_true(error, cut%converged .and. cut%cuts > 0, 'a number of sweeps with which cuts are needed, and suffice')
+    if (allocated(error)) return
+    parts = pressed
+    associate (done => contact%done(:, :contact%n_done))
+      call check_true(error, size(done, 2) > 1, 'several parts')
+      if (allocated(error)) return
+      do i = 1, size(done, 2)
+        target%value = done(:, i)
+        call advance(contact, parts, target, .false., tolerance, 60, 0, next, error)
+        if (allocated(error)) return
+        call check_true(error, next%converged, 'an explicit part')
+        if (allocated(error)) return
+        parts = next
+      end do
+    end associate
+    call check(error, cut%load(:along_y), [1.3_wp*load, 0.6_wp*mu*load, 0.5_wp*mu*load], 1.0e-9_wp, 'the target is reached')
+    if (allocated(error)) return
+    call check(error, reshape(cut%traction, [882]), reshape(parts%traction, [882]), 1.0e-8_wp*mu, 'traction')
+    if (allocated(error)) return
+    call check(error, reshape(cut%slip_increment, [882]), &
+               reshape((parts%relative_displacement - pressed%relative_displacement) &
+                       *spread(merge(1.0_wp, 0.0_wp, parts%pressure > 0.0_wp), 3, 2), [882]), 1.0e-8_wp, 'slip of the step')
+    if (allocated(error)) return
+    call check(error, reshape(cut%accumulated_slip, [441]), reshape(parts%accumulated_slip, [441]), 1.0e-8_wp, 'slip path')
+    if (allocated(error)) return
+    call check(error, cut%dissipated_energy, parts%dissipated_energy, 1.0e-8_wp*abs(parts%dissipated_energy), 'energy')
+    if (allocated(error)) return
+    ! and it is another solution than that of the whole step
+    call advance(contact, pressed, target, .false., tolerance, 60, 0, next, error)
+    if (allocated(error)) return
+    call check_true(error, maxval(abs(next%traction - parts%traction)) > 1.0e-4_wp*mu, 'the size of a step matters')
+  end subroutine test_half_steps
+
+  !> The real method, noting what it has reached.
+  subroutine record_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(recorder_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%frictional_contact_t%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
+    if (allocated(error) .or. .not. state%converged) return
+    self%n_done = self%n_done + 1
+    self%done(:, modulo(self%n_done - 1, size(self%done, 2)) + 1) = target%value
+  end subroutine record_step
+
+  !> A static step ends at the same state from any start; an incremental one does not.
+  subroutine test_any_start(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, other, state(2), next
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.4_wp
+    type(load_target_t) :: target
+
+    call new_sphere(contact, 10, 0.4_wp, -0.25_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, contact%problem%lattice)
+    call advance(contact, virgin, load_target_t(value=[1.3_wp*load, -0.7_wp*mu*load, 0.0_wp, 0.0_wp]), .false., 1.0e-10_wp, 60, 6, &
+                 other, error)
+    if (allocated(error)) return
+    target = load_target_t(value=[load, 0.3_wp*mu*load, 0.5_wp*mu*load, 0.0_wp])
+    call advance(contact, virgin, target, .true., 1.0e-10_wp, 60, 6, state(1), error)
+    if (allocated(error)) return
+    call advance(contact, other, target, .true., 1.0e-10_wp, 60, 6, state(2), error)
+    if (allocated(error)) return
+    call advance(contact, other, target, .false., 1.0e-10_wp, 60, 6, next, error)
+    if (allocated(error)) return
+    call check_true(error, state(1)%converged .and. state(2)%converged .and. next%converged, 'converged')
+    if (allocated(error)) return
+    call check(error, reshape(state(2)%traction, [882]), reshape(state(1)%traction, [882]), 1.0e-8_wp*mu, 'same traction')
+    if (allocated(error)) return
+    call check(error, state(2)%motion, state(1)%motion, 1.0e-8_wp, 'same motions')
+    if (allocated(error)) return
+    call check(error, reshape(state(2)%slip_increment, [882]), reshape(state(1)%slip_increment, [882]), 1.0e-8_wp, &
+               'same slip')
+    if (allocated(error)) return
+    call check_true(error, maxval(abs(next%traction - state(1)%traction)) > 0.05_wp*mu, 'another history, another traction')
+  end subroutine test_any_start
+
+end module test_load_path

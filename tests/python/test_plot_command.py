@@ -1,0 +1,186 @@
+"""The command ``hexcontact plot``: its options, its help, and what it says to what cannot be drawn."""
+
+import inspect
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from hexcontact import Case, plot_choices, plot_command, plotting, plotting_influence
+from hexcontact.cli import app
+from hexcontact.errors import DeckError
+
+BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Spheres pressed and sheared to and fro on a coarse lattice, and pressed without friction."""
+    folder = tmp_path_factory.mktemp("results")
+    bodies = {
+        "body_1": BODY | {"surface": {"shape": "sphere", "radius": 0.01}},
+        "body_2": BODY,
+        "nodes_in_radius": 6,
+    }
+    loads = [
+        {"normal_load": 100.0},
+        {"tangential_load_x": 30.0, "steps": 2},
+        {"tangential_load_x": -10.0, "steps": 2},
+    ]
+    friction = {"friction_coefficient": 0.5, "algorithm": "incremental"}
+    Case(**bodies, **friction, loads=loads, title="Sheared").run(folder / "sheared.nc")
+    Case(**bodies, normal_load=100.0, title="Pressed").run(folder / "pressed.nc")
+    return folder
+
+
+def plot(*words: str | Path) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, ["plot", *map(str, words)])
+    return done.exit_code, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--what", "zones", "--step", "1,2,3,5"],
+        ["-w", "zones", "--arrows", "traction"],
+        ["-w", "tractions", "-s", "2,3,5"],
+        ["-w", "tractions", "--angle", "30", "--through", "10um,0um"],
+        ["-w", "section", "--angle", "0.5rad", "--step", "-1"],
+        ["-w", "traction", "-s", "2,3"],
+        ["-w", "history", "--over", "tangential_load_x"],
+        ["-w", "outlines", "-s", "2,3"],
+        ["-w", "loop"],
+        [],
+    ],
+)
+def test_a_picture_is_written(folder: Path, tmp_path: Path, words: list[str]) -> None:
+    picture = tmp_path / "picture.png"
+    code, out, err = plot(folder / "sheared.nc", *words, "-o", picture)
+    assert (code, err) == (0, "")
+    assert out == f"written: {picture}\n"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("kind", ["pdf", "svg"])
+def test_pictures_for_a_paper(folder: Path, tmp_path: Path, kind: str) -> None:
+    picture = tmp_path / f"loop.{kind}"
+    assert plot(folder / "sheared.nc", "-w", "loop", "-o", picture)[0] == 0
+    assert picture.read_bytes().startswith(b"%PDF" if kind == "pdf" else b"<?xml")
+
+
+def test_several_files(folder: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "zones.png"
+    twice = folder / "sheared.nc", folder / "sheared.nc"
+    assert plot(*twice, "-w", "zones", "-s", "2,3", "-o", picture)[0] == 0
+    code, _, err = plot(*twice, "-w", "loop")
+    assert code == 2
+    assert "--what loop shows one result; expected one FILE, not 2" in err
+    code, _, err = plot(*twice, "-w", "all")
+    assert code == 2
+    assert "expected one FILE" in err
+
+
+def test_the_default_name_is_beside_the_file(folder: Path) -> None:
+    code, out, _ = plot(folder / "sheared.nc", "-w", "torsion")
+    assert code == 2
+    assert out == ""
+    code, out, _ = plot(folder / "sheared.nc", "-w", "loop")
+    assert code == 0
+    assert (folder / "sheared_loop.png").exists()
+
+
+REFUSED = [
+    (
+        "pressed",
+        ["-w", "zones"],
+        "cannot draw zones of .*pressed.nc: a contact without friction has no stick and slip",
+    ),
+    ("pressed", ["-w", "tractions"], "a contact without friction has no traction"),
+    ("pressed", ["-w", "loop"], "a contact without friction has no tangential load"),
+    ("sheared", ["-w", "torsion"], "there is no torque in this result"),
+    ("sheared", ["-w", "zone"], "--what zone: expected overview, .*did you mean zones"),
+    ("sheared", ["-w", "pyramid"], "--what pyramid: expected no FILE"),
+    ("sheared", ["-w", "zones", "-s", "9"], "there is no step 9; the result has steps 1 to 5"),
+    (
+        "sheared",
+        ["-w", "zones", "-s", "2,x"],
+        "--step 2,x: expected a number of a load step, or several as 10,20,30",
+    ),
+    (
+        "sheared",
+        ["-w", "section", "-s", "1,2"],
+        "--step: section shows one load step; expected one number, not 2",
+    ),
+    ("sheared", ["-w", "history", "-s", "1"], "--step: not an option of --what history"),
+    ("sheared", ["-w", "zones", "--angle", "30"], "--angle: not an option of --what zones"),
+    (
+        "sheared",
+        ["-w", "tractions", "--angle", "30 mm"],
+        '--angle 30 mm: expected an angle .*"mm" is a length',
+    ),
+    (
+        "sheared",
+        ["-w", "tractions", "--through", "1um"],
+        "--through 1um: expected two lengths such as 10um,0um",
+    ),
+    ("sheared", ["-w", "tractions", "--through", "1um,2N"], '--through 1um,2N: .*"N" is a force'),
+    (
+        "sheared",
+        ["-w", "history", "--over", "load"],
+        "no history of load in this result; there are normal_load",
+    ),
+    ("sheared", ["-w", "zones", "-o", "zones.xyz"], "cannot draw zones of .*xyz"),
+]
+
+
+@pytest.mark.parametrize(("name", "words", "sentence"), REFUSED)
+def test_what_cannot_be_drawn_is_one_sentence(
+    folder: Path, name: str, words: list[str], sentence: str
+) -> None:
+    code, out, err = plot(folder / f"{name}.nc", *words)
+    assert code == 2
+    assert out == ""
+    [line] = err.splitlines()
+    assert re.search(sentence, line), line
+
+
+def test_all_draws_what_there_is(folder: Path, tmp_path: Path) -> None:
+    code, out, _ = plot(folder / "pressed.nc", "-w", "all", "-o", tmp_path / "p.pdf")
+    assert code == 0
+    written = {path.stem for path in tmp_path.iterdir()}
+    assert written == {"p_overview", "p_pressure", "p_section", "p_boundary", "p_history"}
+    assert "left out: zones (a contact without friction has no stick and slip zones)" in out
+    code, out, _ = plot(folder / "sheared.nc", "-w", "all", "--step", "3", "-o", tmp_path / "s.png")
+    assert code == 0
+    left_out = re.findall(r"left out: (\w+)", out)
+    assert left_out == ["torsion"]
+    written = {path.stem[2:] for path in tmp_path.glob("s_*")}
+    assert written == set(plotting.FIGURES) - {"torsion", "compliance"}
+    code, _, err = plot(folder / "sheared.nc", "-w", "all", "--step", "9")
+    assert code == 2
+    assert "there is no step 9" in err
+
+
+def test_help_has_a_line_for_each_choice() -> None:
+    assert list(plot_choices.OF_A_RESULT) == list(plotting.FIGURES)
+    assert list(plot_choices.OF_NO_RESULT) == list(plotting_influence.FIGURES)
+    done = CliRunner().invoke(app, ["plot", "--help"], env={"COLUMNS": "80", "TERM": "dumb"})
+    lines = [line.strip() for line in done.stdout.splitlines()]
+    for name, words in (plot_choices.OF_A_RESULT | plot_choices.OF_NO_RESULT).items():
+        assert any(re.fullmatch(rf"{name} +{re.escape(words)}", line) for line in lines), name
+
+
+def test_every_option_belongs_to_some_picture() -> None:
+    parameters = {name for draw in plotting.FIGURES.values() for name in inspect.signature(draw).parameters}
+    assert {"step", "steps", "angle", "through", "over", "arrows", "result", "results"} <= parameters
+
+
+def test_options_are_read() -> None:
+    assert plot_command.steps_of("3, 4,-1") == [3, 4, -1]
+    assert plot_command.angle_of("30") == pytest.approx(np.pi / 6)
+    assert plot_command.angle_of("0.5 rad") == 0.5
+    assert plot_command.point_of("10 um, -1e-3") == pytest.approx((1e-5, -1e-3))
+    with pytest.raises(DeckError, match=r"--angle thirty: expected an angle such as 30 or 0\.5rad"):
+        plot_command.angle_of("thirty")

@@ -1,0 +1,797 @@
+"""Pictures of results with friction: what they show is what the result says.
+
+The results here are laid out by `hexcontact.result.assemble` from closed solutions: spheres with E* = 2,
+gamma = 0.4, mu = 0.3, pressed by P = 0.8 and sheared or twisted.
+"""
+
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.quiver import Quiver
+
+from hexcontact import analytic, closed_forms, plotting, plotting_zones
+from hexcontact.analytic_friction import LubkinTorsion, MindlinContact
+from hexcontact.closed_forms import ClosedForms
+from hexcontact.lattice import Lattice
+from hexcontact.plotting_compliance import initial_compliance
+from hexcontact.plotting_history import panels_of
+from hexcontact.result import Metadata, Step, assemble
+from hexcontact.step_view import StepView
+
+MODULUS, GAMMA, MU, LOAD, RADIUS = 2.0, 0.4, 0.3, 0.8, 1.5
+HERTZ = analytic.hertz_sphere(MODULUS, RADIUS, normal_load=LOAD)
+MINDLIN = MindlinContact(MU, LOAD, HERTZ.contact_radius, 4.0 / MODULUS * (1.0 + GAMMA / 2.0))
+LUBKIN = LubkinTorsion(MU, LOAD, HERTZ.contact_radius, 2.0 / MODULUS * (1.0 + GAMMA))
+SLIDING = MU * LOAD
+Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def nothing(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.zeros_like(x)
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a load step came to; fields are functions of (x, y)."""
+
+    q_x: Field = nothing
+    q_y: Field = nothing
+    stick: Field = nothing
+    slip_x: Field = nothing
+    slip_y: Field = nothing
+    load: float = LOAD
+    history: dict[str, float] = field(default_factory=dict)
+
+
+def sphere_gap(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return (x**2 + y**2) / (2 * RADIUS)
+
+
+def made(
+    steps: Sequence[Made],
+    spacing: float = 0.07,
+    half: int = 14,
+    gap: Field = sphere_gap,
+    pressure: Callable[[float], Field] | None = None,
+    **attributes: Any,
+) -> xarray.Dataset:
+    lattice = Lattice(spacing, -half, -half, 2 * half + 1, 2 * half + 1)
+    x, y = lattice.x, lattice.y
+
+    def hertz(load: float) -> Field:
+        return lambda x, y: analytic.hertz_sphere(MODULUS, RADIUS, normal_load=load).pressure(np.hypot(x, y))
+
+    parameters = {
+        "effective_modulus": MODULUS,
+        "dundurs_beta": 0.0,
+        "tangential_compliance_ratio": GAMMA,
+        "friction_coefficient": MU,
+        "algorithm": "incremental",
+        "coupling": "full",
+        "tolerance": 1e-8,
+        **attributes,
+    }
+    done = []
+    for index, step in enumerate(steps):
+        p = (pressure or hertz)(step.load)(x, y)
+        stick = (step.stick(x, y) > 0) & (p > 0)
+        fields = {
+            "initial_gap": gap(x, y),
+            "pressure": p,
+            "traction_x": step.q_x(x, y),
+            "traction_y": step.q_y(x, y),
+            "zone": np.where(p > 0, np.where(stick, 1, 2), 0),
+            "slip_increment_x": step.slip_x(x, y),
+            "slip_increment_y": step.slip_y(x, y),
+            "accumulated_slip": np.hypot(step.slip_x(x, y), step.slip_y(x, y)),
+        }
+        area = lattice.cell_area
+        history = {
+            **dict.fromkeys(("tangential_load_x", "tangential_load_y", "torque"), 0.0),
+            **dict.fromkeys(("shift_x", "shift_y", "twist", "dissipated_energy"), 0.0),
+            "normal_load": step.load,
+            "approach": 0.3 * step.load,
+            "contact_area": area * float((p > 0).sum()),
+            "stick_area": area * float(stick.sum()),
+            "contact_radius": np.sqrt(area * float((p > 0).sum()) / np.pi),
+            "max_pressure": float(p.max()),
+            "max_traction": float(np.hypot(fields["traction_x"], fields["traction_y"]).max()),
+            "segment": 1 if index == 0 else 2,
+            "label": "press" if index == 0 else "shear",
+            **step.history,
+        }
+        done.append(Step(index, lattice, fields, history))
+    return assemble(Metadata(title="Made up", planned_steps=len(done), parameters=parameters), done)
+
+
+def sheared(load: float, peak: float | None = None, angle: float = 0.0, **more: Any) -> Made:
+    """Return a step of Cattaneo-Mindlin, or of Mindlin-Deresiewicz back from a peak."""
+    e_x, e_y = np.cos(angle), np.sin(angle)
+    if peak is None:
+        traction = lambda r: MINDLIN.traction(r, load)  # noqa: E731
+        shift, c = float(MINDLIN.shift(load)), float(MINDLIN.stick_radius(load))
+    else:
+        traction = lambda r: MINDLIN.traction_unloading(r, load, peak)  # noqa: E731
+        shift = float(MINDLIN.shift_unloading(load, peak))
+        c = float(MINDLIN.stick_radius(0.5 * (peak - load)))
+    return Made(
+        q_x=lambda x, y: e_x * traction(np.hypot(x, y)),
+        q_y=lambda x, y: e_y * traction(np.hypot(x, y)),
+        stick=lambda x, y: np.hypot(x, y) <= c,
+        slip_x=lambda x, y: np.where((np.hypot(x, y) > c) & (np.hypot(x, y) < 0.7), -1e-3 * e_x, 0.0),
+        slip_y=lambda x, y: np.where((np.hypot(x, y) > c) & (np.hypot(x, y) < 0.7), -1e-3 * e_y, 0.0),
+        history={
+            "tangential_load_x": e_x * load,
+            "tangential_load_y": e_y * load,
+            "shift_x": e_x * shift,
+            "shift_y": e_y * shift,
+        },
+        **more,
+    )
+
+
+PRESSED = Made(stick=lambda x, y: np.ones_like(x))
+SHARES = (0.2, 0.5, 0.8)
+
+
+def cattaneo(**more: Any) -> xarray.Dataset:
+    return made([PRESSED, *(sheared(share * SLIDING) for share in SHARES)], **more)
+
+
+def loop(**more: Any) -> xarray.Dataset:
+    """Up to 0.6 of the sliding load and back to -0.6 of it."""
+    peak = 0.6 * SLIDING
+    down = (0.3 * SLIDING, 0.0, -0.3 * SLIDING, -peak)
+    return made([PRESSED, sheared(0.3 * SLIDING), sheared(peak), *(sheared(q, peak) for q in down)], **more)
+
+
+def dissimilar() -> xarray.Dataset:
+    """An off-center stick zone; the tractions are not those of any theory."""
+    steps = [
+        Made(
+            q_x=lambda x, y, s=s: s * SLIDING * np.exp(-((x - 0.2) ** 2) - y**2),
+            q_y=lambda x, y: 0.1 * x * y,
+            stick=lambda x, y: np.hypot(x - 0.25, 1.3 * y) < 0.3,
+            history={"tangential_load_x": s * SLIDING, "shift_x": 1.1 * float(MINDLIN.shift(s * SLIDING))},
+        )
+        for s in SHARES
+    ]
+    return made([PRESSED, *steps], dundurs_beta=-0.19)
+
+
+def torsion() -> xarray.Dataset:
+    radii = (0.8, 0.5, 0.3)
+    steps = [
+        Made(history={"torque": LUBKIN.torque(c), "twist": LUBKIN.twist(c)})
+        for c in (r * HERTZ.contact_radius for r in radii)
+    ]
+    return made([PRESSED, *steps])
+
+
+def frictionless() -> xarray.Dataset:
+    result = made([PRESSED], algorithm="frictionless", friction_coefficient=0.0)
+    return result.drop_vars(
+        [name for name in result.data_vars if name.startswith(("traction", "slip", "shift"))]
+    )
+
+
+def units(axis_label: str) -> float:
+    """Factor from what an axis shows back to SI, by the unit in its label."""
+    unit = axis_label.rsplit("(", 1)[1].rstrip(")")
+    prefixes = {"p": 1e-12, "n": 1e-9, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+    if unit in ("m", "Pa", "N", "J", "rad", "N m", "m²"):
+        return 1.0
+    return prefixes[unit[0]] ** (2 if unit.endswith("m²") else 1)
+
+
+def si(axes: Any, line: Any) -> tuple[np.ndarray, np.ndarray]:
+    x, y = (np.asarray(values, dtype=float) for values in line.get_data())
+    return x * units(axes.get_xlabel()), y * units(axes.get_ylabel())
+
+
+def by_label(axes: Any) -> dict[str, Any]:
+    return {line.get_label(): line for line in axes.lines if not line.get_label().startswith("_")}
+
+
+# ----------------------------------------------------------------------------------- closed solutions
+
+
+@pytest.mark.parametrize(
+    ("loads", "turns"),
+    [
+        ([1.0], [1.0]),
+        ([1.0, 2.0], [2.0]),
+        ([2.0, 1.0], [2.0, 1.0]),
+        ([2.0, 1.0, -1.0], [2.0, -1.0]),
+        ([2.0, -1.0, 1.0], [2.0, -1.0, 1.0]),
+        ([2.0, -1.0, 1.0, 0.0, 1.5], [2.0, -1.0, 1.5]),  # the small loop is forgotten
+        ([2.0, -1.0, 2.5], [2.5]),  # back on the first loading
+        ([2.0, -2.0], [-2.0]),  # as if it had been loaded to the other side at once
+        ([2.0, -3.0, 1.0], [-3.0, 1.0]),
+        ([0.0, 1.0], [1.0]),
+    ],
+)
+def test_turning_points_that_are_remembered(loads: list[float], turns: list[float]) -> None:
+    assert closed_forms.turning_points(loads) == turns
+
+
+def test_superposition_is_that_of_mindlin_and_deresiewicz() -> None:
+    r = np.linspace(0.0, 1.1 * HERTZ.contact_radius, 57)
+    peak = 0.7 * SLIDING
+    for load in np.array([0.4, 0.0, -0.3, -0.69]) * SLIDING:
+        turns = closed_forms.turning_points([0.2 * SLIDING, peak, load])
+        found = closed_forms.superposed(lambda q: MINDLIN.traction(r, q), turns)
+        np.testing.assert_allclose(found, MINDLIN.traction_unloading(r, load, peak), atol=1e-14)
+        moved = closed_forms.superposed(MINDLIN.shift, turns)
+        assert float(moved) == pytest.approx(float(MINDLIN.shift_unloading(load, peak)), abs=1e-15)
+    # -Q* has the mirror image of Q*, and a closed cycle ends where it began
+    there = closed_forms.superposed(MINDLIN.shift, closed_forms.turning_points([peak, -peak]))
+    assert float(there) == pytest.approx(-float(MINDLIN.shift(peak)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.floats(-0.95, 0.95), min_size=1, max_size=8))
+def test_superposition_carries_the_load_it_is_for(shares: list[float]) -> None:
+    """The resultant of the traction over the circle is the load, whatever the history; |q| <= mu p."""
+    turns = closed_forms.turning_points([share * SLIDING for share in shares])
+    square = (np.arange(20_000) + 0.5) / 20_000 * HERTZ.contact_radius**2  # r^2, in equal steps
+    r = np.sqrt(square)
+    q = closed_forms.superposed(lambda load: MINDLIN.traction(r, load), turns)
+    total = np.pi * HERTZ.contact_radius**2 * float(q.mean())
+    assert total == pytest.approx(shares[-1] * SLIDING, abs=1e-5 * SLIDING)
+    assert np.all(np.abs(q) <= MU * HERTZ.pressure(r) + 1e-12)
+
+
+def test_partial_slip_is_recognized() -> None:
+    closed = ClosedForms(cattaneo())
+    assert closed.partial_slip(1) is None  # not sheared yet
+    x, y = np.meshgrid(np.linspace(-0.9, 0.9, 31), np.linspace(-0.9, 0.9, 33))
+    for number, share in enumerate(SHARES, start=2):
+        found = closed.partial_slip(number)
+        assert found is not None
+        assert found.name == "Cattaneo–Mindlin"
+        assert found.stick_ratio == pytest.approx((1.0 - share) ** (1 / 3), rel=1e-6)
+        q_x, q_y = found.traction(x, y)
+        np.testing.assert_allclose(q_x, MINDLIN.traction(np.hypot(x, y), share * SLIDING), atol=1e-6)
+        assert np.abs(q_y).max() == 0.0
+    back = ClosedForms(loop()).partial_slip(5)
+    assert back is not None
+    assert back.name == "Mindlin–Deresiewicz"
+    expected = MINDLIN.traction_unloading(np.hypot(x, y), 0.0, 0.6 * SLIDING)
+    np.testing.assert_allclose(back.traction(x, y)[0], expected, atol=1e-6)
+    assert back.stick_ratio == pytest.approx(0.7 ** (1 / 3), rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", [0.7, 2.5])
+def test_partial_slip_along_any_line(angle: float) -> None:
+    found = ClosedForms(made([PRESSED, sheared(0.5 * SLIDING, angle=angle)])).partial_slip(2)
+    assert found is not None
+    q_x, q_y = found.traction(np.array([0.3]), np.array([0.2]))
+    q = MINDLIN.traction(np.hypot(0.3, 0.2), 0.5 * SLIDING)
+    assert (q_x[0], q_y[0]) == pytest.approx((q * np.cos(angle), q * np.sin(angle)), rel=1e-6)
+
+
+def test_partial_slip_over_an_ellipse() -> None:
+    hessian = np.array([[1.0, 0.3], [0.3, 0.5]])
+    ellipse = analytic.hertz_ellipse(MODULUS, hessian, normal_load=LOAD)
+    form = lambda x, y: 0.5 * (hessian[0, 0] * x**2 + 2 * hessian[0, 1] * x * y + hessian[1, 1] * y**2)  # noqa: E731
+    result = made(
+        [PRESSED, sheared(0.5 * SLIDING)], gap=form, pressure=lambda load: ellipse.pressure, half=20
+    )
+    found = ClosedForms(result).partial_slip(2)
+    assert found is not None
+    x, y = np.meshgrid(np.linspace(-2, 2, 401), np.linspace(-2, 2, 401))
+    q = found.traction(x, y)[0]
+    # the load is carried, slip obeys Coulomb's law, and the stick area is a smaller ellipse of the same form
+    assert q.sum() * 0.01**2 == pytest.approx(0.5 * SLIDING, rel=1e-3)
+    slips = np.abs(q - MU * ellipse.pressure(x, y)) < 1e-9
+    c = found.stick_ratio
+    np.testing.assert_array_equal(slips, ellipse.pressure(x / c, y / c) == 0.0)
+    assert ClosedForms(result).shear_loop() is None  # the motion is known for a circle only
+
+
+def replaced(step: Made, **history: float) -> Made:
+    return Made(
+        step.q_x, step.q_y, step.stick, step.slip_x, step.slip_y, step.load, {**step.history, **history}
+    )
+
+
+NOT_CLOSED = {
+    "dissimilar bodies": lambda: cattaneo(dundurs_beta=0.1),
+    "no slip": lambda: cattaneo(friction_coefficient=np.inf),
+    "frictionless": lambda: cattaneo(algorithm="frictionless"),
+    "pressed while sheared": lambda: made([Made(load=0.5), sheared(0.5 * SLIDING)]),
+    "twisted": lambda: made([PRESSED, replaced(sheared(0.5 * SLIDING), twist=0.1)]),
+    "more than friction carries": lambda: made(
+        [PRESSED, replaced(sheared(0.5 * SLIDING), tangential_load_x=1.2 * SLIDING)]
+    ),
+    "no quadratic gap": lambda: cattaneo(gap=lambda x, y: np.hypot(x, y)),
+}
+
+
+@pytest.mark.parametrize("why", NOT_CLOSED)
+def test_no_closed_solution_where_there_is_none(why: str) -> None:
+    result = NOT_CLOSED[why]()
+    closed = ClosedForms(result)
+    assert closed.partial_slip(int(result["step"][-1])) is None
+    assert closed.shear_loop() is None
+    assert closed.torsion_loop() is None
+
+
+def test_closed_solution_ends_where_the_load_leaves_its_line() -> None:
+    closed = ClosedForms(made([PRESSED, sheared(0.3 * SLIDING, angle=1.0), sheared(0.5 * SLIDING)]))
+    assert closed.partial_slip(2) is not None
+    assert closed.partial_slip(3) is None
+    curve = closed.shear_loop()
+    assert curve is not None
+    assert curve[1].max() == pytest.approx(0.3 * SLIDING)
+
+
+def test_static_steps_stand_alone() -> None:
+    """Without a history the way does not matter: pressed and sheared at once, and not turned back."""
+    static = made([Made(load=0.5), sheared(0.5 * SLIDING), sheared(0.3 * SLIDING)], algorithm="static")
+    for number, share in ((2, 0.5), (3, 0.3)):
+        found = ClosedForms(static).partial_slip(number)
+        assert found is not None
+        assert found.turns == pytest.approx((share * SLIDING,))
+
+
+def test_a_held_load_is_no_reversal() -> None:
+    held = replaced(sheared(0.5 * SLIDING), tangential_load_x=0.5 * SLIDING * (1 - 1e-9))
+    found = ClosedForms(made([PRESSED, sheared(0.5 * SLIDING), held])).partial_slip(3)
+    assert found is not None
+    assert found.turns == pytest.approx((0.5 * SLIDING,))
+
+
+# ----------------------------------------------------------------------------------- sections
+
+
+def test_tractions_of_a_step() -> None:
+    result = cattaneo()
+    upper, lower = plotting.tractions(result, 3).axes
+    row = result.sel(step=3, row=0)
+    nodes = {round(float(x), 9): k for k, x in enumerate(row["x"].values)}
+    for axes, name, label, factor in (
+        (upper, "pressure", "computed", 1.0),
+        (lower, "traction_x", "$q_x$", 1.0),
+        (lower, "traction_y", "$q_y$", 1.0),
+        (lower, "pressure", r"$\pm\mu p$", MU),
+    ):
+        x, values = si(lower, by_label(axes)[label])
+        values = values / units(lower.get_ylabel()) * units(axes.get_ylabel())
+        at = [nodes[round(float(place), 9)] for place in x]
+        assert len(at) > 15
+        np.testing.assert_allclose(values, factor * row[name].values[at], atol=1e-12)
+    x, q = si(lower, by_label(lower)["Cattaneo–Mindlin"])
+    np.testing.assert_allclose(q, MINDLIN.traction(np.abs(x), 0.5 * SLIDING), atol=1e-6)
+    upper.set_xlabel(lower.get_xlabel())
+    x, p = si(upper, by_label(upper)["Hertz"])
+    np.testing.assert_allclose(p, HERTZ.pressure(np.abs(x)), atol=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [30.0, 90.0, 120.0, 180.0])
+def test_tractions_along_and_across_a_line_of_nodes(degrees: float) -> None:
+    result = dissimilar()
+    angle = np.radians(degrees)
+    lower = plotting.tractions(result, 3, angle=angle).axes[1]
+    along, across = [line for line in lower.lines if line.get_marker() == "o"]
+    s, q_along = si(lower, along)
+    _, q_across = si(lower, across)
+    one = result.sel(step=3)
+    x, y = one["x"].values, one["y"].values
+    for place, first, second in zip(s, q_along, q_across, strict=True):
+        away = np.hypot(x - place * np.cos(angle), y - place * np.sin(angle))
+        at = away.argmin()
+        if away.flat[at] > 1e-9:  # beyond the window
+            assert abs(place) > HERTZ.contact_radius
+            continue
+        q = one["traction_x"].values.flat[at], one["traction_y"].values.flat[at]
+        assert first == pytest.approx(q[0] * np.cos(angle) + q[1] * np.sin(angle), abs=1e-12)
+        assert second == pytest.approx(q[1] * np.cos(angle) - q[0] * np.sin(angle), abs=1e-12)
+    # no closed solution, no Hertz
+    assert not [label for label in by_label(lower) if "Mindlin" in label]
+
+
+def test_tractions_along_an_oblique_line_through_a_point() -> None:
+    result = made(
+        [PRESSED, Made(q_x=lambda x, y: 0.1 + 0.05 * x, q_y=lambda x, y: -0.02 * y)], dundurs_beta=0.3
+    )
+    angle, through = np.radians(20.0), (0.1, -0.2)
+    lower = plotting.tractions(result, 2, angle=angle, through=through).axes[1]
+    s, q_along = si(lower, by_label(lower)["$q$ along the line"])
+    x, y = through[0] + s * np.cos(angle), through[1] + s * np.sin(angle)
+    expected = (0.1 + 0.05 * x) * np.cos(angle) - 0.02 * y * np.sin(angle)
+    np.testing.assert_allclose(q_along, expected, atol=1e-9)  # the field is linear, and so is what is drawn
+    assert "(0.1, -0.2) m" in lower.get_xlabel() or "(100, -200) mm" in lower.get_xlabel()
+
+
+def test_a_family_of_tractions() -> None:
+    result = loop()
+    steps = [3, 4, 5, 7]
+    figure = plotting.tractions(result, steps)
+    pressure, q_x = figure.axes  # q_y is zero and has no panel
+    assert q_x.get_ylabel().startswith("$q_x$")
+    peak = 0.6 * SLIDING
+    drawn = [line for line in q_x.lines if line.get_marker() == "o"]
+    closed = [line for line in q_x.lines if len(line.get_xdata()) == 1001]
+    loads = (peak, 0.3 * SLIDING, 0.0, -peak)
+    assert len(drawn) == len(closed) == len(steps)
+    for nodes, curve, load in zip(drawn, closed, loads, strict=True):
+        assert nodes.get_color() == curve.get_color()
+        for line, tolerance in ((nodes, 1e-9), (curve, 1e-5)):
+            x, q = si(q_x, line)
+            np.testing.assert_allclose(
+                q, MINDLIN.traction_unloading(np.abs(x), load, peak), atol=tolerance * peak
+            )
+    [legend] = figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[:4] == [
+        "step 3, $Q/\\mu P$ = 0.60",
+        "step 4, $Q/\\mu P$ = 0.30",
+        "step 5",
+        "step 7, $Q/\\mu P$ = −0.60",
+    ]
+    assert "Mindlin–Deresiewicz" in texts[-1]
+    assert len(pressure.lines) == 2 * len(steps)
+    # Q along y: the component across the line is the one that is not zero
+    across = made([PRESSED, *(sheared(s * SLIDING, angle=np.pi / 2) for s in SHARES)])
+    assert [axes.get_ylabel()[:5] for axes in plotting.tractions(across, [2, 3]).axes[1:]] == ["$q_y$"]
+
+
+def test_a_family_along_an_oblique_line_is_drawn_over() -> None:
+    angle = np.radians(40.0)
+    _, along, across = plotting.tractions(cattaneo(), [2, 4], angle=angle).axes
+    for axes, part in ((along, np.cos(angle)), (across, -np.sin(angle))):
+        dashed = [line for line in axes.lines if line.get_linestyle() == "--"]
+        assert len(dashed) == 2
+        for line, share in zip(dashed, (0.2, 0.8), strict=True):
+            s, q = np.asarray(line.get_data()) * units(across.get_xlabel())
+            q = q / units(across.get_xlabel()) * units(axes.get_ylabel())
+            np.testing.assert_allclose(q, part * MINDLIN.traction(np.abs(s), share * SLIDING), atol=1e-6)
+
+
+def test_a_family_without_closed_solution_has_none() -> None:
+    figure = plotting.tractions(dissimilar(), [2, 3, 4])
+    assert [
+        len(line.get_xdata()) for axes in figure.axes for line in axes.lines if len(line.get_xdata()) == 1001
+    ] == []
+    [legend] = figure.legends
+    assert not [text for text in legend.get_texts() if "Hertz" in text.get_text()]
+
+
+def test_section_of_dissimilar_bodies_says_that_hertz_has_no_friction() -> None:
+    upper, lower = plotting.section(dissimilar(), 3).axes
+    assert "Hertz (no friction)" in by_label(upper)
+    assert lower.get_ylabel().startswith("difference")
+    assert "Hertz" in by_label(plotting.section(cattaneo(), 3).axes[0])
+
+
+# ----------------------------------------------------------------------------------- zones
+
+
+def area(polygons: Sequence[np.ndarray]) -> float:
+    return sum(0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1])) for p in polygons)
+
+
+BASIS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
+
+
+@settings(max_examples=60, deadline=None)
+@given(arrays.arrays(bool, arrays.array_shapes(min_dims=2, max_dims=2, max_side=9)))
+def test_outline_encloses_the_cells_of_the_zone(zone: np.ndarray) -> None:
+    polygons = plotting_zones.cell_outline(zone, BASIS, (3.0, -2.0))
+    assert area(polygons) == pytest.approx(zone.sum() * np.sqrt(0.75), abs=1e-9)
+    for polygon in polygons:
+        assert polygon[0] == pytest.approx(polygon[-1])
+        steps = np.hypot(*np.diff(polygon, axis=0).T)
+        np.testing.assert_allclose(steps, 1 / np.sqrt(3), rtol=1e-9)
+    row, col = np.indices(zone.shape)
+    nodes = np.array([3.0, -2.0]) + np.stack([col, row], axis=-1) @ BASIS
+    winding = np.zeros(zone.shape)
+    for polygon in polygons:
+        from_node = polygon - nodes[..., None, :]
+        angle = np.unwrap(np.arctan2(from_node[..., 1], from_node[..., 0]), axis=-1)
+        winding += (angle[..., -1] - angle[..., 0]) / (2 * np.pi)
+    np.testing.assert_allclose(winding, zone, atol=1e-9)  # each node of the zone is inside, no other
+
+
+def patch_area(patch: PathPatch, factor: float) -> float:
+    return area([polygon * factor for polygon in patch.get_path().to_polygons(closed_only=False)])
+
+
+def test_zone_maps_fill_the_cells_of_contact_and_stick() -> None:
+    result = dissimilar()
+    figure = plotting.zones(result, [2, 3, 4])
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title() for axes in panels] == [
+        "step 2, $Q/\\mu P$ = 0.20", "step 3, $Q/\\mu P$ = 0.50", "step 4, $Q/\\mu P$ = 0.80"
+    ]  # fmt: skip
+    factor = units(panels[0].get_ylabel())
+    for axes in panels:
+        contact, stick = axes.patches
+        assert patch_area(contact, factor) == pytest.approx(float(result["contact_area"][1]), rel=1e-9)
+        assert patch_area(stick, factor) == pytest.approx(float(result["stick_area"][1]), rel=1e-9)
+        [hertz] = axes.lines
+        assert np.ptp(hertz.get_xdata()) * factor == pytest.approx(2 * HERTZ.contact_radius, rel=1e-4)
+        assert stick.get_path().vertices[:, 0].mean() * factor == pytest.approx(0.25, abs=0.05)  # off center
+
+
+def test_zone_map_shows_the_closed_stick_area() -> None:
+    figure = plotting.zones(cattaneo(), 3, arrows="slip")
+    [axes] = figure.axes
+    factor = units(axes.get_xlabel())
+    _, exact = axes.lines
+    assert np.ptp(exact.get_xdata()) * factor == pytest.approx(
+        2 * float(MINDLIN.stick_radius(0.5 * SLIDING)), rel=1e-4
+    )
+    [arrows] = [child for child in axes.get_children() if isinstance(child, Quiver)]
+    assert np.all(arrows.U < 0.0)  # against Q: the traction on body 1 opposes its slip
+    assert np.all(arrows.V == 0.0)
+
+
+def test_zones_of_several_results() -> None:
+    figure = plotting.zones([cattaneo(), dissimilar()], [2, 4])
+    assert len([axes for axes in figure.axes if axes.get_visible()]) == 4
+    with pytest.raises(ValueError, match="a contact without friction has no stick and slip zones"):
+        plotting.zones([cattaneo(), frictionless()])
+
+
+def test_outlines_of_stick_areas() -> None:
+    result = dissimilar()
+    axes = plotting.outlines(result, [2, 3]).axes[0]
+    factor = units(axes.get_xlabel())
+    sticks = [line for line in axes.lines if "step" in line.get_label()]
+    assert len(sticks) == 2
+    for line in sticks:
+        enclosed = area([np.stack(line.get_data(), axis=1) * factor])
+        assert enclosed == pytest.approx(float(result["stick_area"][1]), rel=1e-9)
+    slid = made([PRESSED, Made(history={"tangential_load_x": SLIDING})])
+    assert "step 2, $Q/\\mu P$ = 1.00 (no stick)" in by_label(plotting.outlines(slid).axes[0])
+
+
+def test_boundary_tells_sticking_nodes_apart() -> None:
+    result = dissimilar()
+    figure = plotting.contact_boundary(result, 3)
+    lines = by_label(figure.axes[0])
+    one = result.sel(step=3)
+    for label, zone in (("stick", 1), ("slip", 2)):
+        assert len(lines[label].get_xdata()) == int((one["zone"] == zone).sum())
+    assert any(label.startswith("stick: ellipse") for label in lines)
+
+
+# ----------------------------------------------------------------------------------- maps
+
+
+def test_map_of_the_shear_traction() -> None:
+    result = dissimilar()
+    figure = plotting.FIGURES["traction"](result, 3)
+    axes = figure.axes[0]
+    [bar] = axes.child_axes
+    assert "shear traction $|q|$" in bar.get_ylabel()
+    mesh = axes.collections[0]
+    factor = units(bar.get_ylabel())
+    one = result.sel(step=3)
+    size = np.hypot(one["traction_x"].values, one["traction_y"].values)
+    inside = one["pressure"].values > 0
+    drawn = np.sort(np.asarray(mesh.get_array()) * factor)
+    assert np.isin(np.round(size[inside], 9), np.round(drawn, 9)).all()
+    assert mesh.get_clim() == pytest.approx((0.0, size.max() / factor))
+    [arrows] = [child for child in axes.get_children() if isinstance(child, Quiver)]
+    assert 50 < arrows.N <= inside.sum()
+    x, y = (np.asarray(a) * units(axes.get_xlabel()) for a in (arrows.X, arrows.Y))
+    np.testing.assert_allclose(arrows.V, 0.1 * x * y, atol=1e-9)
+    np.testing.assert_allclose(arrows.U, 0.5 * SLIDING * np.exp(-((x - 0.2) ** 2) - y**2), atol=1e-9)
+
+
+def test_signed_maps_are_white_at_zero() -> None:
+    mesh = plotting.FIGURES["traction_y"](dissimilar(), 3).axes[0].collections[0]
+    low, high = mesh.get_clim()
+    assert low == -high
+    mesh = plotting.FIGURES["traction_x"](dissimilar(), 3).axes[0].collections[0]
+    assert mesh.get_clim()[0] == 0.0
+
+
+def test_maps_of_several_steps_share_a_scale() -> None:
+    figure = plotting.FIGURES["traction_x"](dissimilar(), [2, 3, 4])
+    limits = [axes.collections[0].get_clim() for axes in figure.axes if axes.get_title()]
+    assert len(limits) == 3
+    assert len(set(limits)) == 1
+
+
+def test_map_of_the_slip() -> None:
+    result = cattaneo()
+    figure = plotting.FIGURES["slip_increment"](result, 4)
+    factor = units(figure.axes[0].child_axes[0].get_ylabel())
+    assert np.asarray(figure.axes[0].collections[0].get_array()).max() * factor == pytest.approx(1e-3)
+    [bar] = plotting.FIGURES["accumulated_slip"](result, 4).axes[0].child_axes
+    assert "accumulated slip" in bar.get_ylabel()
+
+
+# ----------------------------------------------------------------------------------- history and loops
+
+
+def test_history_leaves_out_what_stays_zero() -> None:
+    assert panels_of(cattaneo()) == [
+        ("normal_load",),
+        ("tangential_load_x",),
+        ("approach",),
+        ("shift_x",),
+        ("contact_area", "stick_area"),
+        ("max_pressure",),
+        ("max_traction",),
+        ("dissipated_energy",),
+    ]
+    assert ("torque",) in panels_of(torsion())
+    assert ("tangential_load_x",) not in panels_of(torsion())
+
+
+@pytest.mark.parametrize("over", ["step", "tangential_load_x"])
+def test_history_shows_areas_over_steps_or_load(over: str) -> None:
+    result = cattaneo()
+    figure = plotting.history(result, over=over)
+    [axes] = [axes for axes in figure.axes if axes.get_ylabel().startswith("area")]
+    lowest = next(axes for axes in figure.axes if axes.get_xlabel())
+    assert lowest.get_xlabel().startswith("load step" if over == "step" else "tangential load x (")
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["contact", "stick"]
+    factor = 1.0 if over == "step" else units(lowest.get_xlabel())
+    for name in ("contact_area", "stick_area"):
+        x, y = by_label(axes)[name].get_data()
+        np.testing.assert_allclose(np.asarray(x) * factor, result[over].values, rtol=1e-12)
+        np.testing.assert_allclose(np.asarray(y) * units(axes.get_ylabel()), result[name].values, rtol=1e-12)
+    with pytest.raises(ValueError, match="no history of tangential_load in this result; there are"):
+        plotting.history(result, over="tangential_load")
+
+
+def test_loop_of_load_and_shift() -> None:
+    result = loop()
+    [axes] = plotting.loop(result).axes
+    assert axes.get_ylabel().startswith("tangential load $Q_x$ (")
+    lines = by_label(axes)
+    shift, load = si(axes, lines["computed"])
+    np.testing.assert_allclose(shift, result["shift_x"].values, atol=1e-15)
+    np.testing.assert_allclose(load, result["tangential_load_x"].values, atol=1e-15)
+    [name] = [label for label in lines if "Deresiewicz" in label]
+    shift, load = si(axes, lines[name])
+    peak = 0.6 * SLIDING
+    top = int(np.argmax(load))
+    np.testing.assert_allclose(shift[: top + 1], MINDLIN.shift(load[: top + 1]), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(shift[top:], MINDLIN.shift_unloading(load[top:], peak), rtol=1e-6, atol=1e-9)
+    assert load[-1] == pytest.approx(-peak)
+
+
+def test_loop_along_a_line() -> None:
+    [axes] = plotting.loop(made([PRESSED, *(sheared(s * SLIDING, angle=0.5) for s in SHARES)])).axes
+    shift, load = si(axes, by_label(axes)["computed"])
+    np.testing.assert_allclose(load, [0.0, *(s * SLIDING for s in SHARES)], atol=1e-12)
+    np.testing.assert_allclose(shift, MINDLIN.shift(load), atol=1e-12)
+    assert "along 28.6°" in axes.get_xlabel()
+
+
+def test_loop_into_sliding_is_closed_up_to_it() -> None:
+    slid = replaced(sheared(0.9 * SLIDING), tangential_load_x=SLIDING, shift_x=1.5 * MINDLIN.sliding_shift)
+    [axes] = plotting.loop(made([PRESSED, sheared(0.5 * SLIDING), slid, slid])).axes
+    [name] = [label for label in by_label(axes) if "Deresiewicz" in label]
+    shift, load = si(axes, by_label(axes)[name])
+    assert (shift[-1], load[-1]) == pytest.approx((MINDLIN.sliding_shift, SLIDING), rel=1e-6)
+    assert r"$\mu P$" in by_label(axes)
+
+
+def test_loop_of_dissimilar_bodies_has_no_closed_curve() -> None:
+    [axes] = plotting.loop(dissimilar()).axes
+    assert set(by_label(axes)) <= {"computed", r"$\mu P$"}
+
+
+def test_torque_and_twist() -> None:
+    result = torsion()
+    [axes] = plotting.torsion(result).axes
+    twist, torque = si(axes, by_label(axes)["computed"])
+    np.testing.assert_allclose(twist, result["twist"].values, atol=1e-15)
+    np.testing.assert_allclose(torque, result["torque"].values, atol=1e-15)
+    twist, torque = si(axes, by_label(axes)["Lubkin"])
+    for stick in (0.9, 0.6, 0.4, 0.32):
+        c = stick * HERTZ.contact_radius
+        assert np.interp(LUBKIN.torque(c), torque, twist) == pytest.approx(LUBKIN.twist(c), rel=1e-3)
+    assert twist[-1] == pytest.approx(LUBKIN.twist(0.3 * HERTZ.contact_radius), rel=1e-6)
+
+
+def test_initial_compliance() -> None:
+    ratio, share = initial_compliance(cattaneo())
+    assert (ratio, share) == pytest.approx((1.0, 0.2), rel=1e-6)
+    assert initial_compliance(dissimilar())[0] == pytest.approx(1.1, rel=1e-6)
+    [axes] = plotting.compliance([dissimilar(), cattaneo()]).axes
+    beta, ratio_of = by_label(axes)[r"$\mu$ = 0.3"].get_data()
+    assert list(beta) == [0.0, 0.19]
+    assert list(ratio_of) == pytest.approx([1.0, 1.1], rel=1e-6)
+    goodman = dissimilar()
+    goodman.attrs["coupling"] = "goodman"
+    assert r"$\mu$ = 0.3, Goodman" in by_label(plotting.compliance([dissimilar(), goodman]).axes[0])
+    moved = dissimilar()
+    moved["shift_x"] += 0.01  # what pressing moved does not count
+    assert initial_compliance(moved)[0] == pytest.approx(1.1, rel=1e-6)
+    with pytest.raises(ValueError, match="needs a load step that only shears"):
+        initial_compliance(made([sheared(0.5 * SLIDING)]))
+
+
+# ----------------------------------------------------------------------------------- all of them
+
+
+def test_overview_shows_shear_and_zones() -> None:
+    figure = plotting.overview(cattaneo(), 3)
+    labels = [axes.get_ylabel() for one in figure.axes for axes in (one, *one.child_axes)]
+    for words in ("pressure", "shear traction $|q|$", "area", "max pressure"):
+        assert any(words in label for label in labels), words
+    assert sum(len(axes.patches) > 0 for axes in figure.axes) == 1
+    single = plotting.overview(made([sheared(0.5 * SLIDING)]), 1)
+    assert not any(axes.get_xlabel() == "load step" for axes in single.axes)
+    without = cattaneo().drop_vars(["traction_x", "traction_y"])  # not kept: what there is without them
+    assert len(plotting.overview(without, 3).axes) < len(figure.axes)
+
+
+SUITABLE = {
+    **dict.fromkeys(plotting.FIGURES, dissimilar),
+    "torsion": torsion,
+}
+
+
+@pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
+@pytest.mark.parametrize("name", plotting.FIGURES)
+def test_every_figure_is_drawn(name: str, kind: str) -> None:
+    figure = plotting.FIGURES[name](SUITABLE[name]())
+    assert isinstance(figure, Figure)
+    stream = io.BytesIO()
+    figure.savefig(stream, format=kind)
+    assert len(stream.getvalue()) > 5000
+
+
+NEEDS_FRICTION = {
+    "tractions": "a contact without friction has no traction",
+    "traction": "a contact without friction has no traction",
+    "traction_x": "a contact without friction has no traction x",
+    "slip_increment": "a contact without friction has no slip increment",
+    "accumulated_slip": "a contact without friction has no accumulated slip",
+    "zones": "a contact without friction has no stick and slip zones",
+    "outlines": "a contact without friction has no stick and slip zones",
+    "loop": "a contact without friction has no tangential load",
+    "torsion": "there is no torque in this result",
+    "compliance": "the tangential compliance is that of spheres with friction",
+}
+
+
+@pytest.mark.parametrize("name", NEEDS_FRICTION)
+def test_what_needs_friction_says_so(name: str) -> None:
+    without = frictionless()
+    if name == "accumulated_slip":
+        without = without.drop_vars("accumulated_slip")
+    with pytest.raises(ValueError, match=NEEDS_FRICTION[name]):
+        plotting.FIGURES[name](without)
+
+
+def test_what_was_not_kept_is_said() -> None:
+    result = cattaneo()
+    with pytest.raises(ValueError, match=r"the traction x was not kept \(output.fields\)"):
+        plotting.tractions(result.drop_vars("traction_x"), 3)
+    result["traction_y"][2] = np.nan
+    result["zone"][2] = -1
+    with pytest.raises(ValueError, match=r"the traction y of step 3 was not kept \(output.every\)"):
+        plotting.tractions(result, 3)
+    with pytest.raises(ValueError, match=r"the zone of step 3 was not kept \(output.every\)"):
+        plotting.zones(result, 3)
+    with pytest.raises(IndexError, match="there is no step 9"):
+        plotting.zones(result, [2, 9])
+    with pytest.raises(ValueError, match="there is no tangential load in this result"):
+        plotting.loop(torsion())
+
+
+def test_title_names_the_loads() -> None:
+    assert StepView.of(cattaneo(), 3).title == "Made up, step 3 ($P$ = 800 mN, $Q_x$ = 120 mN)"
+    assert "$M_z$ = " in StepView.of(torsion(), 3).title

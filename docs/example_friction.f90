@@ -16,8 +16,9 @@ program press_and_shear
   call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(70.0e9_wp, 0.33_wp), error)  ! steel, aluminum
   if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(7.0e-6_wp), [-30, -30], shape(x), error)
   call lattice%coordinates(x, y)
-  if (.not. allocated(error)) &
+  if (.not. allocated(error)) then
     call new_friction_problem(problem, lattice, pair, (x**2 + y**2)/(2*0.01_wp), x < 1, coulomb_t(0.3_wp), .false., error)
+  end if
   if (.not. allocated(error)) call new_frictional_contact(contact, problem, error)
   call new_friction_state(state, lattice)
   do step = 1, 10

@@ -235,8 +235,9 @@ contains
     it%compliance(node) = merge(0.0_wp, infinite, problem%friction%no_slip)
     it%direction(node, :) = 0.0_wp
     length = norm2(it%ds(node, :))
-    if (length > negligible_slip*problem%tangential_compliance*maxval(it%p)) &
+    if (length > negligible_slip*problem%tangential_compliance*maxval(it%p)) then
       it%direction(node, :) = -it%ds(node, :)/length
+    end if
   end subroutine enter
 
   !> Is there nothing to carry the loads, or no more than the directions of slip, with tractions to match?

@@ -240,8 +240,9 @@ contains
           bound = friction%bound(self%p(i))
           associate (e => self%shear%direction(:, i))
             across = 0.0_wp
-            if (self%shear%compliance(i) < blend_end*self%shear%elastic_compliance) &
+            if (self%shear%compliance(i) < blend_end*self%shear%elastic_compliance) then
               across = dot_product(normal_to(e), self%q([i, n + i]))
+            end if
             self%q([i, n + i]) = bound*e + across*normal_to(e)
           end associate
         end if

@@ -247,8 +247,9 @@ contains
     !> Iterate
     type(iterate_t), intent(in) :: it
 
-    is_adrift = .not. it%carried .or. (.not. any(it%zone == stick) .and. &
-                sqrt(maxval(sum(it%q**2, dim=2))) > beyond_reason*problem%friction%bound(maxval(it%p)))
+    is_adrift = .not. it%carried
+    if (is_adrift .or. any(it%zone == stick)) return
+    is_adrift = sqrt(maxval(sum(it%q**2, dim=2)))/beyond_reason > problem%friction%bound(maxval(it%p))
   end function is_adrift
 
   !> Let the nodes stick that are the closest to it: those whose compliance is below the (harmonic) mean.

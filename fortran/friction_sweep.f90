@@ -174,7 +174,7 @@ contains
       now%q = q
     end do
     if (now%sliding) return
-    u = now%u
+    allocate (u, source=now%u)
     motion = now%motion
     call driven%set_motions(multiplier, now%motion)
     call now%shear%to_plane(x, now%q)

@@ -84,7 +84,7 @@ def table_9_3(paths: Mapping[tuple[int, float], Sequence[int]] | None = None) ->
             made = _pressed(mesh, load, mu, steps)
             ratios = solved[steps] = Ratios.of(made[-1], load, mu)
             _against_discrete(found, f"{load:g} N, a/l_e = {mesh}, μ = {mu:g}", mesh, mu, steps, ratios)
-            found.add(f"{load:g} N, a/l_e = {mesh}, μ = {mu:g}", f"time, {steps} steps", "s", made.seconds)
+            found.add(f"{load:g} N, a/l_e = {mesh}, μ = {mu:g}", f"time, N = {steps}", "s", made.seconds)
         if 1 in solved:
             _against_single_step(found, load, mu, solved[1])
         if len(solved) > 2:
@@ -212,7 +212,8 @@ def rigid_plane(step_counts: Sequence[int] = (10, 64)) -> Comparison:
     """Press an elastic sphere with nu = 0 on a rigid plane: beta = 1/2, the strongest coupling."""
     found = Comparison()
     ball = {"young_modulus": 1.0, "poisson_ratio": 0.0, "surface": Sphere(radius=1.0)}
-    allowed = {"c/a (area)": 0.01, "p_max/p_Hertz": 0.01, "delta/delta_Hertz": 0.003}
+    # a few times the last digit of the reference table; in c/a some nodes
+    allowed = {"c/a (area)": 1e-3, "p_max/p_Hertz": 2e-4, "delta/delta_Hertz": 2e-5}
     for steps in step_counts:
         load = 4.0 / 3.0  # a = 1
         made = run(

@@ -34,7 +34,7 @@ def methods(histories: Mapping[str, Mapping[str, Any]] = HISTORIES) -> Compariso
     twisted = {**UNIT, "loads": [press(4.0 / 3.0, 3), {"torque": 0.15, "steps": 4}]}
     _compare(found, "press, twist", bodies(0.2, 0.3, Sphere(radius=1.0)), twisted)
     found.notes.append(
-        "Two algorithms: the nested active sets of section 12 on LAPACK, and the matrix-free one."
+        "Two algorithms: the nested active sets of chapter 12 on LAPACK, and the matrix-free one."
     )
     return found
 

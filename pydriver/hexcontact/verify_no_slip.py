@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from . import analytic_friction as closed
 from .surfaces import Punch, Sphere
 from .verify import Comparison, reference
-from .verify_runs import bodies, hertz_of, press, run
+from .verify_runs import DIGITS, bodies, hertz_of, press, run
 
 NO_SLIP = math.inf
 
@@ -23,9 +23,7 @@ def flat_punch(meshes: Sequence[float] = (80.25,), betas: Sequence[float] = (0.0
             stiffness = _punch(beta, NO_SLIP, mesh) / without
             row = reference(f"flat punch beta={beta:g} no slip", "P/(2 E* a delta)")
             where = f"β = {beta:g}, a/l_e = {mesh:g}"
-            found.add(
-                where, "P/(2 E* a δ)", "-", stiffness, row=row, analytic=kappa, absolute=row.uncertainty
-            )
+            found.add(where, "P/(2 E* a δ)", "-", stiffness, row=row, analytic=kappa, relative=DIGITS)
     found.notes.append(
         "coefficient = inf, given approach; ratio to the frictionless punch on the same lattice. "
         "Analytic: κ = artanh(β)/β."
@@ -100,7 +98,8 @@ def stick_radii(
 
 def _stick_radius(found: Comparison, mesh: float, beta: str, mu: str) -> None:
     case = f"flat punch / self-similar indentation beta={beta} mu={mu}"
-    gamma = min(0.45, 0.99 * (1.0 - 2.0 * float(beta)))  # the second is what materials can have
+    # the reference table has gamma = 0.45, materials at most 1 - 2 beta: this moves a few nodes
+    gamma = min(0.45, 0.99 * (1.0 - 2.0 * float(beta)))
     made = run(
         *bodies(float(beta), gamma, Punch(radius=1.0)),
         spacing=1.0 / mesh,
@@ -117,7 +116,7 @@ def _stick_radius(found: Comparison, mesh: float, beta: str, mu: str) -> None:
         row=row,
         analytic=exact,
         judge="reference",
-        absolute=row.uncertainty,
+        absolute=0.25 * row.uncertainty,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from .surfaces import Sphere
 from .verify import Comparison, reference
-from .verify_runs import bodies, hertz_of, press, run
+from .verify_runs import DIGITS, bodies, hertz_of, press, run
 
 LOAD = 4.0 / 3.0  # E* = 1, R = 1: a_Hertz = 1
 MESH = 40
@@ -51,6 +51,7 @@ def unloading(paths: Sequence[Path] = PATHS) -> Comparison:
             state, share = made[number], 0.1 * tenth
             case = f"{path.case}: {way} P/Pmax={share**3:.3f} (steps {path.steps}, P_k ~ (k/N)^3)"
             radial = state.radial() / hertz.max_pressure
+            nodes = 2.0 * state.two_nodes * state.stick_radius / state.area_radius
             values = {
                 "p_max/p_Hertz(Pmax)": state.peak / hertz.max_pressure,
                 "delta/delta_Hertz(Pmax)": state["approach"] / hertz.approach,
@@ -68,7 +69,7 @@ def unloading(paths: Sequence[Path] = PATHS) -> Comparison:
                     "-",
                     value,
                     row=row,
-                    absolute=row.uncertainty,
+                    absolute=nodes if quantity == "stick area fraction" else DIGITS,
                 )
         found.add(where, f"time, {len(made)} steps", "s", made.seconds)
     found.notes.append(

@@ -4,6 +4,7 @@
 !> area, which stick and slip zones and which residuals follow from them. How to
 !> get to the next one is left to friction_sweep and friction_newton.
 module hc_friction_iterate
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, separated, stick, slip, &
@@ -84,6 +85,8 @@ module hc_friction_iterate
     procedure :: traction_scale
     !> Residuals of the present tractions
     procedure :: find_residuals
+    !> Are all numbers numbers?
+    procedure :: is_finite
   end type iterate_t
 
 contains
@@ -368,6 +371,13 @@ contains
                                                    reshape(self%p, n), self%problem%friction, &
                                                    self%problem%tangential_compliance)
   end subroutine find_residuals
+
+  !> Are all tractions and motions finite numbers?
+  pure logical function is_finite(self)
+    class(iterate_t), intent(in) :: self
+
+    is_finite = all(ieee_is_finite(self%p)) .and. all(ieee_is_finite(self%q)) .and. all(ieee_is_finite(self%motion))
+  end function is_finite
 
   !> R_n of vectors.
   pure real(wp) function gap_residual(problem, p, gap)

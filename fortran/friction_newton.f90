@@ -11,7 +11,7 @@ module hc_friction_newton
   use hc_contact_state, only: normal, force_control
   use hc_driven_motions, only: driven_motions_t
   use hc_friction_iterate, only: iterate_t
-  use hc_friction_sweep, only: inner_accuracy, final_accuracy
+  use hc_friction_sweep, only: inner_accuracy, final_accuracy, beyond_reason
   use hc_friction_systems, only: coupled_system_t
   use hc_krylov, only: projected_gmres, precondition_constraints, fulfil
   implicit none
@@ -25,9 +25,11 @@ module hc_friction_newton
 contains
 
   !> One step of Newton's method.
-  subroutine coupled_sweep(now, error)
+  subroutine coupled_sweep(now, failed, error)
     !> Tractions and motions
     type(iterate_t), intent(inout), target :: now
+    !> Nothing came of it: no node resists the loads
+    logical, intent(out) :: failed
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -97,8 +99,15 @@ contains
                            independent, iterations, error)
       if (allocated(error)) return
     end if
-    now%sliding = .not. independent
-    if (now%sliding) return
+    ! where all nodes slip, only their directions resist a load: not beyond reason
+    failed = .not. independent
+    if (.not. failed .and. n_shear > 0 .and. .not. any(shear_active(n + 1:))) then
+      failed = maxval(abs(x(n + 1:2*n))) > beyond_reason*now%traction_scale()
+    end if
+    if (failed) then
+      call now%refresh(error)
+      return
+    end if
 
     call driven%set_motions(multiplier(:n_shear), now%motion)
     if (m > n_shear) now%motion(normal) = multiplier(m)

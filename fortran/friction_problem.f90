@@ -30,7 +30,7 @@ module hc_friction_problem
   real(wp), parameter :: classification_scale = 10.0_wp
 
   !> |beta| min(mu, 1) from which pressure and shear traction are better found together.
-  real(wp), parameter :: strong_coupling = 0.05_wp
+  real(wp), parameter :: strong_coupling = 0.03_wp
 
   !> Share of a load that rounding may add.
   real(wp), parameter :: rounding = 1.0e-6_wp

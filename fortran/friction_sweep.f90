@@ -16,7 +16,7 @@ module hc_friction_sweep
   implicit none
   private
 
-  public :: staggered_sweep, inner_accuracy, final_accuracy
+  public :: staggered_sweep, inner_accuracy, final_accuracy, beyond_reason
 
   !> Accuracy of a linear solution, relative to the residual at its start.
   real(wp), parameter :: inner_accuracy = 0.1_wp

@@ -10,7 +10,7 @@ module hc_frictional_contact
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, along_x, force_control
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_friction_systems, only: operators_t, new_operators, operators_memory
-  use hc_friction_iterate, only: iterate_t
+  use hc_friction_iterate, only: iterate_t, cautious
   use hc_friction_sweep, only: staggered_sweep
   use hc_friction_newton, only: coupled_sweep
   use hc_multilevel, only: prolong, restrict_field, level_count
@@ -23,7 +23,9 @@ module hc_frictional_contact
   integer, parameter :: smallest_side = 20
   !> Sweeps without a node that sticks on its own, after which a load counts as not carried.
   integer, parameter :: max_held = 12
-  !> Residuals below which strongly coupled tractions are found together.
+  !> Sweeps after which tractions that do not settle one after the other are found together, unless they act on
+  !> each other so strongly that it is done sooner: once residuals are near, or a few sweeps later all the same.
+  integer, parameter :: most_apart = 12, patience = 4
   real(wp), parameter :: near = 0.1_wp
   !> Coarse lattices only have to give a start.
   real(wp), parameter :: coarse_tolerance = 1.0e-4_wp
@@ -219,10 +221,9 @@ contains
 
     type(iterate_t) :: now
     real(wp), allocatable :: displacement(:, :, :)
-    integer :: sweep, held
-    logical :: strong
+    integer :: sweep, held, apart
+    logical :: failed
 
-    strong = problem%couples_strongly()
     held = 0
     operators%flexibility%applications = 0.0_wp
     operators%preconditioning = 0.0_wp
@@ -230,13 +231,22 @@ contains
     allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
     call now%begin(problem, operators, start, reference, target, tolerance, error)
     if (allocated(error)) return
+    ! sweeps that find pressure and shear traction one after the other
+    apart = max_sweeps
+    if (now%pressing) apart = most_apart
+    if (problem%couples_strongly()) then
+      apart = 1
+      now%caution = cautious
+    end if
     do sweep = 1, max_sweeps
-      if (strong .and. max(now%residual_normal, now%residual_tangential) < near) then
-        call coupled_sweep(now, error)
-      else
-        call staggered_sweep(now, error)
+      failed = .true.
+      if (sweep > apart .and. (max(now%residual_normal, now%residual_tangential) < near .or. sweep > apart + patience)) then
+        call coupled_sweep(now, failed, error)
+        if (allocated(error)) return
       end if
+      if (failed) call staggered_sweep(now, error)
       if (allocated(error)) return
+      if (.not. now%is_finite()) exit
       if (now%held) held = held + 1
       if (now%held .and. problem%overloads(target, sum(now%p))) held = max_held
       state%sweeps = sweep

@@ -281,8 +281,8 @@ contains
         h(i, k) = rotated
       end do
       length = hypot(h(k, k), h(k + 1, k))
-      iterations = k
       if (.not. length > 0.0_wp) exit
+      iterations = k
       c(k) = h(k, k)/length
       s(k) = h(k + 1, k)/length
       h(k, k) = length

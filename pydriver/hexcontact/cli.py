@@ -5,6 +5,7 @@ Every command imports what it needs when it runs, so that ``hexcontact --help`` 
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import functools
 import os
@@ -12,7 +13,7 @@ import signal
 import sys
 import threading
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, TypeVar
 
@@ -84,19 +85,44 @@ def _guarded(command: Callable[P, R]) -> Callable[P, R]:
 # --- interruption ---------------------------------------------------------------------------------
 
 
-class _Terminated(BaseException):
-    """SIGTERM has come."""
+class _Interrupted(BaseException):
+    """A signal has come that ends the run."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.name = signal.Signals(number).name
+        self.exit_code = 128 + number
 
 
-def _on_sigterm(*_: object) -> NoReturn:
-    raise _Terminated
+@contextlib.contextmanager
+def _news() -> Iterator[tuple[int, int]]:
+    """Open a pipe into which the signals that end a run put their numbers, in the order they come.
+
+    They raise nothing, wherever they come, so that leaving is not interrupted by those that follow.
+    """
+    old = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    heeded = {number: handler for number, handler in old.items() if handler not in (signal.SIG_IGN, None)}
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    former = signal.set_wakeup_fd(writer)
+    try:
+        for number in heeded:
+            signal.signal(number, lambda *_: None)
+        yield reader, writer
+    finally:
+        for number, handler in heeded.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(former)
+        os.close(reader)
+        os.close(writer)
 
 
-def _in_background(work: Callable[[], None]) -> None:
+def _in_background(work: Callable[[], None], news: tuple[int, int]) -> None:
     """Do `work` in a second thread while this one waits for it, and for signals.
 
     The compiled core cannot be interrupted; a thread that waits can.
     """
+    reader, writer = news
     raised: list[BaseException] = []
 
     def worker() -> None:
@@ -104,21 +130,24 @@ def _in_background(work: Callable[[], None]) -> None:
             work()
         except BaseException as error:
             raised.append(error)
+        os.write(writer, bytes([0]))  # is the number of no signal
 
-    thread = threading.Thread(target=worker, daemon=True)
-    thread.start()
-    thread.join()
+    threading.Thread(target=worker, daemon=True).start()
+    if number := os.read(reader, 1)[0]:
+        raise _Interrupted(number)
     if raised:
         raise raised[0]
 
 
-def _leave(store: Store, code: int) -> NoReturn:
+def _leave(store: Store, signaled: _Interrupted) -> NoReturn:
     """Say what is kept after an interruption and end the process, whatever the core is doing."""
+    store.close(f"interrupted ({signaled.name})")
     kept = store.kept if store.heads else "no load step was finished"
-    print(f"hexcontact: interrupted; {kept}", file=sys.stderr)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
+    with contextlib.suppress(OSError):  # nobody listens any more
+        print(f"hexcontact: interrupted; {kept}", file=sys.stderr)
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(signaled.exit_code)
 
 
 # --- commands -------------------------------------------------------------------------------------
@@ -137,7 +166,7 @@ def _hexcontact(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
-    """Contact of three-dimensional elastic bodies: pressure, contact area and approach from a deck in TOML.
+    """Elastic contact in 3-D from a deck in TOML: pressure, shear traction, stick and slip, approach, shift.
 
     Exit codes: 0 done, 2 wrong input, 3 no convergence, 4 not enough memory or disk, 130 and 143 interrupted.
     """
@@ -218,19 +247,15 @@ def run(
     case = _case(deck, settings)
     target = _target(case, deck, output)
     shown, histories = reporter(quiet), []
-    with Store(target, solve.metadata_of(case), overwrite) as store:
-        previous = signal.getsignal(signal.SIGTERM)
+    with _news() as news, Store(target, solve.metadata_of(case), overwrite) as store:
         try:
-            signal.signal(signal.SIGTERM, _on_sigterm)
             with shown.watching(case.title or deck.stem, len(case.load_steps)):
                 _in_background(
-                    lambda: solve.record(case, store, shown, lambda step: histories.append(step.history))
+                    lambda: solve.record(case, store, shown, lambda step: histories.append(step.history)),
+                    news,
                 )
-        except (KeyboardInterrupt, _Terminated) as signaled:
-            store.close()
-            _leave(store, 130 if isinstance(signaled, KeyboardInterrupt) else 143)
-        finally:
-            signal.signal(signal.SIGTERM, previous)
+        except _Interrupted as signaled:
+            _leave(store, signaled)
     picture = None
     if plot:
         from .plot_command import picture_of

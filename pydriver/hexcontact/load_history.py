@@ -214,7 +214,8 @@ def _overload(
             given = getattr(segment, name)
             # without friction, but solved for all the same, the surfaces may be moved over each other
             if target.value != 0 and given is not None and (by_force or mu is None):
-                yield Problem((*key, name), given, "expected 0, since the contact is frictionless")
+                known = "or a [friction] table" if mu is None else "since friction.coefficient = 0"
+                yield Problem((*key, name), given, f"expected 0, {known}")
         return
     if step.z.control != "force" or any(target.from_start for _, target in (("z", step.z), *tangential)):
         return

@@ -213,9 +213,12 @@ def loop(result: Result | xarray.Dataset) -> Figure:
         )
         bound = float(dataset.attrs.get("friction_coefficient", np.inf)) * _values(dataset, "normal_load")[-1]
         low, high = axes.get_ylim()
-        for sign in (-1.0, 1.0):
-            if 1.3 * low < sign * bound * to_force < 1.3 * high:
-                axes.axhline(sign * bound * to_force, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
+        room = 0.04 * (high - low)
+        for level in (-bound * to_force, bound * to_force):
+            if 1.3 * low < level < 1.3 * high:
+                axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
+                low, high = min(low, level - room), max(high, level + room)
+        axes.set_ylim(low, high)
         axes.legend(*_once(axes))
         set_title(figure, str(dataset.attrs.get("title", "")))
         return figure

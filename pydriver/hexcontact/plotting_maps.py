@@ -32,6 +32,7 @@ Limits = tuple[float, float, float, float]
 
 DRAWN_NODES = 60_000  # nodes beyond which a field is drawn from every second, third, ... node
 _ARROWS, FEWER_ARROWS = 13, 9  # about so many across the contact, in a large and a small picture
+_WITH_ARROWS = 9  # maps in a picture up to which their arrows can be seen
 _WIDTH = 7.2  # inches of a picture with several panels
 
 
@@ -166,8 +167,9 @@ def map_panels(count: int, limits: Limits, lines: int = 1) -> tuple[Figure, list
     columns = min(count, 4 if count > 6 or count == 4 else 3 if aspect < 2.0 else 4)
     rows = -(-count // columns)
     cell = _WIDTH / max(columns, 2)
-    height = rows * (float(np.clip((cell - 0.2) * aspect, 0.6, 3.5)) + 0.17 * lines + 0.12) + 0.95
+    height = rows * (float(np.clip((cell - 0.2) * aspect, 0.6, 3.5)) + 0.17 * lines + 0.24) + 0.95
     figure = Figure(figsize=(cell * columns + 0.6, height), layout="compressed")
+    cast(Any, figure.get_layout_engine()).set(h_pad=0.1)  # between a title and the panel above
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes in panels.flat[count:]:
         axes.set_visible(False)
@@ -278,7 +280,10 @@ def draw_field(
 
 
 def field_map(
-    name: str, result: Result | xarray.Dataset, steps: int | Sequence[int] = -1, with_arrows: bool = True
+    name: str,
+    result: Result | xarray.Dataset,
+    steps: int | Sequence[int] = -1,
+    with_arrows: bool | None = None,
 ) -> Figure:
     """Draw a field over the plane, linear on the triangles of the lattice as in the solution.
 
@@ -290,8 +295,8 @@ def field_map(
         What a run returned, or `open_result` read.
     steps : int or sequence of int
         Numbers of the load steps, from 1; -1 is the last one.
-    with_arrows : bool
-        Whether a vector is drawn as arrows, too.
+    with_arrows : bool, optional
+        Whether a vector is drawn as arrows, too; by default unless there are too many maps to see them.
 
     Returns
     -------
@@ -308,7 +313,8 @@ def field_map(
         views, labels, title = views_of(result, steps)
         limits = widened(union(views)) if len(views) == 1 else union(views)
         figure, panels = map_panels(len(views), limits)
-        draw_field(figure, panels, views, name, limits, with_arrows)
+        arrows = len(views) <= _WITH_ARROWS if with_arrows is None else with_arrows
+        draw_field(figure, panels, views, name, limits, arrows)
         if len(views) == 1:
             if views[0].hertz is not None:
                 panels[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)

@@ -309,15 +309,22 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
     to_length, length = scaled(max(np.abs(view.window()[:2]).max(), view.spacing), "m")
     to_stress, stress = scaled(largest, "Pa")
     place, fine = (cut.origin + cut.place) * to_length, (cut.origin + cut.fine) * to_length
+    size = np.hypot(along, across)
+    low, high = (max(float((sign * np.stack([along, across])).max()), 0.0) for sign in (-1.0, 1.0))
+    with_size = np.abs(across).max() > 0.02 * largest
+    if with_size:
+        high = float(size.max())
+    # what friction carries is drawn on the sides that the traction uses, there whole
+    used = [sign for sign, reach in ((1.0, high), (-1.0, low)) if reach > 0.05 * largest] or [1.0]
     if bound.any():
-        axes.fill_between(place, -bound * to_stress, bound * to_stress, color="0.92", lw=0, zorder=0)
-        axes.plot(place, bound * to_stress, color=GUIDE, lw=0.8, label=r"$\pm\mu p$", zorder=1)
-        axes.plot(place, -bound * to_stress, color=GUIDE, lw=0.8, zorder=1)
+        name = r"$\pm\mu p$" if len(used) == 2 else r"$\mu p$" if used == [1.0] else r"$-\mu p$"
+        for sign in used:
+            edge = sign * bound * to_stress
+            axes.fill_between(place, edge, color="0.92", lw=0, zorder=0)
+            axes.plot(place, edge, color=GUIDE, lw=0.8, label=name if sign == used[0] else None, zorder=1)
     axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=1)
-    if np.abs(across).max() > 0.02 * largest:
-        axes.plot(
-            place, np.hypot(along, across) * to_stress, color="black", lw=0.9, ls=":", label="$|q|$", zorder=2
-        )
+    if with_size:
+        axes.plot(place, size * to_stress, color="black", lw=0.9, ls=":", label="$|q|$", zorder=2)
     for values, color, name in zip((along, across), (COMPUTED, THIRD), cut.names(), strict=True):
         axes.plot(place, values * to_stress, color=color, label=name, zorder=4, **cut.look())
     if exact is not None:
@@ -326,8 +333,9 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
         ):
             axes.plot(fine, values * to_stress, label=label, **cut.beside(EXACT))
     axes.set(ylabel=f"shear traction ({stress})", xlabel=cut.label(length))
-    low = max(-float(np.minimum(along, across).min()), 0.12 * largest)
-    axes.set_ylim(-1.2 * low * to_stress or -1.0, 1.1 * largest * to_stress or 1.0)
+    below, above = (largest if sign in used else reach for sign, reach in ((-1.0, low), (1.0, high)))
+    room = 0.1 * (largest or 1.0 / to_stress)
+    axes.set_ylim(-(below + room) * to_stress, (above + room) * to_stress)
     _pressure_range(axes, cut, view.spacing, to_length)
     legend_below(axes, ncols=3, columnspacing=1.2)
 

@@ -28,6 +28,7 @@ from .result import Layout, Metadata, Result, Step, assemble
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _RECORD = re.compile(r"\d{6}\.nc")
+_STOPPED = "stopped.txt"  # in the journal: why the run ended before its time
 _LACKING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, None}
 
 
@@ -67,17 +68,27 @@ class Journal:
         return read_record(self.records[0])[0]
 
     @property
+    def stopped(self) -> str:
+        """Why the run ended before its time; empty if it goes on, was killed or has finished."""
+        with contextlib.suppress(FileNotFoundError):
+            return (self.folder / _STOPPED).read_text(encoding="utf-8", errors="replace")
+        return ""
+
+    @property
     def complete(self) -> bool:
         """Whether all planned steps are there."""
         return len(self) == self.metadata.planned_steps
 
     def result(self, path: Path) -> Result:
         """All finished steps as a result in memory; `path` is what the user calls it."""
-        return Result(assemble(self.metadata, self, self.complete), str(path))
+        dataset = assemble(self.metadata, self, self.complete)
+        if self.stopped:
+            dataset.attrs["stopped"] = self.stopped
+        return Result(dataset, str(path))
 
     def remove(self) -> None:
-        """Delete the records and what an interrupted write left; the lock stays."""
-        for path in (*self.records, *self.folder.glob("*.tmp")):
+        """Delete the records, why they are not all, and what an interrupted write left; the lock stays."""
+        for path in (*self.records, self.folder / _STOPPED, *self.folder.glob("*.tmp")):
             path.unlink(missing_ok=True)
 
 
@@ -212,8 +223,9 @@ class Store:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        """Close it; an error on its way out is told what is kept."""
-        self.close()
+        """Close it; an error on its way out is written down, and told what is kept."""
+        known = isinstance(error, HexcontactError | KeyboardInterrupt)
+        self.close((str(error) or "interrupted") if known else "")
         if isinstance(error, HexcontactError) and self.heads:
             error.add_note(self.kept)
 
@@ -293,12 +305,21 @@ class Store:
             Journal(self.folder).remove()
             self.close()
 
-    def close(self) -> None:
-        """Let go of the files; the journal of an unfinished run stays."""
+    def close(self, reason: str = "") -> None:
+        """Let go of the files; the journal of an unfinished run stays.
+
+        Parameters
+        ----------
+        reason : str
+            Why the run ends before its time, kept beside its finished steps.
+        """
         with self._mutex:
             if self._closed:
                 return
             self._closed = True
+            if reason and self.heads:
+                with contextlib.suppress(OSError):
+                    (self.folder / _STOPPED).write_text(reason, encoding="utf-8")
             self._lock.release()
             with contextlib.suppress(OSError):  # unless there are records in it
                 self.folder.rmdir()

@@ -281,6 +281,7 @@ def file_rows(result: Result) -> list[Row]:
         ("file", result.path),
         ("written by", f"{attributes['source']}, run started {attributes['created']}"),
         ("load steps", f"{len(result)} ({state})"),
+        *([("stopped", str(attributes["stopped"]))] if "stopped" in attributes else []),
         ("window", f"{sizes['row']} x {sizes['col']} nodes"),
         ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
         ("algorithm", _algorithm(attributes)),

@@ -24,6 +24,7 @@ _SCALARS = (  # of a state, besides the residuals, that have the names of the hi
     *("approach", "shift_x", "shift_y", "twist", "dissipated_energy", "operator_applications"),
 )
 _NEAR_SLIDING = 0.99  # share of mu P from which full slip may carry a tangential load
+_SLIDING = 1.0 - 1e-6  # ... from which it has to
 
 
 class FrictionWindow(Window["ContactState"]):
@@ -140,18 +141,26 @@ class FrictionWindow(Window["ContactState"]):
         shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
         bound = self.case.friction_coefficient * values[0] if z else math.nan
         # below the bound a force alone always finds a balance, whatever an attempt that failed looks like
-        if solution.sliding and (torque or shear > _NEAR_SLIDING * bound or (shear and not z)):
+        doubtful = torque or shear > _NEAR_SLIDING * bound or (shear and not z)
+        if (solution.sliding and doubtful) or (shear and shear >= _SLIDING * bound):
             wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
             wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
             known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})" if z else ""
+            seen = "no sticking node is left and " * solution.sliding
             return (
-                f"{step}: gross sliding: no sticking node is left and friction cannot carry the "
+                f"{step}: gross sliding: {seen}friction cannot carry the "
                 f"{listed(wanted, 'and the')}{known}; {after}; expected a smaller load, or a prescribed "
                 "motion in its place (shift_x, shift_y, twist)"
             )
+        hint = "more steps in this segment may help, or a larger tolerance"
+        if doubtful and math.isfinite(self.case.friction_coefficient):
+            hint += (
+                "; or the load is more than friction can carry, which a prescribed motion in its place "
+                "(shift_x, shift_y, twist) would show"
+            )
         return (
             f"{step} did not converge: {after}; solver.tolerance = {self.case.solver.tolerance:g} was "
-            "expected; more steps in this segment may help, or a larger tolerance"
+            f"expected; {hint}"
         )
 
 

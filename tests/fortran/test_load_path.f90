@@ -278,7 +278,7 @@ contains
     type(load_target_t) :: target
     integer :: sweeps, i
 
-    call new_sphere(contact%frictional_contact_t, 10, 0.4_wp, -0.25_wp, coulomb_t(mu), error)
+    call new_sphere(contact%frictional_contact_t, 10, 0.4_wp, -0.07_wp, coulomb_t(mu), error)
     if (allocated(error)) return
     call new_friction_state(virgin, contact%problem%lattice)
     call advance(contact, virgin, load_target_t(value=[load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., tolerance, 60, 0, pressed, error)

@@ -217,6 +217,8 @@ def test_no_convergence_is_exit_code_3(deck: Path, monkeypatch: pytest.MonkeyPat
         done, 3, r"1 of 2 load steps are finished and kept in .*sphere\.nc\.d; hexcontact info .*sphere\.nc"
     )
     assert len(open_result(deck.with_suffix(".nc"))) == 1
+    told = " ".join(inside(deck.parent, "info", "sphere.nc").output.split())
+    assert "stopped step 2 of 2 did not converge: after" in told
 
 
 # --- interrupted ----------------------------------------------------------------------------------
@@ -248,6 +250,26 @@ def test_an_interrupted_run_keeps_its_steps(deck: Path, sent: signal.Signals, co
         2,
         r"holds \d+ finished steps of an unfinished run; .*--overwrite",
     )
+
+
+@pytest.mark.parametrize("sent", [(15, 15), (15, 2), (2, 15, 15)])
+def test_signals_that_follow_do_not_disturb_the_leaving(deck: Path, sent: tuple[int, ...]) -> None:
+    deck.write_text(DECK.replace("steps = 2", "steps = 5000"))
+    process = start(deck.parent, "run", "sphere.toml")
+    assert process.stderr
+    for _ in range(3):
+        process.stderr.readline()
+    process.send_signal(sent[0])
+    time.sleep(0.005)  # or else the system may deliver them in another order
+    for number in sent[1:]:
+        process.send_signal(number)
+    _, error = process.communicate(timeout=30)
+    assert process.returncode == 128 + sent[0]
+    assert "Traceback" not in error
+    assert error.count("interrupted; ") == 1
+    assert not (journal_of(deck.with_suffix(".nc")) / "lock").exists()
+    told = " ".join(hexcontact_(deck.parent, "info", "sphere.nc").stdout.split())
+    assert f"stopped interrupted ({signal.Signals(sent[0]).name})" in told
 
 
 def test_a_long_step_can_be_interrupted(deck: Path) -> None:

@@ -409,6 +409,26 @@ def test_a_torque_beyond_friction_is_gross_sliding_too() -> None:
         sphere(loads=[{"normal_load": 31.5}, {"torque": 1e-2}]).run()
 
 
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize(
+    ("load", "sentence"),
+    [
+        (
+            {"tangential_load_x": 3.15},
+            r"gross sliding: .*friction cannot carry the tangential load of 3\.150 N ",
+        ),
+        (
+            {"tangential_load_x": 2.0, "torque": 1e-5},
+            r"did not converge: .*; or the load is more than friction ",
+        ),
+        ({"tangential_load_x": 2.0}, r"did not converge: .* may help, or a larger tolerance$"),
+    ],
+)
+def test_a_load_that_may_be_too_much_is_called_so(load: dict[str, float], sentence: str) -> None:
+    with pytest.raises(ConvergenceError, match=rf"step 2 of 2:? {sentence}"):
+        sphere(loads=[{"normal_load": 31.5}, load]).run()
+
+
 def test_a_prescribed_motion_may_go_on_sliding() -> None:
     result = sphere(ALUMINIUM, loads=[{"normal_load": 31.5}, {"shift_x": 5e-6, "steps": 2}]).run()
     # slip directions differ a little from node to node, so the load stays slightly below mu P

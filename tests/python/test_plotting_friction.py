@@ -365,7 +365,7 @@ def test_tractions_of_a_step() -> None:
         (upper, "pressure", "computed", 1.0),
         (lower, "traction_x", "$q_x$", 1.0),
         (lower, "traction_y", "$q_y$", 1.0),
-        (lower, "pressure", r"$\pm\mu p$", MU),
+        (lower, "pressure", r"$\mu p$", MU),
     ):
         x, values = si(lower, by_label(axes)[label])
         values = values / units(lower.get_ylabel()) * units(axes.get_ylabel())
@@ -377,6 +377,22 @@ def test_tractions_of_a_step() -> None:
     upper.set_xlabel(lower.get_xlabel())
     x, p = si(upper, by_label(upper)["Hertz"])
     np.testing.assert_allclose(p, HERTZ.pressure(np.abs(x)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("share", "label", "sides"),
+    [(0.5, r"$\mu p$", {1.0}), (-0.5, r"$-\mu p$", {-1.0}), (0.0, r"$\mu p$", {1.0})],
+)
+def test_what_friction_carries_is_shown_whole_on_the_sides_used(
+    share: float, label: str, sides: set[float]
+) -> None:
+    lower = plotting.tractions(made([PRESSED, sheared(share * SLIDING)]), 2).axes[1]
+    bounds = [line for line in lower.lines if "mu" in str(line.get_label())]
+    low, high = lower.get_ylim()
+    assert {float(np.sign(np.sum(line.get_ydata()))) for line in bounds} == sides
+    assert all(low < y < high for line in bounds for y in np.asarray(line.get_ydata()))
+    assert label in by_label(lower)
+    assert (low < -0.5 * high) == (sides == {-1.0})
 
 
 @pytest.mark.parametrize("degrees", [30.0, 90.0, 120.0, 180.0])
@@ -689,6 +705,22 @@ def test_loop_into_sliding_is_closed_up_to_it() -> None:
 def test_loop_of_dissimilar_bodies_has_no_closed_curve() -> None:
     [axes] = plotting.loop(dissimilar()).axes
     assert set(by_label(axes)) <= {"computed", r"$\mu P$"}
+
+
+@pytest.mark.parametrize("most", [0.6, 0.8, 1 / 1.05, 0.99])
+def test_a_loop_names_only_lines_that_are_seen(most: float) -> None:
+    [axes] = plotting.loop(made([PRESSED, *(sheared(s * most * SLIDING) for s in (0.5, 1.0))])).axes
+    low, high = axes.get_ylim()
+    lines = [line for line in axes.lines if line.get_label() == r"$\mu P$"]
+    assert bool(lines) == (most > 0.75)
+    assert all(low < float(y) < high for line in lines for y in np.asarray(line.get_ydata()))
+
+
+def test_many_maps_have_no_arrows() -> None:
+    result = made([PRESSED, sheared(0.5 * SLIDING)])
+    for count, arrows in ((9, True), (10, False)):
+        maps = plotting.field_map("traction", result, [2] * count).axes
+        assert any(isinstance(child, Quiver) for axes in maps for child in axes.get_children()) == arrows
 
 
 def test_torque_and_twist() -> None:

@@ -321,7 +321,7 @@ def test_a_step_that_cannot_be_committed_leaves_those_before(
     monkeypatch.undo()
     [note] = caught.value.__notes__
     assert note.startswith(f"2 of 9 load steps are finished and kept in {journal_of(out)}; hexcontact info ")
-    assert sorted(p.name for p in journal_of(out).iterdir()) == ["000001.nc", "000002.nc"]
+    assert sorted(p.name for p in journal_of(out).iterdir()) == ["000001.nc", "000002.nc", "stopped.txt"]
     assert_array_equal(open_result(out).pressure.sel(step=2), made_step(1).fields["pressure"])
 
 
@@ -340,7 +340,10 @@ def test_an_output_that_cannot_be_written_at_the_end_leaves_the_journal(
     with pytest.raises(ResourceError, match=r"cannot write the output of .*: No space left on device"):
         written(out)
     assert not out.exists()
-    assert sorted(p.name for p in journal_of(out).iterdir()) == [f"{k:06d}.nc" for k in (1, 2, 3)]
+    assert sorted(p.name for p in journal_of(out).iterdir()) == [
+        *(f"{k:06d}.nc" for k in (1, 2, 3)),
+        "stopped.txt",
+    ]
     assert len(open_result(out)) == 3
 
 

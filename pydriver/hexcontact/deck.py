@@ -142,7 +142,10 @@ class Solver(Table):
     )
     method: Annotated[str, Word(METHODS)] = Field(
         "auto",
-        description="direct: LAPACK on the full matrix; fft: matrix-free; auto: fft, but direct on a small window without friction",
+        description=(
+            "direct: LAPACK on the full matrix; fft: matrix-free; "
+            "auto: fft, but direct on a small window without friction"
+        ),
     )
     tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-14, at_most=0.1)] = Field(
         1e-8, description="bound on every residual at the end of every load step"

@@ -217,7 +217,7 @@ def test_no_convergence_is_exit_code_3(deck: Path, monkeypatch: pytest.MonkeyPat
         done, 3, r"1 of 2 load steps are finished and kept in .*sphere\.nc\.d; hexcontact info .*sphere\.nc"
     )
     assert len(open_result(deck.with_suffix(".nc"))) == 1
-    told = " ".join(inside(deck.parent, "info", "sphere.nc").output.split())
+    told = " ".join(inside(deck.parent, "info", "sphere.nc").stdout.split())
     assert "stopped step 2 of 2 did not converge: after" in told
 
 

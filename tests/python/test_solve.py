@@ -236,7 +236,11 @@ def test_no_convergence_is_told_with_residuals_and_keeps_the_steps_before(
     result = open_result(tmp_path / "out.nc")
     assert len(result) == 2
     assert not result.complete
-    assert sorted(p.name for p in journal_of(tmp_path / "out.nc").iterdir()) == ["000001.nc", "000002.nc", "stopped.txt"]
+    assert sorted(p.name for p in journal_of(tmp_path / "out.nc").iterdir()) == [
+        "000001.nc",
+        "000002.nc",
+        "stopped.txt",
+    ]
 
 
 def test_an_output_in_the_way_is_refused_before_solving(

@@ -20,7 +20,7 @@ module hc_friction_newton
   public :: coupled_sweep
 
   !> Directions that GMRES keeps.
-  integer, parameter :: max_directions = 60
+  integer, parameter :: max_directions = 40
 
 contains
 

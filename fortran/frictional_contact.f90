@@ -83,8 +83,8 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
-    ! fields: problem, iterate, two states, frames, and the vectors of the conjugate gradients
-    finest = operators_memory(extent, n_threads) + 70*8*int(extent(1), long)*extent(2)
+    ! fields: problem, iterate, states, frames, vectors of conjugate gradients, a dozen directions of GMRES
+    finest = operators_memory(extent, n_threads) + 110*8*int(extent(1), long)*extent(2)
     frictional_contact_memory = finest + finest/3
   end function frictional_contact_memory
 

@@ -244,7 +244,12 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: mb(:, :), v(:, :), z(:), image(:)
+    type :: direction_t
+      real(wp), allocatable :: v(:)
+    end type direction_t
+    !> Directions take their memory one by one: mostly a few are enough
+    type(direction_t) :: basis(max_iterations + 1)
+    real(wp), allocatable :: mb(:, :), z(:), image(:), combined(:)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
     integer :: n, i, k
@@ -253,28 +258,28 @@ contains
     iterations = 0
     call precondition_constraints(system, active, columns, mb, error)
     if (allocated(error)) return
-    allocate (v(n, max_iterations + 1), z(n), image(n))
-    v(:, 1) = merge(weight*(rhs - ax + matmul(columns, multiplier)), 0.0_wp, active)
-    length = sqrt(dot(v(:, 1), v(:, 1), system%n_threads))
+    allocate (z(n), image(n))
+    basis(1)%v = merge(weight*(rhs - ax + matmul(columns, multiplier)), 0.0_wp, active)
+    length = sqrt(dot(basis(1)%v, basis(1)%v, system%n_threads))
     independent = .true.
     if (.not. length > 0.0_wp) return
-    v(:, 1) = v(:, 1)/length
+    basis(1)%v = basis(1)%v/length
     g = 0.0_wp
     g(1) = length
     h = 0.0_wp
 
     do k = 1, max_iterations
-      call expand(v(:, k), error)
+      call expand(basis(k)%v, error)
       if (allocated(error) .or. .not. independent) return
       call system%product(z, image, error)
       if (allocated(error)) return
-      v(:, k + 1) = merge(weight*(image - matmul(columns, share)), 0.0_wp, active)
+      basis(k + 1)%v = merge(weight*(image - matmul(columns, share)), 0.0_wp, active)
       do i = 1, k
-        h(i, k) = dot(v(:, i), v(:, k + 1), system%n_threads)
-        v(:, k + 1) = v(:, k + 1) - h(i, k)*v(:, i)
+        h(i, k) = dot(basis(i)%v, basis(k + 1)%v, system%n_threads)
+        basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
       end do
-      h(k + 1, k) = sqrt(dot(v(:, k + 1), v(:, k + 1), system%n_threads))
-      if (h(k + 1, k) > 0.0_wp) v(:, k + 1) = v(:, k + 1)/h(k + 1, k)
+      h(k + 1, k) = sqrt(dot(basis(k + 1)%v, basis(k + 1)%v, system%n_threads))
+      if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
       do i = 1, k - 1
         rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
         h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
@@ -294,8 +299,11 @@ contains
     do i = iterations, 1, -1
       y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
     end do
-    image = matmul(v(:, :iterations), y(:iterations))
-    call expand(image, error)
+    allocate (combined(n), source=0.0_wp)
+    do i = 1, iterations
+      combined = combined + y(i)*basis(i)%v
+    end do
+    call expand(combined, error)
     if (allocated(error)) return
     x = x + z
     multiplier = multiplier + share

@@ -169,6 +169,8 @@ contains
     end if
     if (allocated(error)) return
     self%w = all(:n)
+    self%closing = 0.0_wp
+    self%u = 0.0_wp
     if (all_zero(self%q)) return
     if (self%pressing) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], all, error)

@@ -34,7 +34,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(coupled_system_t) :: system
-    real(wp), allocatable :: x(:), ax(:), rhs(:), weight(:), columns(:, :), rows(:, :), shear_columns(:, :), plane(:)
+    real(wp), allocatable :: x(:), ax(:), rhs(:), weight(:), columns(:, :), mb(:, :), rows(:, :)
+    real(wp), allocatable :: shear_columns(:, :), plane(:)
     logical, allocatable :: active(:), shear_active(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
@@ -82,8 +83,9 @@ contains
       missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - sum(now%p)
       multiplier(m) = now%motion(normal)
     end if
-    call adjust(system, active, columns(:, :m), rows(:, :m), missing(:m), x, independent, error)
+    call precondition_constraints(system, active, columns, mb, error)
     if (allocated(error)) return
+    call fulfil(rows, mb, missing(:m), x, independent, system%n_threads)
     if (independent) then
       call system%product(x, ax, error)
       if (allocated(error)) return
@@ -95,7 +97,7 @@ contains
       goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
                  final_accuracy*now%tolerance)
       goal = goal*real(count(active), wp)**0.25_wp
-      call projected_gmres(system, active, columns, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
+      call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
                            independent, iterations, error)
       if (allocated(error)) return
     end if
@@ -123,23 +125,5 @@ contains
     call now%find_residuals()
     now%first = .false.
   end subroutine coupled_sweep
-
-  !> Make the unknowns carry the prescribed loads.
-  subroutine adjust(system, active, columns, rows, missing, x, independent, error)
-    type(coupled_system_t), intent(inout) :: system
-    logical, intent(in) :: active(:)
-    !> B and C of the constraints
-    real(wp), intent(in) :: columns(:, :), rows(:, :)
-    !> What C^T x lacks
-    real(wp), intent(in) :: missing(:)
-    real(wp), intent(inout) :: x(:)
-    logical, intent(out) :: independent
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: mb(:, :)
-
-    call precondition_constraints(system, active, columns, mb, error)
-    if (allocated(error)) return
-    call fulfil(rows, mb, missing, x, independent, system%n_threads)
-  end subroutine adjust
 
 end module hc_friction_newton

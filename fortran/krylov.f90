@@ -215,14 +215,14 @@ contains
   end subroutine projected_cg
 
   !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
-  subroutine projected_gmres(system, active, columns, rows, weight, rhs, x, ax, tolerance, max_iterations, &
+  subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
                              multiplier, independent, iterations, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
     logical, intent(in) :: active(:)
-    !> B, along which the multipliers act, and C of the constraints (n, number of constraints), zero off the active nodes
-    real(wp), intent(in) :: columns(:, :), rows(:, :)
+    !> B, along which the multipliers act, M B, and C of the constraints (n, number of constraints), zero off the active nodes
+    real(wp), intent(in) :: columns(:, :), mb(:, :), rows(:, :)
     !> Weight of each residual (n)
     real(wp), intent(in) :: weight(:)
     !> Right-hand side (n)
@@ -249,15 +249,13 @@ contains
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
-    real(wp), allocatable :: mb(:, :), z(:), image(:), combined(:)
+    real(wp), allocatable :: z(:), image(:), combined(:)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
     integer :: n, i, k
 
     n = size(x)
     iterations = 0
-    call precondition_constraints(system, active, columns, mb, error)
-    if (allocated(error)) return
     allocate (z(n), image(n))
     basis(1)%v = merge(weight*(rhs - ax + matmul(columns, multiplier)), 0.0_wp, active)
     length = sqrt(dot(basis(1)%v, basis(1)%v, system%n_threads))

@@ -12,7 +12,7 @@ module hc_direct_friction
   use hc_error, only: error_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
-    normal, along_x, along_y, force_control, displacement_control
+    normal, along_x, force_control, displacement_control
   use hc_friction_law, only: linearize, on_cone
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_direct_contact, only: first_guess, exchange, patience

@@ -6,6 +6,7 @@ module hc_f2py_influence
   use iso_c_binding, only: c_double, c_int
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_f2py_handles, only: report
   use hc_lattice, only: equilateral_basis
   use hc_triangle_integrals, only: evaluate_integral, evaluate_displacement, evaluate_linear_displacement
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
@@ -125,21 +126,5 @@ contains
     end if
     call report(error, code, message)
   end subroutine pyramid_kernels
-
-  !> An error as a number and a text of fixed length.
-  pure subroutine report(error, code, message)
-    !> Error, not allocated: no failure
-    type(error_t), allocatable, intent(in) :: error
-    !> Status and its message
-    integer(c_int), intent(out) :: code
-    character(len=512), intent(out) :: message
-
-    code = status%ok
-    message = ' '
-    if (allocated(error)) then
-      code = error%code
-      message = error%message
-    end if
-  end subroutine report
 
 end module hc_f2py_influence

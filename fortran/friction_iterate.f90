@@ -17,7 +17,7 @@ module hc_friction_iterate
   implicit none
   private
 
-  public :: iterate_t, gap_residual, all_zero, cautious
+  public :: iterate_t, gap_residual, cautious
 
   !> The first guess of a shear traction from nothing: this much less of the slip counts.
   real(wp), parameter :: cautious = 0.2_wp
@@ -156,30 +156,30 @@ contains
     class(iterate_t), intent(inout) :: self
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: all(:)
+    real(wp), allocatable :: moved(:)
     integer :: n
 
     n = size(self%p)
-    allocate (all(3*n))
+    allocate (moved(3*n))
     if (self%dragging .and. .not. self%first) then
-      call self%operators%apply([normal], self%p, [normal, along_x, along_y], all, error)
-      self%dragged = all(n + 1:)
+      call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
+      self%dragged = moved(n + 1:)
     else
-      call self%operators%apply([normal], self%p, [normal], all(:n), error)
+      call self%operators%apply([normal], self%p, [normal], moved(:n), error)
     end if
     if (allocated(error)) return
-    self%w = all(:n)
+    self%w = moved(:n)
     self%closing = 0.0_wp
     self%u = 0.0_wp
     if (all_zero(self%q)) return
     if (self%pressing) then
-      call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], all, error)
-      self%closing = all(:n)
+      call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
+      self%closing = moved(:n)
     else
-      call self%operators%apply([along_x, along_y], self%q, [along_x, along_y], all(n + 1:), error)
+      call self%operators%apply([along_x, along_y], self%q, [along_x, along_y], moved(n + 1:), error)
     end if
     if (allocated(error)) return
-    self%u = all(n + 1:)
+    self%u = moved(n + 1:)
   end subroutine refresh
 
   pure logical function all_zero(values)

@@ -250,14 +250,14 @@ contains
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: all(:, :, :)
+    real(wp), allocatable :: tractions(:, :, :)
 
-    allocate (all(size(pressure, 1), size(pressure, 2), 3))
-    all(:, :, 1) = pressure
-    all(:, :, 2:) = traction
-    call flexibility%apply([normal, along_x, along_y], all, [normal, along_x, along_y], displacement, error)
+    allocate (tractions(size(pressure, 1), size(pressure, 2), 3))
+    tractions(:, :, 1) = pressure
+    tractions(:, :, 2:) = traction
+    call flexibility%apply([normal, along_x, along_y], tractions, [normal, along_x, along_y], displacement, error)
     if (allocated(error)) return
-    if (self%goodman) call flexibility%apply([normal], all(:, :, :1), [normal], displacement(:, :, :1), error)
+    if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
   end subroutine displacements
 
   !> shift + twist x r at every node (n_col, n_row, 2) [m].

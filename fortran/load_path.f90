@@ -8,7 +8,7 @@
 module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, load_target_t, normal, force_control
+  use hc_contact_state, only: contact_state_t, load_target_t, force_control
   use hc_friction_problem, only: friction_solver_t
   implicit none
   private

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
 
 # Threads that wait for each other keep their cores busy, by default for so long that two runs on the same
-# cores take a hundred times the time of one. OpenMP reads this when the compiled core is loaded.
+# cores take most of each other's time. OpenMP reads this when the compiled core is loaded.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 

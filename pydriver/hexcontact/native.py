@@ -44,6 +44,16 @@ def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.
     return array.ravel()
 
 
+def checked_mask(candidate: ArrayLike | None, lattice: Lattice) -> NDArray[np.bool_]:
+    """Return the nodes that may touch; None means all."""
+    mask = np.ones(lattice.shape, dtype=bool) if candidate is None else np.asarray(candidate, dtype=bool)
+    if mask.shape != lattice.shape:
+        raise DeckError(
+            f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)"
+        )
+    return mask
+
+
 def method_code(name: str) -> int:
     """Return the number of a method in the core."""
     if name not in _METHODS:
@@ -234,11 +244,7 @@ class NormalContact:
         threads: int = 0,
     ) -> None:
         self.lattice = lattice
-        mask = np.ones(lattice.shape, dtype=bool) if candidate is None else np.asarray(candidate, dtype=bool)
-        if mask.shape != lattice.shape:
-            raise DeckError(
-                f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)"
-            )
+        mask = checked_mask(candidate, lattice)
         # nodes that can never touch may have any gap, also none at all
         gap = np.where(mask, np.asarray(initial_gap, dtype=np.float64), 0.0)
         self._mask = mask

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from .errors import DeckError
 from .lattice import Lattice
-from .native import ElasticPair, Method, checked_field, method_code, raise_for
+from .native import ElasticPair, Method, checked_field, checked_mask, method_code, raise_for
 
 _api = _core.hc_f2py_friction
 
@@ -154,11 +154,7 @@ class FrictionalContact:
         threads: int = 0,
     ) -> None:
         self.lattice = lattice
-        mask = np.ones(lattice.shape, dtype=bool) if candidate is None else np.asarray(candidate, dtype=bool)
-        if mask.shape != lattice.shape:
-            raise DeckError(
-                f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)"
-            )
+        mask = checked_mask(candidate, lattice)
         if not friction_coefficient >= 0:
             raise DeckError(
                 f"friction_coefficient = {friction_coefficient!r}: expected a number of at least 0, or inf"

@@ -318,6 +318,9 @@ def test_memory_is_that_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     assert case.memory_needed(case.lattice) == native_friction.memory_needed("fft", rows, cols)
     assert plain.memory_needed(case.lattice) == native.memory_needed("fft", rows, cols)
     assert memory_needed(case, case.lattice) > memory_needed(plain, case.lattice)
+    # Python holds the state at both ends of a step, and each again on its way into the core and out of it
+    in_python = memory_needed(case, case.lattice) - case.memory_needed(case.lattice)
+    assert in_python >= 4 * 8 * len(FrictionWindow.state) * case.lattice.size
     monkeypatch.setattr(memory, "available", lambda: 1000)
     monkeypatch.setattr("hexcontact.native_friction.FrictionalContact", None)  # must not be reached
     with pytest.raises(ResourceError, match="a window of .* needs .* GB of memory"):

@@ -171,3 +171,16 @@ def test_readme_deck_gives_the_table_shown(tmp_path: Path) -> None:
     rows = [line.rstrip() for line in done.stdout.partition("Against Hertz")[2].splitlines()]
     assert len([row for row in rows if row]) > 4
     assert [row for row in rows if row and row not in readme] == []
+
+
+@pytest.mark.parametrize(
+    ("given", "seen"),
+    [({}, "1000"), ({"GOMP_SPINCOUNT": "7"}, "7"), ({"OMP_WAIT_POLICY": "active"}, "None")],
+)
+def test_threads_do_not_spin_unless_they_are_told_to(given: dict[str, str], seen: str) -> None:
+    environment = {k: v for k, v in os.environ.items() if k not in ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")}
+    program = "import os, hexcontact; print(os.environ.get('GOMP_SPINCOUNT'))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment | given, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == seen

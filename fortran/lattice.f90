@@ -15,7 +15,10 @@ module hc_lattice
   implicit none
   private
 
-  public :: lattice_t, new_lattice, equilateral_basis, edge_directions
+  public :: lattice_t, new_lattice, equilateral_basis, edge_directions, neighbors
+
+  !> Steps in column and row to the six neighbours of a node, along the edges of the triangulation.
+  integer, parameter :: neighbors(2, 6) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1], [2, 6])
 
   !> Basis, origin and index window of a lattice.
   type :: lattice_t

@@ -5,11 +5,11 @@
 !> fine nodes are the midpoints of coarse edges.
 module hc_multilevel
   use hc_precision, only: wp
-  use hc_lattice, only: lattice_t
+  use hc_lattice, only: lattice_t, neighbors
   implicit none
   private
 
-  public :: level_count, prolong, restrict_field, restrict_mask
+  public :: level_count, prolong, prolong_edge, restrict_field, restrict_mask
 
 contains
 
@@ -71,6 +71,45 @@ contains
     end function at
 
   end subroutine prolong
+
+  !> Interpolate a pressure that falls to zero at its edge like the root of the distance.
+  !>
+  !> Its square is linear there: the square is continued by a straight line into the
+  !> nodes beyond the edge, interpolated, and cut off where it is negative. So the edge
+  !> of the fine pressure lies where that of the coarse one does between nodes.
+  pure subroutine prolong_edge(coarse_lattice, coarse, fine_lattice, fine)
+    !> Coarse lattice and window
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse pressure (n_col, n_row)
+    real(wp), intent(in) :: coarse(:, :)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine pressure (n_col, n_row)
+    real(wp), intent(out) :: fine(:, :)
+    real(wp), allocatable :: square(:, :)
+    real(wp) :: beyond
+    integer :: col, row, k, n, near(2), next(2)
+
+    allocate (square, source=max(coarse, 0.0_wp)**2)
+    do row = 1, size(coarse, 2)
+      do col = 1, size(coarse, 1)
+        if (coarse(col, row) > 0.0_wp) cycle
+        beyond = 0.0_wp
+        n = 0
+        do k = 1, size(neighbors, 2)
+          near = [col, row] + neighbors(:, k)
+          next = near + neighbors(:, k)
+          if (any(min(near, next) < 1) .or. any(max(near, next) > shape(coarse))) cycle
+          if (.not. min(coarse(near(1), near(2)), coarse(next(1), next(2))) > 0.0_wp) cycle
+          beyond = beyond + min(2.0_wp*coarse(near(1), near(2))**2 - coarse(next(1), next(2))**2, 0.0_wp)
+          n = n + 1
+        end do
+        if (n > 0) square(col, row) = beyond/n
+      end do
+    end do
+    call prolong(coarse_lattice, square, fine_lattice, fine)
+    fine = sqrt(max(fine, 0.0_wp))
+  end subroutine prolong_edge
 
   !> Values of a field at the coarse nodes.
   pure function restrict_field(fine_lattice, fine, coarse_lattice) result(coarse)

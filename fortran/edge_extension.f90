@@ -1,0 +1,264 @@
+!> Displacements continued beyond the edge of a contact, for a better preconditioner.
+!>
+!> The inverse K^-1 of the flexibility over the whole lattice is cheap by FFT. The
+!> inverse of its part on the active nodes is that of the whole, minimised over
+!> what the displacement may be elsewhere:
+!>
+!>     r^T (K_CC)^-1 r = min over all continuations u of r of u^T K^-1 u,
+!>
+!> because no traction acts outside. Any linear continuation E thus gives a symmetric
+!> preconditioner E^T K^-1 E >= (K_CC)^-1, the better the closer E comes to the
+!> minimum; zero outside is the plainest. Beyond the edge of a loaded region the
+!> surface falls off like the root of the distance, and less the longer
+!> the waves along the edge are. Here each ring of nodes around the active ones takes the
+!> mean of its neighbours in the ring before, smoothed along the ring, and falls off like
+!> 1 - sqrt(ring/(rings + 1)).
+module hc_edge_extension
+  use hc_precision, only: wp
+  use hc_lattice, only: neighbors
+  implicit none
+  private
+
+  public :: edge_extension_t, new_edge_extension
+
+  !> Rings: this times a power of the number of active nodes over that of the edge nodes (the width of
+  !> the contact), and at most so many.
+  real(wp), parameter :: ring_factor = 0.7_wp, ring_power = 0.8_wp
+  integer, parameter :: most_rings = 16
+  !> Times that a ring is smoothed.
+  integer, parameter :: smoothings = 2
+
+  !> Neighbours of the nodes of the rings, in compressed rows.
+  type :: edge_extension_t
+    private
+    !> Nodes of the rings, ring by ring, and where each ring begins
+    integer, allocatable :: node(:), ring(:)
+    !> Neighbours in the ring before, as nodes; where those of each node begin
+    integer, allocatable :: inner(:), inner_start(:)
+    !> The node itself and its neighbours in the same ring, as positions in the list; where they begin
+    integer, allocatable :: beside(:), beside_start(:)
+    !> Fall from ring to ring over the number of neighbours in the ring before
+    real(wp), allocatable :: fall(:)
+  contains
+    !> Continue a field beyond the active nodes
+    procedure :: extend
+    !> The transpose: add what acts on the rings to the active nodes
+    procedure :: fold
+  end type edge_extension_t
+
+contains
+
+  !> Rings around the active nodes.
+  pure subroutine new_edge_extension(self, active)
+    !> Continuation to be set up
+    type(edge_extension_t), intent(out) :: self
+    !> Active nodes (n_col, n_row)
+    logical, intent(in) :: active(:, :)
+
+    !> Ring of each node: 0 active, huge: none yet
+    integer, allocatable :: level(:, :), position(:, :), frontier(:), next(:)
+    integer :: n_ring, r, first, last, n, k, col, row
+
+    allocate (level(size(active, 1), size(active, 2)))
+    level = merge(0, huge(0), active)
+    call find_edge(active, frontier, n)
+    allocate (self%node(0), self%ring(1))
+    self%ring(1) = 1
+    n_ring = 0
+    if (size(frontier) > 0) then
+      n_ring = min(most_rings, int(ring_factor*(real(count(active), wp)/size(frontier))**ring_power))
+    end if
+    do r = 1, n_ring
+      call next_ring(frontier, level, r, next)
+      if (size(next) == 0) exit
+      self%node = [self%node, next]
+      self%ring = [self%ring, size(self%node) + 1]
+      call move_alloc(next, frontier)
+    end do
+
+    n = size(self%node)
+    n_ring = size(self%ring) - 1
+    allocate (position(size(active, 1), size(active, 2)), source=0)
+    do k = 1, n
+      call place(self%node(k), size(active, 1), col, row)
+      position(col, row) = k
+    end do
+    allocate (self%inner_start(n + 1), self%beside_start(n + 1), self%fall(n))
+    allocate (self%inner(6*n), self%beside(7*n))
+    self%inner_start(1) = 1
+    self%beside_start(1) = 1
+    do r = 1, n_ring
+      do k = self%ring(r), self%ring(r + 1) - 1
+        first = self%inner_start(k)
+        last = self%beside_start(k)
+        self%beside(last) = k
+        call list_neighbors(self%node(k), level, position, r, self%inner(first:), self%beside(last + 1:), &
+                            self%inner_start(k + 1), self%beside_start(k + 1))
+        self%inner_start(k + 1) = first + self%inner_start(k + 1)
+        self%beside_start(k + 1) = last + 1 + self%beside_start(k + 1)
+        self%fall(k) = profile(r, n_ring)/profile(r - 1, n_ring)/(self%inner_start(k + 1) - first)
+      end do
+    end do
+  end subroutine new_edge_extension
+
+  !> Height of the continuation in a ring.
+  pure real(wp) function profile(ring, n_ring)
+    !> Ring, and number of rings
+    integer, intent(in) :: ring, n_ring
+    profile = 1.0_wp - sqrt(real(ring, wp)/(n_ring + 1))
+  end function profile
+
+  !> Column and row of a node.
+  pure subroutine place(node, n_col, col, row)
+    !> Node, number of columns
+    integer, intent(in) :: node, n_col
+    integer, intent(out) :: col, row
+
+    row = (node - 1)/n_col + 1
+    col = node - (row - 1)*n_col
+  end subroutine place
+
+  !> Active nodes with a neighbour that is not; a node at the rim of the window has none there.
+  pure subroutine find_edge(active, edge, n)
+    logical, intent(in) :: active(:, :)
+    !> The nodes, their number
+    integer, allocatable, intent(out) :: edge(:)
+    integer, intent(out) :: n
+    integer, allocatable :: found(:)
+    integer :: col, row, k, c, r
+
+    allocate (found(count(active)))
+    n = 0
+    do row = 1, size(active, 2)
+      do col = 1, size(active, 1)
+        if (.not. active(col, row)) cycle
+        do k = 1, size(neighbors, 2)
+          c = col + neighbors(1, k)
+          r = row + neighbors(2, k)
+          if (c < 1 .or. r < 1 .or. c > size(active, 1) .or. r > size(active, 2)) cycle
+          if (active(c, r)) cycle
+          n = n + 1
+          found(n) = col + (row - 1)*size(active, 1)
+          exit
+        end do
+      end do
+    end do
+    edge = found(:n)
+  end subroutine find_edge
+
+  !> Nodes next to a ring that have no ring yet.
+  pure subroutine next_ring(ring, level, number, next)
+    !> Nodes of the ring before
+    integer, intent(in) :: ring(:)
+    !> Ring of each node; the new ones get `number`
+    integer, intent(inout) :: level(:, :)
+    !> Number of the new ring
+    integer, intent(in) :: number
+    !> Its nodes
+    integer, allocatable, intent(out) :: next(:)
+    integer, allocatable :: found(:)
+    integer :: i, k, n, col, row, c, r
+
+    allocate (found(6*size(ring)))
+    n = 0
+    do i = 1, size(ring)
+      call place(ring(i), size(level, 1), col, row)
+      do k = 1, size(neighbors, 2)
+        c = col + neighbors(1, k)
+        r = row + neighbors(2, k)
+        if (c < 1 .or. r < 1 .or. c > size(level, 1) .or. r > size(level, 2)) cycle
+        if (level(c, r) <= number) cycle
+        level(c, r) = number
+        n = n + 1
+        found(n) = c + (r - 1)*size(level, 1)
+      end do
+    end do
+    next = found(:n)
+  end subroutine next_ring
+
+  !> Neighbours of a node in the ring before and in its own.
+  pure subroutine list_neighbors(node, level, position, ring, inner, beside, n_inner, n_beside)
+    !> The node
+    integer, intent(in) :: node
+    !> Ring and place in the list of each node
+    integer, intent(in) :: level(:, :), position(:, :)
+    !> Ring of the node
+    integer, intent(in) :: ring
+    !> Neighbours in the ring before (nodes), and in its own (places)
+    integer, intent(inout) :: inner(:), beside(:)
+    !> Their numbers
+    integer, intent(out) :: n_inner, n_beside
+    integer :: k, col, row, c, r
+
+    n_inner = 0
+    n_beside = 0
+    call place(node, size(level, 1), col, row)
+    do k = 1, size(neighbors, 2)
+      c = col + neighbors(1, k)
+      r = row + neighbors(2, k)
+      if (c < 1 .or. r < 1 .or. c > size(level, 1) .or. r > size(level, 2)) cycle
+      if (level(c, r) == ring - 1) then
+        n_inner = n_inner + 1
+        inner(n_inner) = c + (r - 1)*size(level, 1)
+      else if (level(c, r) == ring) then
+        n_beside = n_beside + 1
+        beside(n_beside) = position(c, r)
+      end if
+    end do
+  end subroutine list_neighbors
+
+  !> Continue a field beyond the active nodes; it has to vanish off them.
+  pure subroutine extend(self, field)
+    class(edge_extension_t), intent(in) :: self
+    !> Field over the window (n)
+    real(wp), intent(inout), contiguous :: field(:)
+    real(wp), allocatable :: value(:), smooth(:)
+    integer :: r, k, s
+
+    allocate (value(size(self%node)), smooth(size(self%node)))
+    do r = 1, size(self%ring) - 1
+      associate (first => self%ring(r), last => self%ring(r + 1) - 1)
+        do k = first, last
+          value(k) = self%fall(k)*sum(field(self%inner(self%inner_start(k):self%inner_start(k + 1) - 1)))
+        end do
+        do s = 1, smoothings
+          do k = first, last
+            associate (near => self%beside(self%beside_start(k):self%beside_start(k + 1) - 1))
+              smooth(k) = sum(value(near))/size(near)
+            end associate
+          end do
+          value(first:last) = smooth(first:last)
+        end do
+        field(self%node(first:last)) = value(first:last)
+      end associate
+    end do
+  end subroutine extend
+
+  !> The transpose of `extend`; what is left on the rings has no meaning.
+  pure subroutine fold(self, field)
+    class(edge_extension_t), intent(in) :: self
+    !> Field over the window (n)
+    real(wp), intent(inout), contiguous :: field(:)
+    real(wp), allocatable :: value(:), share(:)
+    integer :: r, k, s, i
+
+    allocate (value(size(self%node)), share(size(self%node)))
+    do r = size(self%ring) - 1, 1, -1
+      associate (first => self%ring(r), last => self%ring(r + 1) - 1)
+        value(first:last) = field(self%node(first:last))
+        do s = 1, smoothings
+          share(first:last) = value(first:last)/(self%beside_start(first + 1:last + 1) - self%beside_start(first:last))
+          do k = first, last
+            value(k) = sum(share(self%beside(self%beside_start(k):self%beside_start(k + 1) - 1)))
+          end do
+        end do
+        do k = first, last
+          do i = self%inner_start(k), self%inner_start(k + 1) - 1
+            field(self%inner(i)) = field(self%inner(i)) + self%fall(k)*value(k)
+          end do
+        end do
+      end associate
+    end do
+  end subroutine fold
+
+end module hc_edge_extension

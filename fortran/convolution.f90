@@ -19,7 +19,7 @@ module hc_convolution
   implicit none
   private
 
-  public :: convolution_t, new_convolution, convolution_memory, kernel_source_t
+  public :: convolution_t, new_convolution, convolution_memory, kernel_source_t, threads_for
 
   !> Bytes that one component of a column block should take, so that blocks stay in cache.
   integer, parameter :: block_bytes = 32768
@@ -68,17 +68,17 @@ module hc_convolution
   !> Something that knows the kernels at lattice offsets.
   type, abstract :: kernel_source_t
   contains
-    procedure(kernel_values), deferred :: values
+    procedure(kernel_row), deferred :: row
   end type kernel_source_t
 
   abstract interface
-    !> All kernels at the offset of i columns and j rows
-    pure subroutine kernel_values(self, i, j, k)
+    !> All kernels at the offsets of j >= 0 rows and -n...n columns: k(kernel, n + 1 + column)
+    pure subroutine kernel_row(self, j, k)
       import :: kernel_source_t, wp
       class(kernel_source_t), intent(in) :: self
-      integer, intent(in) :: i, j
-      real(wp), intent(out) :: k(:)
-    end subroutine kernel_values
+      integer, intent(in) :: j
+      real(wp), intent(out) :: k(:, :)
+    end subroutine kernel_row
   end interface
 
 contains
@@ -89,7 +89,7 @@ contains
     type(convolution_t), intent(out) :: self
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
-    !> Transform lengths, the first one even; 2*extent - 1 at least unless the convolution is periodic
+    !> Transform lengths, the first one a multiple of four; 2*extent - 1 at least unless the convolution is periodic
     integer, intent(in) :: padded(2)
     !> Number of kernels, and of components of the fields
     integer, intent(in) :: n_kernel, n_component
@@ -102,10 +102,7 @@ contains
 
     integer :: stat
 
-    !$ if (product(extent) >= worth_sharing) self%n_threads = omp_get_max_threads()
-    if (present(n_threads)) then
-      !$ if (n_threads > 0) self%n_threads = n_threads
-    end if
+    self%n_threads = threads_for(extent, n_threads)
     self%first_odd = n_kernel + 1
     if (present(first_odd)) self%first_odd = first_odd
     self%extent = extent
@@ -128,6 +125,20 @@ contains
     call make_plans(self, error)
   end subroutine new_convolution
 
+  !> Threads that a window is worth.
+  integer function threads_for(extent, n_threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
+    integer, intent(in), optional :: n_threads
+
+    threads_for = 1
+    !$ if (product(extent) >= worth_sharing) threads_for = omp_get_max_threads()
+    if (present(n_threads)) then
+      !$ if (n_threads > 0) threads_for = n_threads
+    end if
+  end function threads_for
+
   !> Bytes that a convolution takes while its kernels are transformed.
   pure integer(selected_int_kind(18)) function convolution_memory(extent, padded, n_kernel, n_component, n_threads)
     !> Number of columns and rows of the window
@@ -143,15 +154,17 @@ contains
     leading = padded(1)/2 + width
     n_row = extent(2)
     length = padded(2)
-    convolution_memory = 8*n_kernel*leading*length + 16*(n_component + n_kernel)*leading*n_row &
-                         + n_threads*(8*padded(1) + 16*n_component*width*length)
+    convolution_memory = n_kernel*leading*length + 2*(n_component + n_kernel)*leading*n_row &
+                         + n_threads*(padded(1) + 2*n_component*width*length)
+    convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
   end function convolution_memory
 
-  !> Columns that are transformed together.
+  !> Columns that are transformed together: 4, 8, 12 or 16, so that all transforms begin at addresses
+  !> alike modulo 16 bytes, as their common plan expects.
   elemental integer function block_width(length)
     !> Length of a column
     integer, intent(in) :: length
-    block_width = min(16, max(4, block_bytes/(16*length)))
+    block_width = 4*min(4, max(1, block_bytes/(64*length)))
   end function block_width
 
   subroutine make_plans(self, error)
@@ -195,7 +208,7 @@ contains
     complex(wp), allocatable :: rows(:, :, :)
     real(wp), allocatable :: kernel(:, :)
     real(wp) :: scale, sign
-    integer :: n(2), n_kernel, i, j, m, b, thread, stat, from, to
+    integer :: n(2), n_kernel, j, m, b, thread, stat, from, to
 
     n = self%extent
     n_kernel = size(self%spectrum, 3)
@@ -207,14 +220,12 @@ contains
     end if
 
     thread = 1
-    !$omp parallel num_threads(self%n_threads) private(i, j, m, b, kernel, sign, from, to) firstprivate(thread)
+    !$omp parallel num_threads(self%n_threads) private(j, m, b, kernel, sign, from, to) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     allocate (kernel(n_kernel, 1 - n(1):n(1) - 1))
     !$omp do schedule(dynamic)
     do j = 0, n(2) - 1
-      do i = 1 - n(1), n(1) - 1
-        call source%values(i, j, kernel(:, i))
-      end do
+      call source%row(j, kernel)
       do m = 1, n_kernel
         self%row_buffer(:, thread) = 0.0_wp
         self%row_buffer(:n(1), thread) = scale*kernel(m, 0:)

@@ -14,7 +14,7 @@
 !> mean of its neighbours in the ring before, smoothed along the ring, and falls off like
 !> 1 - sqrt(ring/(rings + 1)).
 module hc_edge_extension
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_lattice, only: neighbors
   implicit none
   private
@@ -38,7 +38,7 @@ module hc_edge_extension
     !> The node itself and its neighbours in the same ring, as positions in the list; where they begin
     integer, allocatable :: beside(:), beside_start(:)
     !> Fall from ring to ring over the number of neighbours in the ring before
-    real(wp), allocatable :: fall(:)
+    real(sp), allocatable :: fall(:)
   contains
     !> Continue a field beyond the active nodes
     procedure :: extend
@@ -55,21 +55,21 @@ contains
     !> Active nodes (n_col, n_row)
     logical, intent(in) :: active(:, :)
 
-    !> Ring of each node: 0 active, huge: none yet
-    integer, allocatable :: level(:, :), position(:, :), frontier(:), next(:)
-    integer :: n_ring, r, first, last, n, k, col, row
+    !> 0 on active nodes, the place in the list on those of the rings, huge elsewhere
+    integer, allocatable :: mark(:, :)
+    integer, allocatable :: frontier(:), next(:)
+    integer :: n_ring, r, first, last, n, k
 
-    allocate (level(size(active, 1), size(active, 2)))
-    level = merge(0, huge(0), active)
-    call find_edge(active, frontier, n)
+    call find_edge(active, frontier)
     allocate (self%node(0), self%ring(1))
     self%ring(1) = 1
     n_ring = 0
     if (size(frontier) > 0) then
       n_ring = min(most_rings, int(ring_factor*(real(count(active), wp)/size(frontier))**ring_power))
     end if
+    allocate (mark, source=merge(0, huge(0), active))
     do r = 1, n_ring
-      call next_ring(frontier, level, r, next)
+      call next_ring(frontier, mark, size(self%node), next)
       if (size(next) == 0) exit
       self%node = [self%node, next]
       self%ring = [self%ring, size(self%node) + 1]
@@ -78,11 +78,6 @@ contains
 
     n = size(self%node)
     n_ring = size(self%ring) - 1
-    allocate (position(size(active, 1), size(active, 2)), source=0)
-    do k = 1, n
-      call place(self%node(k), size(active, 1), col, row)
-      position(col, row) = k
-    end do
     allocate (self%inner_start(n + 1), self%beside_start(n + 1), self%fall(n))
     allocate (self%inner(6*n), self%beside(7*n))
     self%inner_start(1) = 1
@@ -92,11 +87,11 @@ contains
         first = self%inner_start(k)
         last = self%beside_start(k)
         self%beside(last) = k
-        call list_neighbors(self%node(k), level, position, r, self%inner(first:), self%beside(last + 1:), &
+        call list_neighbors(self%node(k), mark, self%ring(r), self%ring(r + 1), self%inner(first:), self%beside(last + 1:), &
                             self%inner_start(k + 1), self%beside_start(k + 1))
         self%inner_start(k + 1) = first + self%inner_start(k + 1)
         self%beside_start(k + 1) = last + 1 + self%beside_start(k + 1)
-        self%fall(k) = profile(r, n_ring)/profile(r - 1, n_ring)/(self%inner_start(k + 1) - first)
+        self%fall(k) = real(profile(r, n_ring)/profile(r - 1, n_ring)/(self%inner_start(k + 1) - first), sp)
       end do
     end do
   end subroutine new_edge_extension
@@ -119,42 +114,44 @@ contains
   end subroutine place
 
   !> Active nodes with a neighbour that is not; a node at the rim of the window has none there.
-  pure subroutine find_edge(active, edge, n)
+  pure subroutine find_edge(active, edge)
     logical, intent(in) :: active(:, :)
-    !> The nodes, their number
+    !> The nodes
     integer, allocatable, intent(out) :: edge(:)
-    integer, intent(out) :: n
     integer, allocatable :: found(:)
-    integer :: col, row, k, c, r
+    logical :: inside(size(active, 1))
+    integer :: col, row, k, c, r, n, from, to
 
     allocate (found(count(active)))
     n = 0
     do row = 1, size(active, 2)
+      inside = .true.
+      do k = 1, size(neighbors, 2)
+        c = neighbors(1, k)
+        r = row + neighbors(2, k)
+        if (r < 1 .or. r > size(active, 2)) cycle
+        from = max(1, 1 - c)
+        to = min(size(active, 1), size(active, 1) - c)
+        inside(from:to) = inside(from:to) .and. active(from + c:to + c, r)
+      end do
       do col = 1, size(active, 1)
-        if (.not. active(col, row)) cycle
-        do k = 1, size(neighbors, 2)
-          c = col + neighbors(1, k)
-          r = row + neighbors(2, k)
-          if (c < 1 .or. r < 1 .or. c > size(active, 1) .or. r > size(active, 2)) cycle
-          if (active(c, r)) cycle
-          n = n + 1
-          found(n) = col + (row - 1)*size(active, 1)
-          exit
-        end do
+        if (.not. active(col, row) .or. inside(col)) cycle
+        n = n + 1
+        found(n) = col + (row - 1)*size(active, 1)
       end do
     end do
     edge = found(:n)
   end subroutine find_edge
 
   !> Nodes next to a ring that have no ring yet.
-  pure subroutine next_ring(ring, level, number, next)
+  pure subroutine next_ring(ring, mark, listed, next)
     !> Nodes of the ring before
     integer, intent(in) :: ring(:)
-    !> Ring of each node; the new ones get `number`
-    integer, intent(inout) :: level(:, :)
-    !> Number of the new ring
-    integer, intent(in) :: number
-    !> Its nodes
+    !> Marks of all nodes; those of the new ring get their place in the list
+    integer, intent(inout) :: mark(:, :)
+    !> Nodes that are in the list already
+    integer, intent(in) :: listed
+    !> Nodes of the new ring
     integer, allocatable, intent(out) :: next(:)
     integer, allocatable :: found(:)
     integer :: i, k, n, col, row, c, r
@@ -162,29 +159,29 @@ contains
     allocate (found(6*size(ring)))
     n = 0
     do i = 1, size(ring)
-      call place(ring(i), size(level, 1), col, row)
+      call place(ring(i), size(mark, 1), col, row)
       do k = 1, size(neighbors, 2)
         c = col + neighbors(1, k)
         r = row + neighbors(2, k)
-        if (c < 1 .or. r < 1 .or. c > size(level, 1) .or. r > size(level, 2)) cycle
-        if (level(c, r) <= number) cycle
-        level(c, r) = number
+        if (c < 1 .or. r < 1 .or. c > size(mark, 1) .or. r > size(mark, 2)) cycle
+        if (mark(c, r) < huge(0)) cycle
         n = n + 1
-        found(n) = c + (r - 1)*size(level, 1)
+        mark(c, r) = listed + n
+        found(n) = c + (r - 1)*size(mark, 1)
       end do
     end do
     next = found(:n)
   end subroutine next_ring
 
   !> Neighbours of a node in the ring before and in its own.
-  pure subroutine list_neighbors(node, level, position, ring, inner, beside, n_inner, n_beside)
+  pure subroutine list_neighbors(node, mark, own, after, inner, beside, n_inner, n_beside)
     !> The node
     integer, intent(in) :: node
-    !> Ring and place in the list of each node
-    integer, intent(in) :: level(:, :), position(:, :)
-    !> Ring of the node
-    integer, intent(in) :: ring
-    !> Neighbours in the ring before (nodes), and in its own (places)
+    !> Marks of all nodes
+    integer, intent(in) :: mark(:, :)
+    !> First marks of its own ring and of the next
+    integer, intent(in) :: own, after
+    !> Neighbours in the ring before (nodes), and in its own (places in the list)
     integer, intent(inout) :: inner(:), beside(:)
     !> Their numbers
     integer, intent(out) :: n_inner, n_beside
@@ -192,40 +189,46 @@ contains
 
     n_inner = 0
     n_beside = 0
-    call place(node, size(level, 1), col, row)
+    call place(node, size(mark, 1), col, row)
     do k = 1, size(neighbors, 2)
       c = col + neighbors(1, k)
       r = row + neighbors(2, k)
-      if (c < 1 .or. r < 1 .or. c > size(level, 1) .or. r > size(level, 2)) cycle
-      if (level(c, r) == ring - 1) then
+      if (c < 1 .or. r < 1 .or. c > size(mark, 1) .or. r > size(mark, 2)) cycle
+      if (mark(c, r) < own) then
+        ! no neighbour is further in than the ring before
         n_inner = n_inner + 1
-        inner(n_inner) = c + (r - 1)*size(level, 1)
-      else if (level(c, r) == ring) then
+        inner(n_inner) = c + (r - 1)*size(mark, 1)
+      else if (mark(c, r) < after) then
         n_beside = n_beside + 1
-        beside(n_beside) = position(c, r)
+        beside(n_beside) = mark(c, r)
       end if
     end do
   end subroutine list_neighbors
 
-  !> Continue a field beyond the active nodes; it has to vanish off them.
+  !> Continue a field beyond the active nodes.
   pure subroutine extend(self, field)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
-    real(wp), intent(inout), contiguous :: field(:)
-    real(wp), allocatable :: value(:), smooth(:)
-    integer :: r, k, s
+    real(sp), intent(inout), contiguous :: field(:)
+    real(sp) :: value(size(self%node)), smooth(size(self%node)), total
+    integer :: r, k, s, i
 
-    allocate (value(size(self%node)), smooth(size(self%node)))
     do r = 1, size(self%ring) - 1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
         do k = first, last
-          value(k) = self%fall(k)*sum(field(self%inner(self%inner_start(k):self%inner_start(k + 1) - 1)))
+          total = 0.0_sp
+          do i = self%inner_start(k), self%inner_start(k + 1) - 1
+            total = total + field(self%inner(i))
+          end do
+          value(k) = self%fall(k)*total
         end do
         do s = 1, smoothings
           do k = first, last
-            associate (near => self%beside(self%beside_start(k):self%beside_start(k + 1) - 1))
-              smooth(k) = sum(value(near))/size(near)
-            end associate
+            total = 0.0_sp
+            do i = self%beside_start(k), self%beside_start(k + 1) - 1
+              total = total + value(self%beside(i))
+            end do
+            smooth(k) = total/(self%beside_start(k + 1) - self%beside_start(k))
           end do
           value(first:last) = smooth(first:last)
         end do
@@ -238,18 +241,23 @@ contains
   pure subroutine fold(self, field)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
-    real(wp), intent(inout), contiguous :: field(:)
-    real(wp), allocatable :: value(:), share(:)
+    real(sp), intent(inout), contiguous :: field(:)
+    real(sp) :: value(size(self%node)), share(size(self%node)), total
     integer :: r, k, s, i
 
-    allocate (value(size(self%node)), share(size(self%node)))
     do r = size(self%ring) - 1, 1, -1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
         value(first:last) = field(self%node(first:last))
         do s = 1, smoothings
-          share(first:last) = value(first:last)/(self%beside_start(first + 1:last + 1) - self%beside_start(first:last))
           do k = first, last
-            value(k) = sum(share(self%beside(self%beside_start(k):self%beside_start(k + 1) - 1)))
+            share(k) = value(k)/(self%beside_start(k + 1) - self%beside_start(k))
+          end do
+          do k = first, last
+            total = 0.0_sp
+            do i = self%beside_start(k), self%beside_start(k + 1) - 1
+              total = total + share(self%beside(i))
+            end do
+            value(k) = total
           end do
         end do
         do k = first, last

@@ -3,7 +3,7 @@
 !> Close to a sliver the contributions of its long edges cancel to the order of
 !> its small height: as many digits are lost as the aspect ratio has. Therefore
 !> the build makes a second module of this file, hc_edge_form_extended, in
-!> which rk is the extended precision xp (see extended_precision.py). It takes
+!> which rk is the extended precision xp (see other_precision.py). It takes
 !> some thirty times as long.
 module hc_edge_form
   use hc_precision, only: rk => wp

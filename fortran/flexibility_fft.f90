@@ -8,6 +8,7 @@ module hc_flexibility_fft
   use hc_flexibility, only: flexibility_t, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, convolution_memory, kernel_source_t
+  use hc_normal_kernel, only: normal_kernel_t, new_normal_kernel
   implicit none
   private
 
@@ -29,13 +30,13 @@ module hc_flexibility_fft
     type(elastic_pair_t) :: pair
     real(wp) :: basis(2, 2) = 0.0_wp
   contains
-    procedure :: values => lattice_block_values
+    procedure :: row => lattice_block_row
   end type lattice_blocks_t
 
 contains
 
   !> Plans and spectra of the operator over a window.
-  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, n_threads)
+  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, n_threads, kernel)
     !> Operator to be set up
     type(fft_flexibility_t), intent(out) :: operator
     !> Lattice and window
@@ -48,8 +49,11 @@ contains
     logical, intent(in), optional :: normal_only
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
+    !> With `normal_only`: the kernel, if it is at hand
+    type(normal_kernel_t), intent(in), optional :: kernel
 
     type(lattice_blocks_t) :: source
+    type(normal_kernel_t) :: made
     logical :: only_normal
 
     only_normal = .false.
@@ -61,10 +65,17 @@ contains
                          merge(1, n_block, only_normal), operator%n_component, error, &
                          first_odd=first_odd_block, n_threads=n_threads)
     if (allocated(error)) return
-    call new_pyramid(source%pyramid, lattice%basis)
-    source%pair = pair
-    source%basis = lattice%basis
-    call operator%convolution%transform_kernels(source, error)
+    if (only_normal .and. present(kernel)) then
+      call operator%convolution%transform_kernels(kernel, error)
+    else if (only_normal) then
+      call new_normal_kernel(made, lattice, pair%lambda_1, n_threads)
+      call operator%convolution%transform_kernels(made, error)
+    else
+      call new_pyramid(source%pyramid, lattice%basis)
+      source%pair = pair
+      source%basis = lattice%basis
+      call operator%convolution%transform_kernels(source, error)
+    end if
   end subroutine new_fft_flexibility
 
   !> Bytes that the operator takes, for a window of the given size.
@@ -80,16 +91,20 @@ contains
                                     merge(1, 3, normal_only), n_threads)
   end function fft_memory
 
-  pure subroutine lattice_block_values(self, i, j, k)
+  pure subroutine lattice_block_row(self, j, k)
     class(lattice_blocks_t), intent(in) :: self
-    integer, intent(in) :: i, j
-    real(wp), intent(out) :: k(:)
+    integer, intent(in) :: j
+    real(wp), intent(out) :: k(:, :)
     real(wp) :: block(n_block), position(2)
+    integer :: i, n
 
-    position = i*self%basis(:, 1) + j*self%basis(:, 2)
-    block = blocks(self%pair, self%pyramid%kernels(position(1), position(2)))
-    k = block(:size(k))
-  end subroutine lattice_block_values
+    n = size(k, 2)/2
+    do i = -n, n
+      position = i*self%basis(:, 1) + j*self%basis(:, 2)
+      block = blocks(self%pair, self%pyramid%kernels(position(1), position(2)))
+      k(:, n + 1 + i) = block(:size(k, 1))
+    end do
+  end subroutine lattice_block_row
 
   subroutine fft_apply(self, from, traction, onto, displacement, error)
     class(fft_flexibility_t), intent(inout) :: self

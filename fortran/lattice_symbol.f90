@@ -14,7 +14,7 @@ module hc_lattice_symbol
   implicit none
   private
 
-  public :: kernel_symbols, symbol_1, symbol_xx, symbol_xy
+  public :: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
 
   !> Order of the symbols: those of K1, K_xx and K_xy.
   integer, parameter :: symbol_1 = 1, symbol_xx = 2, symbol_xy = 3
@@ -51,6 +51,87 @@ contains
       symbol = 0.5_wp*(symbol + alias_sum(basis, area, theta))
     end if
   end function kernel_symbols
+
+  !> Symbols of K1 at many frequencies of a periodic grid [m].
+  !>
+  !> The signs of the sines cancel in the product of all three, so that the sum over aliases is one
+  !> over polynomials and a root; where a phase vanishes the limits are those of `kernel_symbols`.
+  pure subroutine normal_symbols(basis, length, frequency, symbol)
+    !> Basis vectors as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> Number of columns and rows of the grid
+    integer, intent(in) :: length(2)
+    !> Frequency indices (2, n), from 0 to length - 1
+    integer, intent(in) :: frequency(:, :)
+    !> Symbol (n) [m]
+    real(wp), intent(out) :: symbol(:)
+
+    real(wp), dimension(size(symbol)) :: theta_1, theta_2
+    real(wp) :: sine_1(0:length(1) - 1), cosine_1(0:length(1) - 1), sine_2(0:length(2) - 1), cosine_2(0:length(2) - 1)
+    real(wp) :: area, g(3), p(2), all_symbols(3), shift(2)
+    integer :: m, i, j, f(2), low(2)
+
+    area = basis(1, 1)*basis(2, 2) - basis(2, 1)*basis(1, 2)
+    ! |k|^2 = (g1 phase1^2 + g2 phase1 phase2 + g3 phase2^2)/area^2
+    g = [dot_product(basis(:, 2), basis(:, 2)), -2.0_wp*dot_product(basis(:, 1), basis(:, 2)), &
+         dot_product(basis(:, 1), basis(:, 1))]
+    call half_angles(length(1), sine_1, cosine_1)
+    call half_angles(length(2), sine_2, cosine_2)
+    do m = 1, size(symbol)
+      f = frequency(:, m)
+      low = f - merge(length, 0, 2*f > length)
+      theta_1(m) = 2.0_wp*pi*low(1)/length(1)
+      theta_2(m) = 2.0_wp*pi*low(2)/length(2)
+      if (.not. is_special(length, low)) cycle
+      theta_1(m) = 1.0_wp
+      theta_2(m) = 2.0_wp
+    end do
+    symbol = 0.0_wp
+    do j = -n_alias, n_alias
+      do i = -n_alias, n_alias
+        shift = 2.0_wp*pi*[i, j]
+        do m = 1, size(symbol)
+          p = [theta_1(m) + shift(1), theta_2(m) + shift(2)]
+          symbol(m) = symbol(m) + 1.0_wp/(p(1)*p(2)*(p(2) - p(1))*sqrt(p(1)*(g(1)*p(1) + g(2)*p(2)) + g(3)*p(2)*p(2)))
+        end do
+      end do
+    end do
+    do m = 1, size(symbol)
+      f = frequency(:, m)
+      if (is_special(length, f - merge(length, 0, 2*f > length))) then
+        all_symbols = kernel_symbols(basis, length, f)
+        symbol(m) = all_symbols(symbol_1)
+      else
+        associate (s1 => sine_1(f(1)), c1 => cosine_1(f(1)), s2 => sine_2(f(2)), c2 => cosine_2(f(2)))
+          symbol(m) = symbol(m)*16.0_wp*pi*area*s1*s2*(s2*c1 - c2*s1)
+        end associate
+      end if
+    end do
+  end subroutine normal_symbols
+
+  !> Does a phase vanish, or is the frequency its own opposite?
+  pure logical function is_special(length, low)
+    !> Grid, and frequency of the smallest modulus
+    integer, intent(in) :: length(2), low(2)
+
+    is_special = low(1) == 0 .or. low(2) == 0 .or. 2*low(1) == length(1) .or. 2*low(2) == length(2) &
+                 .or. low(1)*length(2) == low(2)*length(1)
+  end function is_special
+
+  !> Sines and cosines of half the phases of all frequencies, taken from (-pi, pi].
+  pure subroutine half_angles(n, sine, cosine)
+    !> Length
+    integer, intent(in) :: n
+    real(wp), intent(out) :: sine(0:n - 1), cosine(0:n - 1)
+    real(wp) :: half
+    integer :: f
+
+    do f = 0, n - 1
+      half = pi*merge(f - n, f, 2*f > n)/n
+      sine(f) = sin(half)
+      cosine(f) = cos(half)
+    end do
+  end subroutine half_angles
 
   !> Sum over reciprocal vectors; theta = k.basis in (-pi, pi].
   pure function alias_sum(basis, area, theta) result(total)

@@ -7,10 +7,12 @@ module hc_normal_contact
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_flexibility_fft, only: new_fft_flexibility, fft_memory
+  use hc_fftw, only: good_size
+  use hc_convolution_single, only: convolution_memory
+  use hc_flexibility_fft, only: fft_memory
+  use hc_normal_kernel, only: normal_kernel_t, new_normal_kernel
   use hc_contact_state, only: contact_state_t, check_problem
-  use hc_contact_residuals, only: normal_self_compliance
-  use hc_preconditioner, only: new_preconditioner, preconditioner_memory
+  use hc_preconditioner, only: preconditioner_memory
   use hc_normal_level, only: normal_level_t
   use hc_multilevel, only: level_count, prolong_edge, restrict_field, restrict_mask
   implicit none
@@ -52,6 +54,7 @@ contains
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
 
+    type(normal_kernel_t) :: kernel
     integer :: l
 
     call check_problem(lattice, initial_gap, candidate, error)
@@ -70,11 +73,10 @@ contains
             level%candidate = restrict_mask(finer%lattice, finer%candidate, level%lattice)
           end associate
         end if
-        level%compliance = normal_self_compliance(level%lattice, pair)
-        call new_fft_flexibility(level%flexibility, level%lattice, pair, error, normal_only=.true., n_threads=n_threads)
-        if (allocated(error)) return
-        call new_preconditioner(level%preconditioner, level%lattice, pair, error, n_threads)
-        level%n_threads = level%flexibility%convolution%n_threads
+        if (l == 1) call new_normal_kernel(kernel, lattice, pair%lambda_1, n_threads)
+        ! the kernel grows with the spacing
+        kernel%factor = pair%lambda_1*2.0_wp**(l - 1)
+        call level%prepare(pair, kernel, l == 1, error, n_threads)
         if (allocated(error)) return
       end associate
     end do
@@ -89,9 +91,10 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
-    ! fields: gap, candidates, state, and the vectors of the conjugate gradients
+    ! fields: gap, candidates, state, what an iteration needs, and the kernel
     finest = fft_memory(extent, .true., n_threads) + preconditioner_memory(extent, n_threads, .false.) &
-             + 14*8*int(extent(1), long)*extent(2)
+             + convolution_memory(extent, good_size(2*extent - 1), 1, 1, n_threads) &
+             + 16*8*int(extent(1), long)*extent(2) + 8*int(maxval(extent), long)**2
     normal_contact_memory = finest + finest/3
   end function normal_contact_memory
 

@@ -1,13 +1,16 @@
 !> Working precision and the constants every module shares.
 module hc_precision
-  use, intrinsic :: iso_fortran_env, only: real64
+  use, intrinsic :: iso_fortran_env, only: real32, real64
   implicit none
   private
 
-  public :: wp, xp, pi
+  public :: wp, sp, xp, pi
 
   !> Kind of every real in the library; every literal carries it.
   integer, parameter :: wp = real64
+
+  !> Kind of corrections that need a few digits only: half of the memory, half of the time.
+  integer, parameter :: sp = real32
 
   !> Kind of the few sums that cancel: thirty digits or more, or wp where there is none.
   integer, parameter :: xp = merge(selected_real_kind(30), wp, selected_real_kind(30) > 0)

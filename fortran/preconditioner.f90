@@ -4,17 +4,21 @@
 !> that one application costs about a quarter of a product. It is symmetric
 !> and positive definite, also when it is restricted to a set of nodes.
 module hc_preconditioner
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
-  use hc_convolution, only: convolution_t, new_convolution, convolution_memory
-  use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
+  use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
+  use hc_edge_extension, only: edge_extension_t
+  use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
 
   public :: preconditioner_t, new_preconditioner, preconditioner_memory
+
+  !> A transform in single precision moves half of the bytes, and is counted as half of one.
+  real(wp), parameter, public :: single_cost = 0.5_wp
 
   !> Blocks (onto, from) of the symmetric inverse.
   integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
@@ -22,13 +26,17 @@ module hc_preconditioner
   !> Approximate inverse of the normal or of the tangential flexibility.
   type :: preconditioner_t
     type(convolution_t), private :: convolution
+    !> Displacement per traction that the single precision numbers are scaled with [m/Pa]
+    real(wp) :: unit = 1.0_wp
     !> Of the tangential flexibility
     logical, private :: tangential = .false.
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
   contains
     !> Traction that causes a given displacement, approximately
-    procedure :: apply => apply_preconditioner
+    procedure :: apply
+    !> The same in single precision, displacements and tractions in any units of ratio `unit`
+    procedure :: apply_single
   end type preconditioner_t
 
 contains
@@ -51,6 +59,7 @@ contains
     integer, allocatable :: f(:, :)
     integer :: length(2), b, i, n_component
     real(wp) :: scale, k(3), matrix(3)
+    real(wp), allocatable :: symbol(:)
 
     if (present(tangential)) self%tangential = tangential
     n_component = merge(2, 1, self%tangential)
@@ -58,26 +67,32 @@ contains
     call new_convolution(self%convolution, lattice%extent, length, merge(3, 1, self%tangential), n_component, error, &
                          n_threads=n_threads)
     if (allocated(error)) return
-    scale = 1.0_wp/product(real(length, wp))
-    !$omp parallel do num_threads(self%convolution%n_threads) private(f, i, k, matrix)
+    self%unit = pair%lambda_1*lattice%spacing()
+    scale = self%unit/product(real(length, wp))
+    !$omp parallel do num_threads(self%convolution%n_threads) private(f, i, k, matrix, symbol)
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
-      do i = 1, size(f, 2)
-        if (f(1, i) > length(1)/2) cycle
-        k = kernel_symbols(lattice%basis, length, f(:, i))
-        if (self%tangential) then
+      if (.not. self%tangential) then
+        allocate (symbol(size(f, 2)))
+        ! beyond length/2 there is mere filling
+        f(1, :) = min(f(1, :), length(1)/2)
+        call normal_symbols(lattice%basis, length, f, symbol)
+        self%convolution%spectrum(:, b, 1) = real(scale/(pair%lambda_1*symbol), sp)
+        deallocate (symbol)
+      else
+        do i = 1, size(f, 2)
+          if (f(1, i) > length(1)/2) cycle
+          k = kernel_symbols(lattice%basis, length, f(:, i))
           ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
           matrix = [pair%lambda_1*k(symbol_1) + pair%lambda_5*k(symbol_xx), pair%lambda_5*k(symbol_xy), &
                     pair%lambda_1*k(symbol_1) + pair%lambda_5*(k(symbol_1) - k(symbol_xx))]
-          self%convolution%spectrum(i, b, :) = scale*[matrix(3), -matrix(2), matrix(1)] &
-                                               /(matrix(1)*matrix(3) - matrix(2)**2)
-        else
-          self%convolution%spectrum(i, b, 1) = scale/(pair%lambda_1*k(symbol_1))
-        end if
-      end do
+          self%convolution%spectrum(i, b, :) = real(scale*[matrix(3), -matrix(2), matrix(1)] &
+                                                    /(matrix(1)*matrix(3) - matrix(2)**2), sp)
+        end do
+      end if
     end do
     !$omp end parallel do
-    self%cost = n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
+    self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
   end subroutine new_preconditioner
 
   !> Bytes that the preconditioner takes, for a window of the given size.
@@ -99,18 +114,49 @@ contains
     grid_length = good_size(extent + (extent + 7)/8)
   end function grid_length
 
-  subroutine apply_preconditioner(self, displacement, traction)
+  subroutine apply(self, displacement, traction, edge)
     class(preconditioner_t), intent(inout) :: self
     !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2) [m]
     real(wp), intent(in), contiguous :: displacement(:, :, :)
     !> Pressure, or shear tractions (n_col, n_row, 1 or 2) [Pa]
     real(wp), intent(out), contiguous :: traction(:, :, :)
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in), optional :: edge
+    real(sp), allocatable :: given(:, :, :), wanted(:, :, :)
 
+    allocate (given, source=real(displacement/self%unit, sp))
+    allocate (wanted, mold=given)
+    call self%apply_single(given, wanted, edge)
+    traction = wanted
+  end subroutine apply
+
+  subroutine apply_single(self, displacement, traction, edge)
+    class(preconditioner_t), intent(inout) :: self
+    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
+    real(sp), intent(inout), contiguous, target :: displacement(:, :, :)
+    !> Pressure, or shear tractions (n_col, n_row, 1 or 2)
+    real(sp), intent(out), contiguous, target :: traction(:, :, :)
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in), optional :: edge
+    real(sp), pointer, contiguous :: field(:)
+    integer :: m
+
+    if (present(edge)) then
+      do m = 1, size(displacement, 3)
+        field(1:size(displacement, 1)*size(displacement, 2)) => displacement(:, :, m)
+        call edge%extend(field)
+      end do
+    end if
     if (self%tangential) then
       call self%convolution%convolve(tangential_block, displacement, traction)
     else
       call self%convolution%convolve(normal_block, displacement, traction)
     end if
-  end subroutine apply_preconditioner
+    if (.not. present(edge)) return
+    do m = 1, size(displacement, 3)
+      field(1:size(displacement, 1)*size(displacement, 2)) => traction(:, :, m)
+      call edge%fold(field)
+    end do
+  end subroutine apply_single
 
 end module hc_preconditioner

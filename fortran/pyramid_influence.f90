@@ -73,6 +73,10 @@ module hc_pyramid_influence
   contains
     !> The five kernels at one point [m]
     procedure :: kernels
+    !> K1 alone [m]
+    procedure :: normal_kernel
+    !> Is the lattice equilateral?
+    procedure :: is_equilateral
     !> The five kernels at all lattice offsets of a box [m]
     procedure :: kernel_table
   end type pyramid_t
@@ -128,6 +132,29 @@ contains
       k = self%spacing*far_kernels(self, xs, ys)
     end if
   end function kernels
+
+  !> K1 at a point relative to the node [m].
+  pure real(wp) function normal_kernel(self, x, y) result(k)
+    class(pyramid_t), intent(in) :: self
+    !> Field point relative to the node [m]
+    real(wp), intent(in) :: x, y
+    real(wp) :: xs, ys, all_kernels(5)
+
+    xs = x/self%spacing
+    ys = y/self%spacing
+    if (hypot(xs, ys) < far_radius) then
+      all_kernels = near_kernels(self, xs, ys)
+      k = self%spacing*all_kernels(k_1)
+    else
+      k = self%spacing*far_normal_kernel(self, xs, ys)
+    end if
+  end function normal_kernel
+
+  !> Have the edges one length? Then the kernels have the symmetries of a hexagon.
+  pure logical function is_equilateral(self)
+    class(pyramid_t), intent(in) :: self
+    is_equilateral = self%fold == 6
+  end function is_equilateral
 
   !> Kernels at the offsets i*basis(:, 1) + j*basis(:, 2) with |i| <= n(1), |j| <= n(2).
   !>
@@ -248,10 +275,7 @@ contains
     u = cmplx(x/r, -y/r, wp)            ! conjugate direction, exp(-i theta)
     q = 1.0_wp/r
     q = q*q
-    power = max_power
-    do harmonic = 1, size(band_radius)
-      if (r >= band_radius(harmonic)) power = band_power(harmonic)
-    end do
+    power = powers_needed(r)
 
     turn = u*u
     if (self%fold == 6) turn = turn*turn*turn
@@ -275,6 +299,42 @@ contains
 
     k = self%volume/r*[real(k1, wp), 0.5_wp*real(k1 + k2, wp), 0.5_wp*aimag(k2), real(kc, wp), -aimag(kc)]
   end function far_kernels
+
+  !> Moment series of K1.
+  pure real(wp) function far_normal_kernel(self, x, y) result(k)
+    class(pyramid_t), intent(in) :: self
+    !> Field point relative to the node, in longest edges
+    real(wp), intent(in) :: x, y
+    complex(wp) :: turn, turns
+    real(wp) :: r, q
+    integer :: power, harmonic
+
+    r = sqrt(x*x + y*y)
+    q = 1.0_wp/r
+    turn = cmplx(x*q, -y*q, wp)**2
+    q = q*q
+    power = powers_needed(r)
+    if (self%fold == 6) turn = turn*turn*turn
+    k = real(horner(self%even(:power, 0), q), wp)
+    turns = 1.0_wp
+    do harmonic = 1, 2*power/self%fold
+      turns = turns*turn
+      k = k + real(turns*horner(self%even(:power, harmonic), q), wp)
+    end do
+    k = self%volume/r*k
+  end function far_normal_kernel
+
+  !> Powers of 1/R^2 that suffice at a distance.
+  pure integer function powers_needed(r)
+    !> Distance, in longest edges
+    real(wp), intent(in) :: r
+    integer :: band
+
+    powers_needed = max_power
+    do band = 1, size(band_radius)
+      if (r >= band_radius(band)) powers_needed = band_power(band)
+    end do
+  end function powers_needed
 
   !> Polynomial with complex coefficients at a real argument, smallest terms first.
   pure complex(wp) function horner(coefficient, q)

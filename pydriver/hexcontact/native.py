@@ -268,7 +268,7 @@ class NormalContact:
         normal_load: float | None = None,
         approach: float | None = None,
         tolerance: float = 1e-8,
-        max_sweeps: int = 60,
+        max_sweeps: int = 200,
     ) -> NormalSolution:
         """Solve for a normal load or for an approach.
 

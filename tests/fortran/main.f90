@@ -11,6 +11,7 @@ program tester
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
   use test_contact, only: collect_contact
+  use test_normal_contact, only: collect_normal_contact
   use test_friction, only: collect_friction
   use test_load_path, only: collect_load_path
   use test_direct_friction, only: collect_direct_friction
@@ -27,6 +28,7 @@ program tester
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
     new_suite('contact', collect_contact), &
+    new_suite('normal_contact', collect_normal_contact), &
     new_suite('friction', collect_friction), &
     new_suite('load_path', collect_load_path), &
     new_suite('direct_friction', collect_direct_friction) &

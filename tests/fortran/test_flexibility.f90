@@ -414,7 +414,7 @@ contains
         call preconditioner%apply(reshape(unit, shape(answer)), answer)
         matrix(:, k) = reshape(answer, [n])
       end do
-      call check(error, maxval(abs(matrix - transpose(matrix))), 0.0_wp, 1.0e-14_wp*maxval(matrix), 'asymmetry')
+      call check(error, maxval(abs(matrix - transpose(matrix))), 0.0_wp, 1.0e-6_wp*maxval(matrix), 'asymmetry')
       if (allocated(error)) return
       call dsyev('N', 'U', n, matrix, n, values, work, size(work), info)
       call check_true(error, info == 0 .and. minval(values) > 0.001_wp*maxval(values), 'positive definite')

@@ -387,7 +387,7 @@ contains
       m(n + i, n + i) = 1.0_wp
     end do
     scale = maxval(abs(m))
-    call check(error, maxval(abs(m - transpose(m))), 0.0_wp, 1.0e-14_wp*scale, 'asymmetry of the preconditioner')
+    call check(error, maxval(abs(m - transpose(m))), 0.0_wp, 1.0e-6_wp*scale, 'asymmetry of the preconditioner')
     if (allocated(error)) return
     call check_true(error, positive_definite(m), 'preconditioner positive definite')
     if (allocated(error)) return

@@ -1,0 +1,348 @@
+!> What makes frictionless contact fast: kernels by symmetry, displacements continued beyond the edge, corrections
+!> in single precision.
+module test_normal_contact
+  use hc_precision, only: wp, sp, pi
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: normal
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1
+  use hc_normal_kernel, only: normal_kernel_t, new_normal_kernel
+  use hc_lattice_symbol, only: kernel_symbols, normal_symbols
+  use hc_multilevel, only: prolong, prolong_edge
+  use hc_edge_extension, only: edge_extension_t, new_edge_extension
+  use hc_preconditioner, only: preconditioner_t, new_preconditioner
+  use hc_contact_state, only: contact_state_t, force_control, displacement_control
+  use hc_contact_residuals, only: normal_residual, normal_self_compliance
+  use hc_normal_contact, only: normal_contact_t, new_normal_contact
+  use testing, only: test_t, new_test, check, check_true
+  implicit none
+  private
+
+  public :: collect_normal_contact
+
+contains
+
+  subroutine collect_normal_contact(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('kernel_by_symmetry', test_kernel), &
+      new_test('symbols', test_symbols), &
+      new_test('prolonged_edge', test_prolonged_edge), &
+      new_test('transpose', test_transpose), &
+      new_test('continuation_pays', test_continuation), &
+      new_test('scattered_nodes', test_scattered), &
+      new_test('tight_tolerance', test_tight), &
+      new_test('residual_is_true', test_true_residual), &
+      new_test('few_products', test_few_products) &
+    ]
+  end subroutine collect_normal_contact
+
+  !> The table agrees with the pyramid at every offset, on an equilateral and on an oblique lattice.
+  subroutine test_kernel(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(pyramid_t) :: pyramid
+    type(normal_kernel_t) :: kernel
+    real(wp) :: basis(2, 2), row(1, -11:11), all_kernels(5), worst
+    integer :: which, i, j
+
+    do which = 1, 2
+      basis = equilateral_basis(0.5_wp)
+      if (which == 2) basis(:, 2) = [0.1_wp, 0.4_wp]
+      call new_lattice(lattice, basis, [0, 0], [12, 9], error)
+      if (allocated(error)) return
+      call new_normal_kernel(kernel, lattice, 2.0_wp)
+      call new_pyramid(pyramid, basis)
+      worst = 0.0_wp
+      do j = 0, 8
+        call kernel%row(j, row)
+        do i = -11, 11
+          all_kernels = pyramid%kernels(i*basis(1, 1) + j*basis(1, 2), i*basis(2, 1) + j*basis(2, 2))
+          worst = max(worst, abs(row(1, i)/(2.0_wp*all_kernels(k_1)) - 1.0_wp))
+        end do
+      end do
+      call check(error, worst, 0.0_wp, 1.0e-14_wp, 'kernel')
+      if (allocated(error)) return
+    end do
+  end subroutine test_kernel
+
+  !> The fast sum over aliases agrees with the careful one at every frequency.
+  subroutine test_symbols(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: length(2) = [12, 18]
+    integer :: f(2, length(1)*length(2)), i, j
+    real(wp) :: symbol(size(f, 2)), all_symbols(3), worst
+
+    f = reshape([((i, j, i=0, length(1) - 1), j=0, length(2) - 1)], shape(f))
+    call normal_symbols(equilateral_basis(0.3_wp), length, f, symbol)
+    worst = 0.0_wp
+    do i = 1, size(f, 2)
+      all_symbols = kernel_symbols(equilateral_basis(0.3_wp), length, f(:, i))
+      worst = max(worst, abs(symbol(i)/all_symbols(1) - 1.0_wp))
+    end do
+    call check(error, worst, 0.0_wp, 1.0e-13_wp, 'symbol of K1')
+  end subroutine test_symbols
+
+  !> The edge of a Hertzian pressure is found between the coarse nodes: the error is an eighth of that of
+  !> plain interpolation at least.
+  subroutine test_prolonged_edge(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: fine, coarse
+    real(wp), allocatable :: p(:, :), plain(:, :), edge(:, :), exact(:, :)
+
+    call new_lattice(fine, equilateral_basis(1.0_wp/32), [-45, -45], [91, 91], error)
+    if (allocated(error)) return
+    coarse = fine%coarsened()
+    allocate (plain(91, 91))
+    allocate (edge, exact, mold=plain)
+    p = hertz(coarse)
+    exact = hertz(fine)
+    call prolong(coarse, p, fine, plain)
+    call prolong_edge(coarse, p, fine, edge)
+    call check_true(error, norm2(edge - exact) < norm2(plain - exact)/8.0_wp, 'the edge is found between nodes')
+
+  contains
+
+    function hertz(lattice) result(pressure)
+      type(lattice_t), intent(in) :: lattice
+      real(wp), allocatable :: pressure(:, :), x(:, :), y(:, :)
+
+      allocate (x(lattice%extent(1), lattice%extent(2)))
+      allocate (y, mold=x)
+      call lattice%coordinates(x, y)
+      pressure = sqrt(max(1.0_wp - x**2 - y**2, 0.0_wp))
+    end function hertz
+
+  end subroutine test_prolonged_edge
+
+  !> A disc of active nodes in the middle of a window.
+  pure function disc(n, radius) result(active)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: radius
+    logical :: active(n, n)
+    integer :: i, j
+    real(wp) :: x, y
+
+    do j = 1, n
+      do i = 1, n
+        x = i - (n + 1)/2 + 0.5_wp*(j - (n + 1)/2)
+        y = 0.5_wp*sqrt(3.0_wp)*(j - (n + 1)/2)
+        active(i, j) = x**2 + y**2 < radius**2
+      end do
+    end do
+  end function disc
+
+  !> y^T E x = (E^T y)^T x for any x on the active nodes and any y.
+  subroutine test_transpose(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 41
+    type(edge_extension_t) :: edge
+    logical :: active(n, n)
+    real(sp), target :: x(n, n), y(n, n), extended(n, n), folded(n, n)
+    real(sp), pointer, contiguous :: flat(:)
+    real(wp) :: left, right
+
+    active = disc(n, 12.5_wp)
+    active(3:5, 30:34) = .true.
+    active(1, 1) = .true.
+    call new_edge_extension(edge, active)
+    call random_number(x)
+    call random_number(y)
+    x = merge(x, 0.0_sp, active)
+    extended = x
+    flat(1:n*n) => extended
+    call edge%extend(flat)
+    call check_true(error, count(abs(extended) > 0.0_sp) > count(active) + 200, 'nodes beyond the edge take part')
+    if (allocated(error)) return
+    call check_true(error, all(abs(extended - x) <= 0.0_sp .or. .not. active), 'the active nodes keep their values')
+    if (allocated(error)) return
+    folded = y
+    flat(1:n*n) => folded
+    call edge%fold(flat)
+    left = sum(real(y, wp)*extended)
+    right = sum(real(folded, wp)*x, mask=active)
+    call check(error, left, right, 1.0e-6_wp*abs(right), 'y^T E x')
+  end subroutine test_transpose
+
+  !> Conjugate gradients on a disc need half of the iterations with the continuation.
+  subroutine test_continuation(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: plain, continued
+
+    call iterations(.false., plain, error)
+    if (allocated(error)) return
+    call iterations(.true., continued, error)
+    if (allocated(error)) return
+    call check_true(error, 3*continued <= 2*plain, 'a third of the iterations is saved')
+  end subroutine test_continuation
+
+  !> Iterations of preconditioned conjugate gradients to 1e-5 for a rigid punch.
+  subroutine iterations(continued, n_iteration, error)
+    logical, intent(in) :: continued
+    integer, intent(out) :: n_iteration
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 121
+    type(lattice_t) :: lattice
+    type(fft_flexibility_t) :: flexibility
+    type(preconditioner_t) :: preconditioner
+    type(edge_extension_t) :: edge
+    logical :: active(n, n)
+    real(wp), dimension(n, n, 1) :: x, r, z, d, kd
+    real(wp) :: rz, rz_old, step
+    integer :: i
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-60, -60], [n, n], error)
+    if (.not. allocated(error)) then
+      call new_fft_flexibility(flexibility, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error, normal_only=.true.)
+    end if
+    if (.not. allocated(error)) call new_preconditioner(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error)
+    if (allocated(error)) return
+    active = disc(n, 40.3_wp)
+    call new_edge_extension(edge, active)
+    x = 0.0_wp
+    r(:, :, 1) = merge(1.0_wp, 0.0_wp, active)
+    do i = 1, n, 2
+      r(i, :, 1) = -0.7_wp*r(i, :, 1)
+    end do
+    d = 0.0_wp
+    rz_old = 1.0_wp
+    do n_iteration = 0, 60
+      if (maxval(abs(r)) < 1.0e-5_wp) exit
+      if (continued) then
+        call preconditioner%apply(r, z, edge)
+      else
+        call preconditioner%apply(r, z)
+      end if
+      z(:, :, 1) = merge(z(:, :, 1), 0.0_wp, active)
+      rz = sum(r*z)
+      d = z + merge(rz/rz_old, 0.0_wp, n_iteration > 0)*d
+      rz_old = rz
+      call flexibility%apply([normal], d, [normal], kd, error)
+      if (allocated(error)) return
+      step = rz/sum(d*kd)
+      x = x + step*d
+      r(:, :, 1) = merge(r(:, :, 1) - step*kd(:, :, 1), 0.0_wp, active)
+    end do
+  end subroutine iterations
+
+  !> Single nodes have no rings: nothing is wide enough to fall off slowly.
+  subroutine test_scattered(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 20
+    type(edge_extension_t) :: edge
+    logical :: active(n, n)
+    real(sp) :: field(n*n), before(n*n)
+
+    active = .false.
+    active(3::5, 3::5) = .true.
+    call new_edge_extension(edge, active)
+    field = reshape(merge(1.0_sp, 0.0_sp, active), [n*n])
+    before = field
+    call edge%extend(field)
+    call check_true(error, all(abs(field - before) <= 0.0_sp), 'the field is as it was')
+    if (allocated(error)) return
+    active = .true.
+    call new_edge_extension(edge, active)
+    field = 1.0_sp
+    call edge%extend(field)
+    call edge%fold(field)
+    call check_true(error, all(abs(field - 1.0_sp) <= 0.0_sp), 'no node is left to continue to')
+  end subroutine test_scattered
+
+  !> A sphere of unit radius on a window with the given number of nodes a side.
+  subroutine sphere(n, solver, lattice, gap, error)
+    integer, intent(in) :: n
+    type(normal_contact_t), intent(out) :: solver
+    type(lattice_t), intent(out) :: lattice
+    real(wp), allocatable, intent(out) :: gap(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: x(:, :), y(:, :)
+    logical, allocatable :: candidate(:, :)
+
+    call new_lattice(lattice, equilateral_basis(2.7_wp/n), [-n/2, -n/2], [n, n], error)
+    if (allocated(error)) return
+    allocate (x(n, n), y(n, n), candidate(n, n))
+    call lattice%coordinates(x, y)
+    gap = 0.5_wp*(x**2 + y**2)
+    candidate = .true.
+    call new_normal_contact(solver, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error)
+  end subroutine sphere
+
+  !> Tolerances far below single precision are met, load included.
+  subroutine test_tight(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(normal_contact_t) :: solver
+    type(contact_state_t) :: state
+    type(lattice_t) :: lattice
+    real(wp), allocatable :: gap(:, :)
+
+    call sphere(60, solver, lattice, gap, error)
+    if (allocated(error)) return
+    call solver%solve(force_control, 4.0_wp/3.0_wp, 1.0e-12_wp, 60, state, error)
+    if (allocated(error)) return
+    call check_true(error, state%converged, 'converged under a load')
+    if (allocated(error)) return
+    call check(error, state%load(normal), 4.0_wp/3.0_wp, 2.0e-12_wp, 'load')
+    if (allocated(error)) return
+    call solver%solve(displacement_control, 1.0_wp, 1.0e-12_wp, 60, state, error)
+    if (allocated(error)) return
+    call check_true(error, state%converged, 'converged at an approach')
+  end subroutine test_tight
+
+  !> The residual that is reported is that of the pressure, found anew in double precision.
+  subroutine test_true_residual(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: tolerance = 1.0e-8_wp
+    type(normal_contact_t) :: solver
+    type(contact_state_t) :: state
+    type(fft_flexibility_t) :: flexibility
+    type(elastic_pair_t), parameter :: pair = elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp)
+    type(lattice_t) :: lattice
+    real(wp), allocatable :: gap(:, :), pressure(:, :, :), w(:, :, :)
+    logical, allocatable :: candidate(:, :)
+    real(wp) :: residual
+
+    call sphere(150, solver, lattice, gap, error)
+    if (allocated(error)) return
+    call solver%solve(force_control, 4.0_wp/3.0_wp, tolerance, 60, state, error)
+    if (allocated(error)) return
+    call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=.true.)
+    if (allocated(error)) return
+    pressure = reshape(state%pressure, [150, 150, 1])
+    allocate (w, mold=pressure)
+    call flexibility%apply([normal], pressure, [normal], w, error)
+    if (allocated(error)) return
+    allocate (candidate(150, 150), source=.true.)
+    residual = normal_residual(state%pressure, gap + w(:, :, 1) - state%motion(normal), candidate, &
+                               normal_self_compliance(lattice, pair))
+    call check_true(error, state%converged, 'converged')
+    if (allocated(error)) return
+    call check(error, residual, state%residual_normal, 0.1_wp*tolerance, 'residual')
+  end subroutine test_true_residual
+
+  !> At most twelve scalar products, whatever the mesh; corrections in single precision count half.
+  subroutine test_few_products(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(normal_contact_t) :: solver
+    type(contact_state_t) :: state
+    type(lattice_t) :: lattice
+    real(wp), allocatable :: gap(:, :)
+    integer :: n
+
+    n = 40
+    do while (n <= 320)
+      call sphere(n, solver, lattice, gap, error)
+      if (allocated(error)) return
+      call solver%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 60, state, error)
+      if (allocated(error)) return
+      call check_true(error, state%converged .and. 3.0_wp*state%operator_applications <= 12.0_wp, 'few products')
+      if (allocated(error)) return
+      n = 2*n
+    end do
+  end subroutine test_few_products
+
+end module test_normal_contact

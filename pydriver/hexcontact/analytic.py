@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from typing import TypedDict, Unpack, cast
 
 import numpy as np
+import scipy  # its parts are loaded when they are first used: a fifth of a second
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, special
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array], Array]
@@ -148,7 +148,8 @@ def power_law(
     if not (np.isfinite(n) and n >= 1.0):
         raise ValueError(f"exponent is {exponent!r}; expected a number of at least 1")
     name, value = _one_of(given)
-    c = np.sqrt(np.pi) * np.exp(special.gammaln(n / 2 + 1) - special.gammaln(n / 2 + 0.5)) * coefficient
+    log_gamma = scipy.special.gammaln
+    c = np.sqrt(np.pi) * np.exp(log_gamma(n / 2 + 1) - log_gamma(n / 2 + 0.5)) * coefficient
     load_factor = 2.0 * effective_modulus * n / (n + 1.0)  # P = load_factor * delta * a
     if name == "normal_load":
         a = (value / (load_factor * c)) ** (1.0 / (n + 1.0))
@@ -159,7 +160,7 @@ def power_law(
 
     def pressure(r: Array) -> Array:
         z = np.maximum(1.0 - (r / a) ** 2, 0.0)
-        return np.asarray(scale * np.sqrt(z) * special.hyp2f1(1.0, 1.0 - n / 2, 1.5, z))
+        return np.asarray(scale * np.sqrt(z) * scipy.special.hyp2f1(1.0, 1.0 - n / 2, 1.5, z))
 
     if n == 1.0:
         peak = np.inf
@@ -323,7 +324,7 @@ def axisymmetric(
 
 def _gauss(n: int) -> tuple[Array, Array]:
     """Nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
-    node, weight = special.roots_legendre(n)
+    node, weight = scipy.special.roots_legendre(n)
     return 0.5 * (node + 1.0), 0.5 * weight
 
 
@@ -354,7 +355,9 @@ def _solve_profile(
         upper = start if start is not None else 2.0 * smallest
         while target(upper) < value:
             upper *= 2.0
-        a = optimize.brentq(lambda t: target(t) - value, smallest, upper, xtol=1e-15 * upper, rtol=1e-15)
+        a = scipy.optimize.brentq(
+            lambda t: target(t) - value, smallest, upper, xtol=1e-15 * upper, rtol=1e-15
+        )
 
     def pressure(r: Array) -> Array:
         r = np.asarray(r, dtype=float)[..., None]
@@ -375,7 +378,7 @@ def _solve_profile(
 
 def _maximum(pressure: Profile, first: float, last: float) -> float:
     """Largest value between two radii; there is one maximum between them."""
-    found: optimize.OptimizeResult = optimize.minimize_scalar(
+    found: scipy.optimize.OptimizeResult = scipy.optimize.minimize_scalar(
         lambda s: -float(pressure(np.array(s))),
         bounds=(first, last),
         method="bounded",
@@ -422,13 +425,14 @@ def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[
 
     def axis_ratio_error(log_ratio: float) -> float:
         m1 = np.exp(2.0 * log_ratio)  # (b/a)^2
-        return float(np.log(special.elliprd(0, m1, 1) / special.elliprd(0, 1, m1)) - np.log(small / large))
+        ratio = scipy.special.elliprd(0, m1, 1) / scipy.special.elliprd(0, 1, m1)
+        return float(np.log(ratio) - np.log(small / large))
 
-    ratio = 1.0
+    m1, k, d = 1.0, np.pi / 2, 0.75 * np.pi  # a circle, with which scipy need not be loaded
     if small < large * (1 - 1e-15):  # (A/B) lies between (b/a)^2 and b/a
-        ratio = np.exp(optimize.brentq(axis_ratio_error, np.log(small / large) - 1e-9, 1e-9, xtol=1e-15))
-    m1 = min(ratio, 1.0) ** 2
-    k, d = special.elliprf(0, m1, 1), special.elliprd(0, m1, 1)
+        lowest = np.log(small / large) - 1e-9
+        m1 = min(np.exp(scipy.optimize.brentq(axis_ratio_error, lowest, 1e-9, xtol=1e-15)), 1.0) ** 2
+        k, d = scipy.special.elliprf(0, m1, 1), scipy.special.elliprd(0, m1, 1)
     if name == "normal_load":
         a = (value * d / (np.pi * effective_modulus * small)) ** (1.0 / 3.0)  # A = small/2
     else:

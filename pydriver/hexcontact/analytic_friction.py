@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import integrate, optimize, special
 
 Array = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ class LubkinTorsion:
     def _twist_factor(self, radius: float) -> float:
         """K(k) - E(k) with k^2 = 1 - r^2/a^2, in Carlson's form (no cancellation, no overflow)."""
         m1 = (radius / self.contact_radius) ** 2
-        return float((1.0 - m1) * special.elliprd(0.0, m1, 1.0) / 3.0)
+        return float((1.0 - m1) * scipy.special.elliprd(0.0, m1, 1.0) / 3.0)
 
     def twist(self, stick_radius: float) -> float:
         """Twist (rad) at which the stick radius is c (m): (S_t mu p0/2) [K - E](k), k^2 = 1 - c^2/a^2."""
@@ -149,7 +149,9 @@ class LubkinTorsion:
     def torque(self, stick_radius: float) -> float:
         """Torque (N m) at which the stick radius is c (m)."""
         c = stick_radius
-        slip = integrate.quad(lambda t: t**2 * self._twist_factor(t), c, self.contact_radius, epsabs=0.0)[0]
+        slip = scipy.integrate.quad(
+            lambda t: t**2 * self._twist_factor(t), c, self.contact_radius, epsabs=0.0
+        )[0]
         stick = 4.0 * self.twist(c) * c**3 / (3.0 * np.pi * self.compliance)
         return float(4.0 * np.pi * (stick + 2.0 * self._peak / np.pi * slip))
 
@@ -158,7 +160,7 @@ class LubkinTorsion:
         if not 0.0 <= torque < self.sliding_torque:
             raise ValueError("the torque is not between 0 and the sliding torque 3 pi mu P a/16")
         a = self.contact_radius
-        return float(optimize.brentq(lambda c: self.torque(c) - torque, 1e-12 * a, a, xtol=1e-12 * a))
+        return float(scipy.optimize.brentq(lambda c: self.torque(c) - torque, 1e-12 * a, a, xtol=1e-12 * a))
 
 
 def no_slip_constants(beta: float) -> tuple[float, float]:
@@ -183,7 +185,7 @@ def no_slip_constants(beta: float) -> tuple[float, float]:
     angle = np.arctanh(beta)
     kappa = angle / beta if beta else 1.0
     # t = tanh(s/2) turns the logarithm into -s: a decaying, smooth integrand
-    integral = integrate.quad(
+    integral = scipy.integrate.quad(
         lambda s: np.tanh(s / 2) * np.cos(angle * s / np.pi) / (2.0 * np.cosh(s / 2) ** 2),
         0.0,
         80.0,
@@ -216,9 +218,9 @@ def goodman_stick_ratio(beta: float, friction_coefficient: float) -> float:
 
     def residual(z: float) -> float:  # z = artanh(c/a) resolves c/a close to 1
         k = np.tanh(z)
-        return float(z / k - ratio * special.ellipkm1(k * k))  # K'(k) = K(m = 1 - k^2)
+        return float(z / k - ratio * scipy.special.ellipkm1(k * k))  # K'(k) = K(m = 1 - k^2)
 
-    return float(np.tanh(optimize.brentq(residual, 1e-150, 40.0, xtol=1e-15)))
+    return float(np.tanh(scipy.optimize.brentq(residual, 1e-150, 40.0, xtol=1e-15)))
 
 
 # ------------------------------------------------------------------------------ plane problems
@@ -284,6 +286,7 @@ def goodman_stick_ratio_plane(beta: float, friction_coefficient: float) -> float
     ratio = friction_coefficient / abs(beta)
 
     def residual(z: float) -> float:  # m = k^2 = 1/(1 + exp(-z)) resolves both ends
-        return float(special.ellipk(special.expit(z)) - ratio * special.ellipk(special.expit(-z)))
+        ellipk, expit = scipy.special.ellipk, scipy.special.expit
+        return float(ellipk(expit(z)) - ratio * ellipk(expit(-z)))
 
-    return float(np.sqrt(special.expit(optimize.brentq(residual, -700.0, 36.0, xtol=1e-14))))
+    return float(np.sqrt(scipy.special.expit(scipy.optimize.brentq(residual, -700.0, 36.0, xtol=1e-14))))

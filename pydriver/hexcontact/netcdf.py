@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import DeckError, HexcontactError
-from .result import Layout, Metadata, Result, Step, window_of
-from .variables import FIELDS, SCHEMA_VERSION, VARIABLES
+from .result import Layout, Metadata, Result, Step
+from .variables import SCHEMA_VERSION, VARIABLES
 
 if TYPE_CHECKING:
     import netCDF4
@@ -35,8 +36,8 @@ def _alone() -> Iterator[None]:
 # --- writing --------------------------------------------------------------------------------------
 
 
-def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool, compress: bool = True) -> None:
-    """Write a netCDF file and flush it to disk.
+def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
+    """Write the file of a result and flush it to disk.
 
     Parameters
     ----------
@@ -48,38 +49,46 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool, com
         The steps with their fields; gone through once, none is kept.
     complete : bool
         Whether these are all steps of the run.
-    compress : bool
-        Compress what has a value at every node.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
+    with _new_file(path) as file:
+        with _alone():
+            file.setncatts(layout.attributes(complete))
+            for name, size in layout.sizes.items():
+                file.createDimension(name, size)
+            for name, values in (layout.coordinates() | layout.histories()).items():
+                if VARIABLES[name].dtype == "str":
+                    _write_text(file, name, values)
+                else:
+                    _column(file, name)[...] = values
+            columns = {name: _column(file, name) for name in layout.fields}
+        gap_column = columns.pop("initial_gap", None)
+        gap: Any = None
+        for position, step in enumerate(steps):
+            with _alone():
+                for name, column in columns.items():
+                    column[position] = layout.field(name, position, step)
+            if gap_column is not None:
+                gap = layout.initial_gap(gap, step)
+        if gap_column is not None:
+            with _alone():
+                gap_column[...] = gap
+
+
+@contextlib.contextmanager
+def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
+    """Create a file; in the end close it and flush it to disk."""
     import netCDF4
 
     try:
         with _alone():
             file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
         try:
-            with _alone():
-                file.setncatts(layout.attributes(complete))
-                for name, size in layout.sizes.items():
-                    file.createDimension(name, size)
-                for name, values in layout.coordinates().items():
-                    _column(file, layout, name, compress)[...] = values
-                columns = {name: _column(file, layout, name, compress) for name in layout.variables}
-            gap_column = columns.pop("initial_gap", None)
-            gap: Any = None
-            for position, step in enumerate(steps):
-                with _alone():
-                    for name, column in columns.items():
-                        column[position] = _characters(column, layout.value(name, position, step))
-                if gap_column is not None:
-                    gap = layout.initial_gap(gap, step)
-            with _alone():
-                if gap_column is not None:
-                    gap_column[...] = gap
+            yield file
         finally:
             with _alone():
                 file.close()
@@ -88,25 +97,14 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool, com
     flush(path)
 
 
-def _column(file: netCDF4.Dataset, layout: Layout, name: str, compress: bool) -> netCDF4.Variable:
+def _column(file: netCDF4.Dataset, name: str) -> netCDF4.Variable:
     """Create the variable `name` with its attributes."""
     variable = VARIABLES[name]
-    if variable.dtype == "str":
-        # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
-        longest = max(len(str(step.history.get(name, "")).encode()) for step in layout.steps)
-        file.createDimension(f"{name}_length", max(1, longest))
-        column = file.createVariable(name, "S1", (*variable.dims, f"{name}_length"))
-        column.setncatts({**variable.attributes, "_Encoding": "utf-8"})
-        column.set_auto_chartostring(False)
-        return column
     options: dict[str, Any] = {}
     if variable.dims[-2:] == ("row", "col"):
-        options["compression"] = "zlib" if compress else None
-        options["complevel"] = 1
+        sizes = [1 if dim == "step" else len(file.dimensions[dim]) for dim in variable.dims]
+        options = {"compression": "zlib", "complevel": 1, "chunksizes": [min(_CHUNK, n) for n in sizes]}
         options["fletcher32"] = True  # damage shows as an error, not as wrong numbers
-        options["chunksizes"] = [min(_CHUNK, len(file.dimensions[dim])) for dim in variable.dims]
-        if "step" in variable.dims:
-            options["chunksizes"][0] = 1
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
     column = file.createVariable(name, variable.dtype, variable.dims, **options)
@@ -116,11 +114,18 @@ def _column(file: netCDF4.Dataset, layout: Layout, name: str, compress: bool) ->
     return column
 
 
-def _characters(column: netCDF4.Variable, value: Any) -> Any:
-    """Turn text into the characters of `column`; everything else stays as it is."""
-    if not isinstance(value, str):
-        return value
-    return np.frombuffer(value.encode().ljust(column.shape[-1], b"\0"), "S1")
+def _write_text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> None:
+    """Write the text variable `name`.
+
+    Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
+    """
+    variable = VARIABLES[name]
+    characters = np.array([text.encode() for text in texts]).view("S1").reshape(len(texts), -1)
+    file.createDimension(f"{name}_length", characters.shape[1])
+    column = file.createVariable(name, "S1", (*variable.dims, f"{name}_length"))
+    column.setncatts({**variable.attributes, "_Encoding": "utf-8"})
+    column.set_auto_chartostring(False)
+    column[...] = characters
 
 
 def flush(path: Path) -> None:
@@ -139,7 +144,7 @@ def flush(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def _reading(path: Path) -> Iterator[None]:
+def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
     """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
     try:
         yield
@@ -149,7 +154,7 @@ def _reading(path: Path) -> Iterator[None]:
         raise DeckError(f"{path} cannot be read: {error.strerror}") from error
     except Exception as error:  # damage takes any form: every library below has its own exceptions
         raise DeckError(
-            f"{path} is damaged or not a netCDF file ({str(error).strip() or type(error).__name__})"
+            f"{path} is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
         ) from error
 
 
@@ -168,36 +173,6 @@ def _attributes(file: netCDF4.Dataset) -> dict[str, Any]:
     return {name: file.getncattr(name) for name in file.ncattrs()}
 
 
-def read_record(path: Path) -> tuple[Metadata, Step]:
-    """Read one record of a journal.
-
-    Raises
-    ------
-    DeckError
-        If the file is damaged or of another kind.
-    FileNotFoundError
-        If it is not there.
-    """
-    import netCDF4
-
-    with _reading(path), _alone(), netCDF4.Dataset(path) as file:
-        file.set_auto_mask(False)
-        attributes = _attributes(file)
-        _check_ours(attributes, path)
-        fields, history = {}, {}
-        for name in VARIABLES.keys() & file.variables.keys():
-            if name in FIELDS:
-                fields[name] = file[name][0]
-            elif VARIABLES[name].dims == ("step",):
-                value = file[name][0]
-                history[name] = str(value) if VARIABLES[name].dtype == "str" else value
-        if "initial_gap" in file.variables:
-            fields["initial_gap"] = file["initial_gap"][...]
-        window = window_of(attributes, file["row"][...], file["col"][...])
-        index = int(history.pop("step")) - 1
-    return Metadata.from_attributes(attributes), Step(index, window, fields, history)
-
-
 def read_output(path: Path) -> Result:
     """Open an output file; its fields are read when they are asked for.
 
@@ -210,13 +185,13 @@ def read_output(path: Path) -> Result:
     """
     import netCDF4
 
-    with _reading(path), _alone(), netCDF4.Dataset(path) as file:
+    with reading(path), _alone(), netCDF4.Dataset(path) as file:
         attributes = _attributes(file)
         _check_ours(attributes, path)
         for name in ("step", "row", "col", "x", "y"):
             if file[name].dimensions != VARIABLES[name].dims or 0 in file[name].shape:
                 raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
-    with _reading(path):
+    with reading(path):
         import xarray
 
         result = Result(xarray.open_dataset(path, engine="netcdf4"), str(path))

@@ -149,21 +149,18 @@ class Layout:
         Where the result comes from, and which fields it keeps.
     steps : sequence of Step
         All its steps (heads are enough), in order.
-    everything : bool
-        Keep all fields of all steps, whatever `metadata` chooses.
     """
 
-    def __init__(self, metadata: Metadata, steps: Sequence[Step], everything: bool = False) -> None:
+    def __init__(self, metadata: Metadata, steps: Sequence[Step]) -> None:
         if not steps:
             raise ValueError("a result needs at least one finished step")
         self.metadata = metadata
         self.steps = steps
         self.window = _union([step.lattice for step in steps])
-        self.every = 1 if everything else metadata.every
         present = {name for step in steps for name in (*step.fields, *step.history)}
         if unknown := present - VARIABLES.keys():
             raise ValueError(f"the result has no quantity named {', '.join(sorted(unknown))}")
-        if metadata.fields and not everything:
+        if metadata.fields:
             present -= set(FIELDS) - set(metadata.fields)
         self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
         self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
@@ -199,16 +196,30 @@ class Layout:
     def keeps(self, position: int) -> bool:
         """Whether the fields of the step at `position` are kept."""
         last = position == len(self.steps) - 1
-        return last or self.steps[position].number % self.every == 0
+        return last or self.steps[position].number % self.metadata.every == 0
 
-    def value(self, name: str, position: int, step: Step) -> Any:
-        """Value of a quantity in one step: a scalar, or a field padded to the whole window."""
+    @property
+    def fields(self) -> list[str]:
+        """Names of what has a value at every node."""
+        return [name for name, variable in self.variables.items() if variable.dims[-2:] == ("row", "col")]
+
+    def histories(self) -> dict[str, NDArray[Any]]:
+        """Values of what has one value by step; texts as objects."""
+        return {
+            name: np.array(
+                [step.history.get(name, "" if v.dtype == "str" else v.missing) for step in self.steps],
+                dtype=object if v.dtype == "str" else v.dtype,
+            )
+            for name, v in self.variables.items()
+            if v.dims == ("step",)
+        }
+
+    def field(self, name: str, position: int, step: Step) -> NDArray[Any]:
+        """Values of a field in one step, padded to the whole window."""
+        if self.keeps(position) and name in step.fields:
+            return self.padded(name, step)
         variable = self.variables[name]
-        if variable.is_field:
-            if self.keeps(position) and name in step.fields:
-                return self.padded(name, step)
-            return np.full(self.window.shape, variable.missing, dtype=variable.dtype)
-        return step.history.get(name, "" if variable.dtype == "str" else variable.missing)
+        return np.full(self.window.shape, variable.missing, dtype=variable.dtype)
 
     def padded(self, name: str, step: Step) -> NDArray[Any]:
         """Return a field of `step` on the window of the whole result."""
@@ -279,20 +290,20 @@ def assemble(metadata: Metadata, steps: Iterable[Step], complete: bool = True) -
     import xarray
 
     layout = Layout(metadata, [step.head for step in steps])
-    values: dict[str, Any] = {
-        name: np.empty([layout.sizes[dim] for dim in v.dims], dtype=object if v.dtype == "str" else v.dtype)
-        for name, v in layout.variables.items()
+    values = {
+        name: np.empty([layout.sizes[dim] for dim in VARIABLES[name].dims], VARIABLES[name].dtype)
+        for name in layout.fields
         if name != "initial_gap"
     }
     gap = None
     for position, step in enumerate(steps):
         for name, array in values.items():
-            array[position] = layout.value(name, position, step)
+            array[position] = layout.field(name, position, step)
         if "initial_gap" in step.fields:
             gap = layout.initial_gap(gap, step)
     if gap is not None:
         values["initial_gap"] = gap
-    values |= layout.coordinates()
+    values |= layout.histories() | layout.coordinates()
     variables = {
         name: xarray.Variable(v.dims, values[name], v.attributes)
         for name, v in VARIABLES.items()

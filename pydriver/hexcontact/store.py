@@ -1,11 +1,10 @@
 """Result files: a journal of finished steps, and one netCDF file made from it.
 
-While a run goes on, each finished step is a small netCDF file of its own in the journal beside
-the output (``out.nc.d/000012.nc``), written under a temporary name, flushed to disk and renamed.
-A record of the journal is a result with one step, all its fields kept. ``out.nc`` is assembled
-from the records, one step in memory at a time, and only ever replaced as a whole. So a run that
-is killed at any moment loses at most the step it was working on, and what stood in ``out.nc``
-before stays readable.
+While a run goes on, each finished step is a small file of its own in the journal beside the output
+(``out.nc.d/000012.npz``), with all its fields, written under a temporary name, flushed to disk and renamed.
+``out.nc`` is assembled from the records, one step in memory at a time, and only ever replaced as a
+whole. So a run that is killed at any moment loses at most the step it was working on, and what stood
+in ``out.nc`` before stays readable.
 """
 
 from __future__ import annotations
@@ -17,17 +16,18 @@ import re
 import shutil
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Self
 
 from .errors import DeckError, HexcontactError, ResourceError
 from .lock import Lock
-from .netcdf import flush, read_output, read_record, write
+from .netcdf import flush, read_output, write
+from .record import SUFFIX, read_record, write_record
 from .result import Layout, Metadata, Result, Step, assemble
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
-_RECORD = re.compile(r"\d{6}\.nc")
+_RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _STOPPED = "stopped.txt"  # in the journal: why the run ended before its time
 _LACKING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, None}
 
@@ -59,7 +59,7 @@ class Journal:
         """Read the steps; DeckError if one is missing between others or damaged."""
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
-                raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}.nc")
+                raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
             yield read_record(record)[1]
 
     @property
@@ -213,7 +213,7 @@ class Store:
                     old = read_output(self.path) if self.path.exists() else None
                     if old is None or (not old.complete and _continues(left, old)):
                         layout = Layout(left.metadata, [step.head for step in left])
-                        self._replace(self.path, layout, left, complete=left.complete)
+                        self._put_together(layout, left, left.complete)
                     if old is not None:
                         old.close()
             left.remove()
@@ -249,19 +249,21 @@ class Store:
             kind = ResourceError if error.errno in _LACKING else DeckError
             raise kind(f"cannot write {what} of {self.path}: {reason}") from error
 
-    def _replace(
-        self, target: Path, layout: Layout, steps: Iterable[Step], complete: bool, compress: bool = True
-    ) -> None:
-        """Write `target` under a temporary name, then put it in its place."""
+    def _replace(self, target: Path, write_to: Callable[[Path], None]) -> None:
+        """Have `target` written under a temporary name, then put it in its place."""
         temporary = self.folder / (target.name + ".tmp")
         try:
-            write(temporary, layout, steps, complete, compress)
+            write_to(temporary)
             os.replace(temporary, target)
             flush(target.parent)
         except BaseException:
             with contextlib.suppress(OSError):
                 temporary.unlink()
             raise
+
+    def _put_together(self, layout: Layout, journal: Journal, complete: bool) -> None:
+        """Make the output of all finished steps."""
+        self._replace(self.path, lambda path: write(path, layout, journal, complete))
 
     def append(self, step: Step) -> None:
         """Commit a finished step: when this returns it is on the disk.
@@ -277,9 +279,8 @@ class Store:
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
             with self._writing(f"step {step.number}"):
-                layout = Layout(self.metadata, [step.head], everything=True)
-                record = self.folder / f"{step.number:06d}.nc"
-                self._replace(record, layout, [step], complete=False, compress=False)
+                record = self.folder / f"{step.number:06d}{SUFFIX}"
+                self._replace(record, lambda path: write_record(path, self.metadata, step))
             self.heads.append(step.head)
             steps, moment = self._published
             due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
@@ -288,8 +289,7 @@ class Store:
 
     def _publish(self, complete: bool) -> None:
         with self._writing("the output"):
-            layout = Layout(self.metadata, self.heads)
-            self._replace(self.path, layout, Journal(self.folder), complete)
+            self._put_together(Layout(self.metadata, self.heads), Journal(self.folder), complete)
         self._published = (len(self.heads), time.monotonic())
 
     def finish(self) -> None:

@@ -237,8 +237,8 @@ def test_no_convergence_is_told_with_residuals_and_keeps_the_steps_before(
     assert len(result) == 2
     assert not result.complete
     assert sorted(p.name for p in journal_of(tmp_path / "out.nc").iterdir()) == [
-        "000001.nc",
-        "000002.nc",
+        "000001.npz",
+        "000002.npz",
         "stopped.txt",
     ]
 

@@ -27,7 +27,7 @@ from hexcontact import store as store_module
 from hexcontact.errors import DeckError, ResourceError
 from hexcontact.lattice import Lattice
 from hexcontact.lock import Lock
-from hexcontact.netcdf import read_record
+from hexcontact.record import read_record
 from hexcontact.result import Metadata, Step, assemble
 from hexcontact.store import Journal, Store, journal_of, open_result
 
@@ -86,7 +86,7 @@ def test_a_window_that_grew_and_chosen_fields_come_back(out: Path) -> None:
     with Store(out, described) as store:
         for step in steps:
             store.append(step)
-        record = read_record(store.folder / "000001.nc")
+        record = read_record(store.folder / "000001.npz")
         assert_array_equal(record[1].fields["gap"], steps[0].fields["gap"])  # the journal keeps everything
         assert record[0] == described
         store.finish()
@@ -321,7 +321,7 @@ def test_a_step_that_cannot_be_committed_leaves_those_before(
     monkeypatch.undo()
     [note] = caught.value.__notes__
     assert note.startswith(f"2 of 9 load steps are finished and kept in {journal_of(out)}; hexcontact info ")
-    assert sorted(p.name for p in journal_of(out).iterdir()) == ["000001.nc", "000002.nc", "stopped.txt"]
+    assert sorted(p.name for p in journal_of(out).iterdir()) == ["000001.npz", "000002.npz", "stopped.txt"]
     assert_array_equal(open_result(out).pressure.sel(step=2), made_step(1).fields["pressure"])
 
 
@@ -341,14 +341,14 @@ def test_an_output_that_cannot_be_written_at_the_end_leaves_the_journal(
         written(out)
     assert not out.exists()
     assert sorted(p.name for p in journal_of(out).iterdir()) == [
-        *(f"{k:06d}.nc" for k in (1, 2, 3)),
+        *(f"{k:06d}.npz" for k in (1, 2, 3)),
         "stopped.txt",
     ]
     assert len(open_result(out)) == 3
 
 
 def test_a_full_disk_is_told_apart_from_wrong_input(out: Path) -> None:
-    """A limit on the size of files makes the real netCDF library fail as on a full disk."""
+    """A limit on the size of files makes the real libraries fail as on a full disk."""
     written(out)
     before = out.read_bytes()
     program = f"""
@@ -366,13 +366,20 @@ def test_a_full_disk_is_told_apart_from_wrong_input(out: Path) -> None:
                 store.append(made_step(1, replace(WINDOW, n_row=300, n_col=300)))
             except Exception as error:
                 print(type(error).__name__, error)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+            try:
+                store.finish()
+            except Exception as error:
+                print(type(error).__name__, error)
     """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True)
     assert done.stderr == ""
-    assert done.stdout.startswith("ResourceError cannot write step 2 of ")
-    assert "is the disk full?" in done.stdout
+    step, output = done.stdout.splitlines()
+    assert step == f"ResourceError cannot write step 2 of {out}: File too large"
+    assert output.startswith(f"ResourceError cannot write the output of {out}: ")
+    assert "is the disk full?" in output  # the netCDF library does not say
     assert out.read_bytes() == before
-    assert [p.name for p in journal_of(out).iterdir()] == ["000001.nc"]
+    assert [p.name for p in journal_of(out).iterdir()] == ["000001.npz"]
 
 
 # --- killed ---------------------------------------------------------------------------------------
@@ -599,16 +606,14 @@ def test_a_truncated_file_is_damaged_not_a_crash(out: Path) -> None:
             open_result(out)
 
 
-@pytest.mark.parametrize("planned", [1, 2])
-def test_flipped_bytes_in_a_field_are_noticed(out: Path, planned: int) -> None:
-    """Checksums: a field that can be read is the field that was written, in the output and in the journal."""
-    written(out, 1, planned)
-    file = out if planned == 1 else journal_of(out) / "000001.nc"
-    whole = file.read_bytes()
+def test_flipped_bytes_in_a_field_are_noticed(out: Path) -> None:
+    """Checksums: a field that can be read is the field that was written."""
+    written(out, 1, planned=1)
+    whole = out.read_bytes()
     expected = made_step(0).fields["pressure"]
     noticed = 0
     for at in range(0, len(whole), 211):
-        file.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
+        out.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
         try:
             values = open_result(out).pressure.values
         except (DeckError, RuntimeError):
@@ -618,15 +623,45 @@ def test_flipped_bytes_in_a_field_are_noticed(out: Path, planned: int) -> None:
     assert noticed > 3
 
 
+def test_flipped_bytes_in_a_record_are_noticed(out: Path) -> None:
+    """A record that can be read is the record that was written, its history included."""
+    described = written(out, 1, planned=2)
+    record = journal_of(out) / "000001.npz"
+    whole = record.read_bytes()
+    expected = assemble(described, [made_step(0)], complete=False)
+    noticed, places = 0, range(0, len(whole), 11)
+    for at in places:
+        record.write_bytes(whole[:at] + bytes([255 - whole[at]]) + whole[at + 1 :])
+        try:
+            read = open_result(out).dataset
+        except DeckError as error:
+            assert "000001.npz is damaged" in str(error)
+            noticed += 1
+        else:
+            assert read.identical(expected)
+    assert noticed > 0.9 * len(places)
+
+
+def test_a_record_of_another_version_is_refused(out: Path) -> None:
+    written(out, 1, planned=2)
+    record = journal_of(out) / "000001.npz"
+    with np.load(record) as file:
+        arrays = dict(file)
+    text = arrays["about"].tobytes().replace(b'"journal_version": 1', b'"journal_version": 9')
+    np.savez(record, **(arrays | {"about": np.frombuffer(text, "u1")}))
+    with pytest.raises(DeckError, match=r"000001\.npz was kept by hexcontact .*layout 9; .* reads layout 1"):
+        open_result(out)
+
+
 def test_a_gap_or_a_damaged_record_in_the_journal_is_named(out: Path) -> None:
     written(out, count=3, planned=9)
-    record = journal_of(out) / "000002.nc"
+    record = journal_of(out) / "000002.npz"
     kept = record.read_bytes()
     record.write_bytes(kept[: len(kept) // 2])
-    with pytest.raises(DeckError, match=r"000002\.nc is damaged"):
+    with pytest.raises(DeckError, match=r"000002\.npz is damaged"):
         open_result(out)
     record.unlink()
-    with pytest.raises(DeckError, match=r"lacks the record of step 2, 000002\.nc"):
+    with pytest.raises(DeckError, match=r"lacks the record of step 2, 000002\.npz"):
         open_result(out)
     with Store(out, Metadata(planned_steps=1), overwrite=True):  # nothing stands in the way of a new run
         pass

@@ -59,7 +59,7 @@ contains
     self%initial_gap = initial_gap
     self%candidate = candidate
     self%compliance = normal_self_compliance(lattice, pair)
-    call new_dense_flexibility(self%flexibility, lattice, pair, error, normal_only=.true.)
+    call new_dense_flexibility(self%flexibility, lattice, pair, error)
   end subroutine new_direct_contact
 
   !> Solve for a normal load or an approach.
@@ -228,7 +228,7 @@ contains
     end if
     !$omp parallel do if (n > 1000)
     do i = 1, n
-      matrix(:i, i) = self%flexibility%matrix(node(:i), node(i))
+      matrix(:i, i) = self%flexibility%normal_influence(node(:i), node(i))
     end do
     !$omp end parallel do
     rhs(:, 1) = 1.0_wp

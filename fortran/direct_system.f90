@@ -1,8 +1,9 @@
 !> The linear problem of the direct method: an area in contact, with stick and slip frozen.
 module hc_direct_system
+  use, intrinsic :: iso_fortran_env, only: real32
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_lapack, only: dgesv, dgelss
+  use hc_lapack, only: dsgesv, dgelss
   use hc_flexibility_dense, only: dense_flexibility_t
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
   use hc_friction_law, only: normal_to
@@ -65,7 +66,7 @@ contains
   subroutine solve_area(problem, flexibility, target, it, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
-    !> Its explicit matrix
+    !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
@@ -75,21 +76,25 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(driven_motions_t) :: driven
-    real(wp), allocatable :: matrix(:, :), rhs(:, :), weight(:, :), traction(:, :), resultant(:, :), rigid(:, :), &
-                             direction(:, :)
-    integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), pivot(:)
+    real(wp), allocatable :: matrix(:, :), rhs(:, :), unknown(:, :), weight(:, :), traction(:, :), resultant(:, :), &
+                             rigid(:, :), direction(:, :), work(:, :)
+    real(real32), allocatable :: single(:)
+    integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), place(:), pivot(:)
     real(wp) :: load(n_motion)
-    integer :: i, k, n, n_p, n_free, info, stat
+    integer :: i, k, n, n_p, n_free, refinements, info, stat
 
     contact = pack([(i, i=1, size(it%p))], it%contact)
     stuck = pack(contact, it%zone(contact) == stick)
     sliding = pack(contact, it%zone(contact) == slip .and. it%compliance(contact) < infinite)
     node = [contact, stuck, stuck, sliding]
+    place = unpack([(i, i=1, size(contact))], it%contact, 0)
+    place = place(node)
     call new_driven_motions(driven, problem, target, reshape(it%contact, problem%lattice%extent))
     n = size(node)
     n_p = size(contact)
     n_free = size(driven%motion) + merge(1, 0, target%control(normal) == force_control)
-    allocate (matrix(n, n), rhs(n, 0:n_free), weight(3, n), resultant(n, n_free), pivot(n), stat=stat)
+    allocate (matrix(n, n), rhs(n, 0:n_free), unknown(n, 0:n_free), weight(3, n), resultant(n, n_free), pivot(n), &
+              work(n, 0:n_free), single(n*(n + 1 + n_free)), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the matrix of the contact area: use method "fft"')
       return
@@ -123,23 +128,23 @@ contains
       rhs(:, k) = sum(weight(along_x:, :)*transpose(direction(node, :)), dim=1)
       resultant(:, k) = sum(traction(along_x:, :)*transpose(direction(node, :)), dim=1)
     end do
-    call assemble(problem, flexibility, node, n_p, weight, traction, matrix)
+    call assemble(problem, flexibility, contact, place, weight, traction, matrix)
     do k = n_p + 2*size(stuck) + 1, n
       matrix(k, k) = matrix(k, k) + it%compliance(node(k))/problem%normal_compliance
     end do
-    call dgesv(n, 1 + n_free, matrix, n, pivot, rhs, n, info)
+    call dsgesv(n, 1 + n_free, matrix, n, pivot, rhs, n, unknown, n, work, single, refinements, info)
     if (info /= 0) then
       call raise(error, status%no_convergence, 'the matrix of the contact area is singular')
       return
     end if
 
-    call fulfil_loads(problem, driven, load(:n_free), resultant, rhs, it, error)
+    call fulfil_loads(problem, driven, load(:n_free), resultant, unknown, it, error)
     if (allocated(error)) return
     it%p = 0.0_wp
     it%q = 0.0_wp
-    it%p(contact) = rhs(:n_p, 0)
+    it%p(contact) = unknown(:n_p, 0)
     do k = 1, n
-      it%q(node(k), :) = it%q(node(k), :) + rhs(k, 0)*traction(along_x:, k)
+      it%q(node(k), :) = it%q(node(k), :) + unknown(k, 0)*traction(along_x:, k)
     end do
   end subroutine solve_area
 
@@ -184,39 +189,34 @@ contains
   end subroutine fulfil_loads
 
   !> Matrix of the nodes' mutual influence: weight.K.traction, divided by the self-compliance.
-  subroutine assemble(problem, flexibility, node, n_p, weight, traction, matrix)
+  subroutine assemble(problem, flexibility, contact, place, weight, traction, matrix)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
-    !> Its explicit matrix
+    !> Its flexibility
     type(dense_flexibility_t), intent(in) :: flexibility
-    !> Node of each unknown
-    integer, intent(in) :: node(:)
-    !> Number of pressures; they come first
-    integer, intent(in) :: n_p
-    !> Displacements that each row adds up, traction of each unknown (3, size(node))
+    !> Nodes in contact
+    integer, intent(in) :: contact(:)
+    !> Node of each unknown, as a place in `contact`
+    integer, intent(in) :: place(:)
+    !> Displacements that each row adds up, traction of each unknown (3, size(place))
     real(wp), intent(in) :: weight(:, :), traction(:, :)
     !> Matrix
     real(wp), intent(out) :: matrix(:, :)
-    integer :: column, from, onto, first, source, k, n
+    real(wp) :: u(3, size(contact)), by_pressure(3, size(contact)), pressure(3)
+    integer :: column, k
 
-    n = problem%lattice%size()
-    !$omp parallel do private(from, onto, first, source, k) if (size(node) > 500)
-    do column = 1, size(node)
-      matrix(:, column) = 0.0_wp
-      do from = normal, along_y
-        if (abs(traction(from, column)) <= 0.0_wp) cycle
-        source = (from - 1)*n + node(column)
-        ! Goodman: the gap does not feel shear tractions
-        first = merge(n_p + 1, 1, problem%goodman .and. from /= normal)
-        do k = first, size(node)
-          do onto = normal, along_y
-            if (abs(weight(onto, k)) <= 0.0_wp) cycle
-            matrix(k, column) = matrix(k, column) + weight(onto, k)*traction(from, column) &
-                                *flexibility%matrix((onto - 1)*n + node(k), source)
-          end do
-        end do
+    !$omp parallel do private(u, by_pressure, pressure, k) if (size(place) > 500)
+    do column = 1, size(place)
+      call flexibility%response(contact, contact(place(column)), traction(:, column)/problem%normal_compliance, u)
+      if (problem%goodman) then
+        ! the gap does not feel shear tractions
+        pressure = [traction(normal, column)/problem%normal_compliance, 0.0_wp, 0.0_wp]
+        call flexibility%response(contact, contact(place(column)), pressure, by_pressure)
+        u(normal, :) = by_pressure(normal, :)
+      end if
+      do k = 1, size(place)
+        matrix(k, column) = dot_product(weight(:, k), u(:, place(k)))
       end do
-      matrix(:, column) = matrix(:, column)/problem%normal_compliance
     end do
     !$omp end parallel do
   end subroutine assemble

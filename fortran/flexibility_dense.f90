@@ -1,29 +1,38 @@
-!> Flexibility operator as an explicit matrix over all nodes of a window, for LAPACK.
+!> Flexibility operator by direct summation, and its single coefficients, for LAPACK.
+!>
+!> A coefficient depends on the distance of two nodes only, so those of all distances in the window are all
+!> that is kept; the matrix of an area is filled from them where it is needed.
 module hc_flexibility_dense
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_lapack, only: dgemv
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, n_block, blocks, block_index
+  use hc_flexibility, only: flexibility_t, normal, along_y, n_block, blocks, block_index
   implicit none
   private
 
   public :: dense_flexibility_t, new_dense_flexibility, dense_memory
 
-  !> Explicit operator; node and component run as in an array (n_col, n_row, component).
+  !> Operator by direct summation.
   type, extends(flexibility_t) :: dense_flexibility_t
-    !> Flexibility matrix, symmetric [m/Pa]
-    real(wp), allocatable :: matrix(:, :)
+    private
+    !> Position of each node: two nodes differ by the same whenever they are equally far apart (n_node)
+    integer, allocatable :: position(:)
+    !> Blocks of the operator by the difference of positions, onto - from (:, n_block) [m/Pa]
+    real(wp), allocatable :: influence(:, :)
   contains
     procedure :: apply => dense_apply
+    !> Displacements of some nodes by a unit pressure on one
+    procedure :: normal_influence
+    !> Displacements of some nodes by the tractions on one
+    procedure :: response
   end type dense_flexibility_t
 
 contains
 
-  !> The matrix of the operator over a window.
-  subroutine new_dense_flexibility(operator, lattice, pair, error, normal_only)
+  !> The coefficients of the operator over a window.
+  subroutine new_dense_flexibility(operator, lattice, pair, error)
     !> Operator to be set up
     type(dense_flexibility_t), intent(out) :: operator
     !> Lattice and window
@@ -32,62 +41,82 @@ contains
     type(elastic_pair_t), intent(in) :: pair
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Only the action of the pressure on the gap will be asked for
-    logical, intent(in), optional :: normal_only
 
     type(pyramid_t) :: pyramid
-    real(wp), allocatable :: influence(:, :, :)
-    real(wp) :: offset(2), sign
-    integer :: n(2), n_component, from, onto, col, row, source, index, stat, n_node
+    real(wp) :: offset(2)
+    integer :: n(2), col, row, stride, largest, stat
 
     operator%lattice = lattice
     operator%pair = pair
-    n_component = 3
-    if (present(normal_only)) n_component = merge(1, 3, normal_only)
     n = lattice%extent
-    n_node = lattice%size()
-    allocate (operator%matrix(n_node*n_component, n_node*n_component), &
-              influence(1 - n(1):n(1) - 1, 1 - n(2):n(2) - 1, n_block), stat=stat)
+    stride = 2*n(1) - 1
+    largest = n(1) - 1 + (n(2) - 1)*stride
+    allocate (operator%influence(-largest:largest, n_block), operator%position(lattice%size()), stat=stat)
     if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the flexibility matrix: use method "fft"')
+      call raise(error, status%resources, 'not enough memory for the flexibility operator')
       return
     end if
+    operator%position = [((col + row*stride, col=0, n(1) - 1), row=0, n(2) - 1)]
     call new_pyramid(pyramid, lattice%basis)
-    !$omp parallel do private(col, offset) if (n_node > 1000)
+    !$omp parallel do private(col, offset) if (lattice%size() > 1000)
     do row = 1 - n(2), n(2) - 1
       do col = 1 - n(1), n(1) - 1
         offset = col*lattice%basis(:, 1) + row*lattice%basis(:, 2)
-        influence(col, row, :) = blocks(pair, pyramid%kernels(offset(1), offset(2)))
+        operator%influence(col + row*stride, :) = blocks(pair, pyramid%kernels(offset(1), offset(2)))
       end do
     end do
     !$omp end parallel do
-    do from = 1, n_component
-      do onto = 1, n_component
-        index = abs(block_index(onto, from))
-        sign = merge(1.0_wp, -1.0_wp, block_index(onto, from) > 0)
-        !$omp parallel do private(col, source) if (n_node > 1000)
-        do row = 1, n(2)
-          do col = 1, n(1)
-            source = (from - 1)*n_node + (row - 1)*n(1) + col
-            operator%matrix((onto - 1)*n_node + 1:onto*n_node, source) = &
-              sign*reshape(influence(1 - col:n(1) - col, 1 - row:n(2) - row, index), [n_node])
-          end do
-        end do
-        !$omp end parallel do
-      end do
-    end do
   end subroutine new_dense_flexibility
 
-  !> Bytes that the matrix takes, together with a factor of it.
+  !> Bytes that the matrix of the whole window takes, factorized.
   pure integer(selected_int_kind(18)) function dense_memory(extent, normal_only)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
-    !> Only the action of the pressure on the gap will be asked for
+    !> Contact without friction
     logical, intent(in) :: normal_only
     integer, parameter :: long = selected_int_kind(18)
 
-    dense_memory = 2*8*(merge(1_long, 3_long, normal_only)*extent(1)*extent(2))**2
+    ! with friction the factors are of single precision, beside the matrix
+    dense_memory = merge(8_long, 12_long, normal_only)*(merge(1_long, 3_long, normal_only)*extent(1)*extent(2))**2
   end function dense_memory
+
+  !> Displacements along the normal by a unit pressure on one node [m/Pa].
+  pure function normal_influence(self, onto, from) result(displacement)
+    class(dense_flexibility_t), intent(in) :: self
+    !> Nodes that move, in the order of a window
+    integer, intent(in) :: onto(:)
+    !> Node that is loaded
+    integer, intent(in) :: from
+    real(wp) :: displacement(size(onto))
+
+    displacement = self%influence(self%position(onto) - self%position(from), block_index(normal, normal))
+  end function normal_influence
+
+  !> Displacements by the tractions on one node.
+  pure subroutine response(self, onto, from, traction, displacement)
+    class(dense_flexibility_t), intent(in) :: self
+    !> Nodes that move, in the order of a window
+    integer, intent(in) :: onto(:)
+    !> Node that is loaded
+    integer, intent(in) :: from
+    !> Its tractions [Pa]
+    real(wp), intent(in) :: traction(3)
+    !> Displacements (3, size(onto)) [m]
+    real(wp), intent(out) :: displacement(:, :)
+    real(wp) :: factor(3)
+    integer :: acting, k, offset, block(3)
+
+    displacement = 0.0_wp
+    do acting = normal, along_y
+      if (abs(traction(acting)) <= 0.0_wp) cycle
+      block = abs(block_index(:, acting))
+      factor = traction(acting)*sign(1, block_index(:, acting))
+      do k = 1, size(onto)
+        offset = self%position(onto(k)) - self%position(from)
+        displacement(:, k) = displacement(:, k) + factor*self%influence(offset, block)
+      end do
+    end do
+  end subroutine response
 
   subroutine dense_apply(self, from, traction, onto, displacement, error)
     class(dense_flexibility_t), intent(inout) :: self
@@ -96,22 +125,31 @@ contains
     integer, intent(in) :: onto(:)
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
-    integer :: i, o, n
+    real(wp) :: factor
+    integer :: col, row, i, o, block, first, n(2), target_row
 
     call self%check(from, traction, onto, displacement, error)
     if (allocated(error)) return
-    n = self%lattice%size()
-    if (max(maxval(from), maxval(onto))*n > size(self%matrix, 1)) then
-      call raise(error, status%invalid_input, 'the operator was set up for normal contact only')
-      return
-    end if
-    displacement = 0.0_wp
-    do i = 1, size(from)
-      do o = 1, size(onto)
-        call dgemv('N', n, n, 1.0_wp, self%matrix((onto(o) - 1)*n + 1, (from(i) - 1)*n + 1), size(self%matrix, 1), &
-                   traction(:, :, i), 1, 1.0_wp, displacement(:, :, o), 1)
+    n = self%lattice%extent
+    !$omp parallel do private(row, col, i, o, block, first, factor) if (self%lattice%size() > 1000)
+    do target_row = 1, n(2)
+      displacement(:, target_row, :) = 0.0_wp
+      do i = 1, size(from)
+        do row = 1, n(2)
+          do col = 1, n(1)
+            if (abs(traction(col, row, i)) <= 0.0_wp) cycle
+            first = 1 - col + (target_row - row)*(2*n(1) - 1)
+            do o = 1, size(onto)
+              block = block_index(onto(o), from(i))
+              factor = sign(1, block)*traction(col, row, i)
+              displacement(:, target_row, o) = displacement(:, target_row, o) &
+                                               + factor*self%influence(first:first + n(1) - 1, abs(block))
+            end do
+          end do
+        end do
       end do
     end do
+    !$omp end parallel do
     call self%count(from, onto)
   end subroutine dense_apply
 

@@ -1,22 +1,13 @@
 !> The procedures of BLAS and LAPACK that the library calls.
 module hc_lapack
+  use, intrinsic :: iso_fortran_env, only: real32
   use hc_precision, only: wp
   implicit none
   private
 
-  public :: dgemv, dposv, dgesv, dgelss
+  public :: dposv, dgesv, dsgesv, dgelss
 
   interface
-    !> y = alpha A x + beta y
-    subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
-      import :: wp
-      implicit none
-      character(len=1), intent(in) :: trans
-      integer, intent(in) :: m, n, lda, incx, incy
-      real(wp), intent(in) :: alpha, beta, a(lda, *), x(*)
-      real(wp), intent(inout) :: y(*)
-    end subroutine dgemv
-
     !> Solve A X = B for a symmetric positive definite A (Cholesky)
     subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
       import :: wp
@@ -35,6 +26,19 @@ module hc_lapack
       real(wp), intent(inout) :: a(lda, *), b(ldb, *)
       integer, intent(out) :: ipiv(*), info
     end subroutine dgesv
+
+    !> Solve A X = B (LU with partial pivoting in single precision, refined to full precision; should that
+    !> fail, LU in full precision)
+    subroutine dsgesv(n, nrhs, a, lda, ipiv, b, ldb, x, ldx, work, swork, iter, info)
+      import :: wp, real32
+      implicit none
+      integer, intent(in) :: n, nrhs, lda, ldb, ldx
+      real(wp), intent(inout) :: a(lda, *)
+      real(wp), intent(in) :: b(ldb, *)
+      real(wp), intent(out) :: x(ldx, *), work(n, *)
+      real(real32), intent(out) :: swork(*)
+      integer, intent(out) :: ipiv(*), iter, info
+    end subroutine dsgesv
 
     !> Solution of A X = B of least norm, of least squares where there is none (singular values)
     subroutine dgelss(m, n, nrhs, a, lda, b, ldb, s, rcond, rank, work, lwork, info)

@@ -223,19 +223,26 @@ contains
     type(lattice_t) :: lattice
     type(dense_flexibility_t) :: dense
     integer, parameter :: n = 3*81
-    real(wp) :: values(n), work(8*n), asymmetry
+    real(wp) :: matrix(n, n), unit(n), column(9, 9, 3), values(n), work(8*n), asymmetry
     real(wp), parameter :: beta(3) = [0.0_wp, 0.5_wp, -0.5_wp], gamma(3) = [1.0_wp, 0.0_wp, 1.0_wp]
-    integer :: i, info
+    integer :: i, k, info
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [-4, -4], [9, 9], error)
     if (allocated(error)) return
     do i = 1, 3
       call new_dense_flexibility(dense, lattice, elastic_pair_t(1.0_wp, beta(i), gamma(i)), error)
       if (allocated(error)) return
-      asymmetry = maxval(abs(dense%matrix - transpose(dense%matrix)))
+      do k = 1, n
+        unit = 0.0_wp
+        unit(k) = 1.0_wp
+        call dense%apply(all_components, reshape(unit, [9, 9, 3]), all_components, column, error)
+        if (allocated(error)) return
+        matrix(:, k) = reshape(column, [n])
+      end do
+      asymmetry = maxval(abs(matrix - transpose(matrix)))
       call check(error, asymmetry, 0.0_wp, 1.0e-13_wp, 'asymmetry')
       if (allocated(error)) return
-      call dsyev('N', 'U', n, dense%matrix, n, values, work, size(work), info)
+      call dsyev('N', 'U', n, matrix, n, values, work, size(work), info)
       call check_true(error, info == 0 .and. minval(values) > 0.01_wp*maxval(values)/sqrt(real(n, wp)), 'positive definite')
       if (allocated(error)) return
     end do

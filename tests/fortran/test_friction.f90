@@ -340,7 +340,8 @@ contains
     type(shear_system_t) :: system
     type(dense_flexibility_t) :: dense
     type(elastic_pair_t) :: pair
-    real(wp) :: angle(n), x(2*n), y(2*n), expected(2*n), plane(n, 2), frame(2*n), answer(2*n), m(2*n, 2*n), scale
+    real(wp) :: angle(n), x(2*n), y(2*n), expected(2*n), plane(n, 2), frame(2*n), answer(2*n), m(2*n, 2*n), scale, &
+                moved(5, 6, 2)
     integer :: i
 
     pair = elastic_pair_t(0.8_wp, 0.2_wp, 0.5_wp)
@@ -363,9 +364,9 @@ contains
     ! frame -> plane by hand: x_t t + x_e e with t = (-e_2, e_1)
     plane(:, 1) = -system%direction(2, :)*x(:n) + system%direction(1, :)*x(n + 1:)
     plane(:, 2) = system%direction(1, :)*x(:n) + system%direction(2, :)*x(n + 1:)
-    associate (t => dense%matrix(n + 1:, n + 1:))
-      answer = matmul(t, reshape(plane, [2*n]))
-    end associate
+    call dense%apply([along_x, along_y], reshape(plane, [5, 6, 2]), [along_x, along_y], moved, error)
+    if (allocated(error)) return
+    answer = reshape(moved, [2*n])
     expected(:n) = -system%direction(2, :)*answer(:n) + system%direction(1, :)*answer(n + 1:) + system%compliance*x(:n)
     expected(n + 1:) = system%direction(1, :)*answer(:n) + system%direction(2, :)*answer(n + 1:)
     do i = 1, 2*n

@@ -4,6 +4,7 @@ module hc_direct_system
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: dsgesv, dgelss
+  use hc_block_solve, only: solve_blocks
   use hc_flexibility_dense, only: dense_flexibility_t
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
   use hc_friction_law, only: normal_to
@@ -20,6 +21,9 @@ module hc_direct_system
   real(wp), parameter :: undetermined = 1.0e-12_wp
   !> Part of a load, relative to the sum of all tractions, that counts as rounding error.
   real(wp), parameter :: carried = 1.0e-8_wp
+
+  character(len=*), parameter :: no_memory = &
+    'not enough memory for the matrix of the contact area: use method "fft"'
 
   !> An iterate; over the nodes of the window.
   type :: iterate_t
@@ -77,11 +81,12 @@ contains
 
     type(driven_motions_t) :: driven
     real(wp), allocatable :: matrix(:, :), rhs(:, :), unknown(:, :), weight(:, :), traction(:, :), resultant(:, :), &
-                             rigid(:, :), direction(:, :), work(:, :)
-    real(real32), allocatable :: single(:)
-    integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), place(:), pivot(:)
+                             rigid(:, :), direction(:, :)
+    real(real32), allocatable :: first(:, :)
+    logical :: solved
+    integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), place(:)
     real(wp) :: load(n_motion)
-    integer :: i, k, n, n_p, n_free, refinements, info, stat
+    integer :: i, k, n, n_p, n_free, stat
 
     contact = pack([(i, i=1, size(it%p))], it%contact)
     stuck = pack(contact, it%zone(contact) == stick)
@@ -93,10 +98,10 @@ contains
     n = size(node)
     n_p = size(contact)
     n_free = size(driven%motion) + merge(1, 0, target%control(normal) == force_control)
-    allocate (matrix(n, n), rhs(n, 0:n_free), unknown(n, 0:n_free), weight(3, n), resultant(n, n_free), pivot(n), &
-              work(n, 0:n_free), single(n*(n + 1 + n_free)), stat=stat)
+    allocate (matrix(n, n), rhs(n, 0:n_free), unknown(n, 0:n_free), weight(3, n), resultant(n, n_free), &
+              first(n_p, n_p), stat=stat)
     if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the matrix of the contact area: use method "fft"')
+      call raise(error, status%resources, no_memory)
       return
     end if
     weight = 0.0_wp
@@ -132,10 +137,13 @@ contains
     do k = n_p + 2*size(stuck) + 1, n
       matrix(k, k) = matrix(k, k) + it%compliance(node(k))/problem%normal_compliance
     end do
-    call dsgesv(n, 1 + n_free, matrix, n, pivot, rhs, n, unknown, n, work, single, refinements, info)
-    if (info /= 0) then
-      call raise(error, status%no_convergence, 'the matrix of the contact area is singular')
-      return
+    do i = 1, n_p
+      first(:, i) = real(flexibility%normal_influence(contact, contact(i))/problem%normal_compliance, real32)
+    end do
+    call solve_blocks(n, n_p, 1 + n_free, first, matrix, rhs, unknown, solved)
+    if (.not. solved) then
+      call solve_whole(matrix, rhs, unknown, error)
+      if (allocated(error)) return
     end if
 
     call fulfil_loads(problem, driven, load(:n_free), resultant, unknown, it, error)
@@ -147,6 +155,30 @@ contains
       it%q(node(k), :) = it%q(node(k), :) + unknown(k, 0)*traction(along_x:, k)
     end do
   end subroutine solve_area
+
+  !> Solve matrix.unknown = rhs by LU.
+  subroutine solve_whole(matrix, rhs, unknown, error)
+    !> Matrix, its factors on return
+    real(wp), intent(inout), contiguous :: matrix(:, :)
+    !> Right-hand sides
+    real(wp), intent(in), contiguous :: rhs(:, :)
+    !> Unknowns
+    real(wp), intent(out), contiguous :: unknown(:, :)
+    !> Allocated on failure: not enough memory, a singular matrix
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: work(size(rhs, 1), size(rhs, 2))
+    real(real32), allocatable :: single(:)
+    integer :: n, refinements, info, stat, pivot(size(matrix, 1))
+
+    n = size(matrix, 1)
+    allocate (single(n*(n + size(rhs, 2))), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, no_memory)
+      return
+    end if
+    call dsgesv(n, size(rhs, 2), matrix, n, pivot, rhs, n, unknown, n, work, single, refinements, info)
+    if (info /= 0) call raise(error, status%no_convergence, 'the matrix of the contact area is singular')
+  end subroutine solve_whole
 
   !> Find the motions whose loads are prescribed from these loads.
   !>

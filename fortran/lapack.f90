@@ -5,9 +5,40 @@ module hc_lapack
   implicit none
   private
 
-  public :: dposv, dgesv, dsgesv, dgelss
+  public :: dgemm, dposv, dgesv, dsgesv, dgelss, spotrf, spotrs
 
   interface
+    !> C = alpha A B + beta C
+    subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+      import :: wp
+      implicit none
+      character(len=1), intent(in) :: transa, transb
+      integer, intent(in) :: m, n, k, lda, ldb, ldc
+      real(wp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
+      real(wp), intent(inout) :: c(ldc, *)
+    end subroutine dgemm
+
+    !> Cholesky factor of a symmetric positive definite A, in single precision
+    subroutine spotrf(uplo, n, a, lda, info)
+      import :: real32
+      implicit none
+      character(len=1), intent(in) :: uplo
+      integer, intent(in) :: n, lda
+      real(real32), intent(inout) :: a(lda, *)
+      integer, intent(out) :: info
+    end subroutine spotrf
+
+    !> Solve A X = B with the factor that spotrf returns
+    subroutine spotrs(uplo, n, nrhs, a, lda, b, ldb, info)
+      import :: real32
+      implicit none
+      character(len=1), intent(in) :: uplo
+      integer, intent(in) :: n, nrhs, lda, ldb
+      real(real32), intent(in) :: a(lda, *)
+      real(real32), intent(inout) :: b(ldb, *)
+      integer, intent(out) :: info
+    end subroutine spotrs
+
     !> Solve A X = B for a symmetric positive definite A (Cholesky)
     subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
       import :: wp

@@ -2,6 +2,7 @@
 !>
 !> E* = 1, R = 1 and P = 4/3 make the contact radius of the sphere 1, its approach 1 and p0 = 2/pi.
 module test_direct_friction
+  use, intrinsic :: iso_fortran_env, only: real32
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
@@ -12,6 +13,7 @@ module test_direct_friction
   use hc_friction_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact, exchange, patience
+  use hc_block_solve, only: solve_blocks
   use hc_direct_friction, only: direct_friction_t, new_direct_friction, ring
   use testing, only: test_t, new_test, check, check_true
   implicit none
@@ -31,6 +33,7 @@ contains
     tests = [ &
       new_test('ring', test_ring), &
       new_test('exchange', test_exchange), &
+      new_test('blocks', test_blocks), &
       new_test('cattaneo_mindlin', test_cattaneo_mindlin), &
       new_test('lubkin', test_lubkin), &
       new_test('dissimilar', test_dissimilar), &
@@ -166,6 +169,49 @@ contains
     call exchange([.false., .true., .false., .false.], fewest, left, active)
     call check(error, left, patience, 'fewer wrong nodes than ever')
   end subroutine test_exchange
+
+  !> Solutions to rounding of any size, none where the coupling is strong, one block alone.
+  subroutine test_blocks(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 60, n_1 = 25
+    real(wp), parameter :: coupling(3) = [0.0_wp, 0.1_wp, 3.0_wp], size_of(3) = [1.0_wp, 1.0e-60_wp, 1.0e60_wp]
+    real(wp) :: base(n, n), matrix(n, n), x(n, 3), unknown(n, 3)
+    real(real32) :: first(n_1, n_1)
+    logical :: solved
+    integer :: i, j
+
+    call random_number(x)
+    do i = 1, n
+      base(:, i) = [(1.0_wp/(1.0_wp + abs(i - j)), j=1, n)]
+    end do
+    x = x*spread(size_of, 1, n)
+    do i = 1, 3
+      matrix = base
+      matrix(:n_1, n_1 + 1:) = coupling(i)*base(:n_1, n_1 + 1:)
+      matrix(n_1 + 1:, :n_1) = 0.7_wp*base(n_1 + 1:, :n_1)
+      matrix(:n_1, 3) = matrix(:n_1, 3) + 0.1_wp*coupling(i)      ! friction makes the first block unsymmetric
+      first = real(base(:n_1, :n_1), real32)
+      call solve_blocks(n, n_1, 3, first, matrix, matmul(matrix, x), unknown, solved)
+      call check_true(error, solved .eqv. (i < 3), 'solved as long as the coupling is weak')
+      if (allocated(error)) return
+      do j = 1, merge(3, 0, solved)
+        call check(error, unknown(:, j), x(:, j), 1.0e-13_wp*size_of(j), 'unknowns')
+        if (allocated(error)) return
+      end do
+    end do
+    ! pressures alone
+    first = real(base(:n_1, :n_1), real32)
+    call solve_blocks(n_1, n_1, 1, first, base(:n_1, :n_1), matmul(base(:n_1, :n_1), x(:n_1, :1)), unknown(:n_1, :1), solved)
+    call check_true(error, solved, 'one block')
+    if (allocated(error)) return
+    call check(error, unknown(:n_1, 1), x(:n_1, 1), 1.0e-13_wp, 'one block')
+    if (allocated(error)) return
+    ! a slip node that carries nothing, with a compliance beyond single precision
+    matrix(n, n) = 1.0e50_wp
+    first = real(base(:n_1, :n_1), real32)
+    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call check_true(error, .not. solved, 'too large for single precision')
+  end subroutine test_blocks
 
   !> gamma = 0: c/a = (1 - Q/muP)^(1/3), shift = (3 mu P S/16 a) [1 - (1 - Q/muP)^(2/3)], S = 4 for E* = 1.
   !>

@@ -22,7 +22,7 @@ module hc_direct_contact
   !> Exchanges of whole sets that may fail to lower the number of wrong nodes.
   integer, parameter :: patience = 10
 
-  !> A frictionless contact problem with its explicit matrix.
+  !> A frictionless contact problem with its flexibility.
   type :: direct_contact_t
     private
     type(dense_flexibility_t) :: flexibility
@@ -39,7 +39,7 @@ module hc_direct_contact
 
 contains
 
-  !> Matrix of a problem.
+  !> Flexibility of a problem.
   subroutine new_direct_contact(self, lattice, pair, initial_gap, candidate, error)
     !> Problem to be set up
     type(direct_contact_t), intent(out) :: self

@@ -37,7 +37,7 @@ module hc_direct_friction
   !> Traction, relative to its largest bound, that no step towards a solution leads to.
   real(wp), parameter :: beyond_reason = 5.0_wp
 
-  !> A contact problem with friction and its explicit matrix.
+  !> A contact problem with friction and its flexibility.
   type, extends(friction_solver_t) :: direct_friction_t
     private
     type(dense_flexibility_t) :: flexibility
@@ -48,7 +48,7 @@ module hc_direct_friction
 
 contains
 
-  !> Matrix of a problem.
+  !> Flexibility of a problem.
   subroutine new_direct_friction(self, problem, error)
     !> Solver to be set up
     type(direct_friction_t), intent(out) :: self

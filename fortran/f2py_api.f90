@@ -61,7 +61,7 @@ contains
 
   !> Bytes that a frictionless problem, or an operator, takes.
   subroutine memory_needed(method, extent, operator_only, n_threads, bytes)
-    !> 0: explicit matrix and LAPACK, else FFT
+    !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Number of columns and rows of the window
     integer(c_int), intent(in) :: extent(2)
@@ -83,7 +83,7 @@ contains
 
   !> A flexibility operator over a window.
   subroutine create_operator(method, basis, extent, lambda, n_threads, handle, code, message)
-    !> 0: explicit matrix, else FFT
+    !> 0: direct summation, else FFT
     integer(c_int), intent(in) :: method
     !> Basis vectors as columns [m]
     real(c_double), intent(in) :: basis(2, 2)
@@ -159,7 +159,7 @@ contains
   !> A frictionless contact problem.
   subroutine create_normal_contact(method, basis, first, extent, lambda, n_node, initial_gap, candidate, n_threads, &
                                    handle, code, message)
-    !> 0: explicit matrix and LAPACK, else FFT
+    !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Basis vectors as columns [m]
     real(c_double), intent(in) :: basis(2, 2)

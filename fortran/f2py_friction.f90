@@ -31,7 +31,7 @@ contains
 
   !> Bytes that a problem takes.
   subroutine friction_memory_needed(method, extent, n_threads, bytes)
-    !> 0: explicit matrix and LAPACK, else FFT
+    !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Number of columns and rows of the window
     integer(c_int), intent(in) :: extent(2)
@@ -50,7 +50,7 @@ contains
   !> A contact problem with friction.
   subroutine create_frictional_contact(method, basis, first, extent, origin, lambda, n_node, initial_gap, candidate, &
                                        coefficient, goodman, n_threads, handle, code, message)
-    !> 0: explicit matrix and LAPACK, else FFT
+    !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Basis vectors as columns [m]
     real(c_double), intent(in) :: basis(2, 2)

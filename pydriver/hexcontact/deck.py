@@ -143,7 +143,7 @@ class Solver(Table):
     method: Annotated[str, Word(METHODS)] = Field(
         "auto",
         description=(
-            "direct: LAPACK on the full matrix; fft: matrix-free; "
+            "direct: LAPACK on the matrix of the contact; fft: matrix-free; "
             "auto: fft, but direct on a small window without friction"
         ),
     )

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from .closed_forms import ClosedForms
 from .plotting_compliance import compliance
-from .plotting_history import draw_history, history, loop, torsion
+from .plotting_history import draw_history, fitted, history, loop, torsion
 from .plotting_maps import draw_field, field_map, outline, set_plane, widened
 from .plotting_sections import Cut, draw_section, draw_shear, section, tractions
 from .plotting_style import EXACT, STYLE, legend_below, new_figure, set_title
@@ -132,7 +132,7 @@ def _frictional(dataset: xarray.Dataset, view: StepView) -> Figure:
     below = lower.subplots(1, 3 if several else 1)
     draw_shear(below[0] if several else below, view, exact, Cut.of([view], 0.0, None))
     if several:
-        draw_history(below[1], dataset, ("contact_area", "stick_area"))
+        draw_history(below[1], dataset, fitted(dataset, ("contact_area", "stick_area")))
         draw_history(below[2], dataset, ("max_pressure",))
         for axes in below[1:]:
             axes.axvline(view.number, color="0.8", lw=3.0, zorder=0)

@@ -79,7 +79,13 @@ def panels_of(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
         return beside == name or _largest(dataset, [name]) > _TINY * scale
 
     panels = (tuple(filter(shown, names)) for names in (HISTORY if "stick_area" in known else FRICTIONLESS))
-    return [names for names in panels if names]
+    return [fitted(dataset, names) for names in panels if names]
+
+
+def fitted(dataset: xarray.Dataset, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of areas or radii to the edge between the nodes, where the result has them all."""
+    fits = tuple(f"{name}_fit" for name in names)
+    return fits if all(name in dataset for name in fits) else names
 
 
 def history(
@@ -152,7 +158,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
 
 
 def _titled(name: str, unit: str) -> str:
-    return name.replace("_", " ") + (f" ({unit})" if unit else "")
+    return name.removesuffix("_fit").replace("_", " ") + (f" ({unit})" if unit else "")
 
 
 def _common(names: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from . import estimators
 from .closed_forms import ClosedForms, PartialSlip
+from .edges import ContactEdges, Edge
 from .plotting_maps import (
     FEWER_ARROWS,
     draw_arrows,
@@ -309,6 +310,10 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
         for nodes, color, label in groups:
             axes.plot(x[nodes], y[nodes], ms=inside_size, **{**dot, "mfc": color, "mew": 0}, label=label)
         axes.plot(x[rim], y[rim], ms=max(0.45 * pitch, 1.0), color="black", label="boundary node", **dot)
+        if (edge := _edge_of(view)) is not None:
+            pieces = LineCollection(cast(Any, edge.segments * to_length), colors="black", linewidths=0.9)
+            pieces.set_label(f"edge, $\\sqrt{{A/\\pi}}$ = {worded(edge.radius, 'm')}")
+            axes.add_collection(pieces)
         fitted, words = _fitted(view, view.contact, "a", view.center)
         plain: dict[str, Any] = {"linestyle": "-", "color": COMPUTED if stick is None else "black"}
         outline(axes, fitted, fitted.center, to_length, label=f"fitted {words}", **plain)
@@ -326,6 +331,16 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
             cast(Line2D, handle).set_markersize(4.0)
         set_title(figure, view.title)
         return figure
+
+
+def _edge_of(view: StepView) -> Edge | None:
+    """Return the edge of the contact between the nodes, None if the gap was not kept."""
+    try:
+        gap = view.field("gap")
+    except ValueError:
+        return None
+    start = float(view.x[0, 0]), float(view.y[0, 0])
+    return ContactEdges(view.pressure, gap, view.contact, np.isfinite(gap), view.basis, start).contact()
 
 
 def _fitted(

@@ -187,10 +187,16 @@ def load_or_motion(name: str, history: Mapping[str, Any]) -> str:
     return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, LOADS_AND_MOTIONS[name][1])
 
 
+def fitted(name: str, history: Mapping[str, Any]) -> float:
+    """Return an area or radius to the edge between the nodes; as its nodes have it where no fit was kept."""
+    value = float(history.get(f"{name}_fit", math.nan))
+    return float(history[name]) if math.isnan(value) else value
+
+
 def stick_share(history: Mapping[str, Any]) -> str:
     """Write how much of the contact area sticks."""
-    area = history["contact_area"]
-    return f"{100 * history['stick_area'] / area:.1f} %" if area else "-"
+    area = fitted("contact_area", history)
+    return f"{100 * fitted('stick_area', history) / area:.1f} %" if area else "-"
 
 
 def residuals(history: Mapping[str, Any]) -> dict[str, float]:
@@ -214,7 +220,7 @@ def describe(history: Mapping[str, Any], short: bool = False) -> str:
     else:
         parts.append(f"p_max {quantity(history['max_pressure'], 'Pa')}")
         if not short:
-            parts.append(f"radius {quantity(history['contact_radius'], 'm')}")
+            parts.append(f"radius {quantity(fitted('contact_radius', history), 'm')}")
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
     if not short:
         parts.append(quantity(history["seconds"], "s", 3))

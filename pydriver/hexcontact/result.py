@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _COORDINATES = ("step", "row", "col", "x", "y")
 _TOLD = (  # of the last step when a result is printed
     *("normal_load", "tangential_load_x", "tangential_load_y", "approach", "shift_x", "shift_y"),
-    *("contact_radius", "stick_radius", "max_pressure", "residual_normal", "residual_tangential"),
+    *("contact_radius_fit", "stick_radius_fit", "max_pressure", "residual_normal", "residual_tangential"),
 )
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import HexcontactError
 from .progress import (
     LOADS_AND_MOTIONS,
+    fitted,
     is_frictional,
     load_or_motion,
     quantity,
@@ -35,6 +36,7 @@ _FURTHER = {  # shown of a load step besides loads and motions
     "max_pressure": "Pa",
     "max_traction": "Pa",
     "contact_radius": "m",
+    "stick_radius": "m",
     "elastic_energy": "J",
     "dissipated_energy": "J",
 }
@@ -160,7 +162,9 @@ def step_rows(history: History) -> list[Row]:
     """Return what a load step came to, with its residuals."""
     rows = [(_words(name), load_or_motion(name, history)) for name in worth_showing([history])]
     rows += [
-        (_words(name), quantity(history[name], unit)) for name, unit in _FURTHER.items() if name in history
+        (_words(name), quantity(fitted(name, history), unit))
+        for name, unit in _FURTHER.items()
+        if name in history
     ]
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
@@ -205,7 +209,7 @@ def history_table(histories: Sequence[History], console: Console) -> Table:
         columns["stick"] = stick_share
     else:
         columns["p_max"] = lambda h: quantity(h["max_pressure"], "Pa")
-        columns["radius"] = lambda h: quantity(h["contact_radius"], "m")
+        columns["radius"] = lambda h: quantity(fitted("contact_radius", h), "m")
     columns["residual"] = lambda h: f"{max(residuals(h).values(), default=math.nan):.1e}"
     columns["time"] = lambda h: quantity(h["seconds"], "s", 3)
     for spare in ("", "time", "label", "residual"):
@@ -255,7 +259,7 @@ def hertz_rows(case: Case, history: History) -> list[Row]:
     compared = [
         ("max pressure", hertz.max_pressure, history["max_pressure"], "Pa"),
         ("approach", hertz.approach, history["approach"], "m"),
-        ("contact radius (pressure at the edge)", radius, history.get("contact_radius_fit", math.nan), "m"),
+        ("contact radius (to the edge)", radius, history.get("contact_radius_fit", math.nan), "m"),
         ("contact radius (area of the nodes)", radius, history["contact_radius"], "m"),
     ]
     return [

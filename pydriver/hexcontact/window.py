@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -16,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import memory
+from .edges import ContactEdges
 from .errors import DeckError
-from .estimators import area_radius, edge_radius, pressure_center
+from .estimators import area_radius, pressure_center
 from .grid import rim_sides
 from .messages import listed
 from .result import Step
@@ -36,7 +36,6 @@ DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"
 S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
-_CIRCULAR = 0.99  # least ratio of the axes of a contact that counts as circular
 
 
 # --- memory ---------------------------------------------------------------------------------------
@@ -160,7 +159,7 @@ class Window(ABC, Generic[S]):
         """Return the fields of a step beyond initial gap, pressure, gap and zone."""
 
     @abstractmethod
-    def _more_history(self, solution: S, before: S | None) -> dict[str, float]:
+    def _more_history(self, solution: S, before: S | None, edges: ContactEdges) -> dict[str, float]:
         """Return what has one value by step beyond load, approach and contact area."""
 
     def outgrown(self, solution: S) -> bool:
@@ -209,9 +208,12 @@ class Window(ABC, Generic[S]):
             if wanted:
                 moved = self._displacement(body, fields)
                 fields |= {name: moved[name[-1]] for name in wanted}
+        edges = ContactEdges(
+            solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
+        )
         history: dict[str, float | int | str] = {
-            **self._contact_measures(solution),
-            **self._more_history(solution, before),
+            **self._contact_measures(solution, edges),
+            **self._more_history(solution, before, edges),
             "segment": target.segment + 1,
             "label": target.label,
             "seconds": time.perf_counter() - started,
@@ -223,16 +225,17 @@ class Window(ABC, Generic[S]):
         with np.errstate(invalid="ignore"):  # inf - NaN there
             return np.asarray(solution.gap - self.initial_gap + solution.approach)
 
-    def _contact_measures(self, solution: S) -> dict[str, float]:
+    def _contact_measures(self, solution: S, edges: ContactEdges) -> dict[str, float]:
         """Return load, approach and the size of the contact."""
-        x, y = self.lattice.x, self.lattice.y
-        inside, center = solution.zone > 0, pressure_center(x, y, solution.pressure)
+        inside, edge = solution.zone > 0, edges.contact()
+        center = pressure_center(self.lattice.x, self.lattice.y, solution.pressure)
         return {
             "normal_load": solution.normal_load,
             "approach": solution.approach,
             "contact_area": self.lattice.cell_area * int(inside.sum()),
             "contact_radius": area_radius(inside, self.lattice.cell_area),
-            "contact_radius_fit": _edge_radius(x, y, solution.pressure, self.lattice.spacing, center),
+            "contact_area_fit": edge.area,
+            "contact_radius_fit": edge.radius,
             "pressure_center_x": center[0],
             "pressure_center_y": center[1],
             "max_pressure": float(solution.pressure.max()),
@@ -258,18 +261,6 @@ class Window(ABC, Generic[S]):
             z = operator.apply(pressure)[0]  # in this approximation shear does not move the surfaces along z
         sign = 1.0 if number == 1 else -1.0
         return {"x": sign * x, "y": sign * y, "z": z}
-
-
-def _edge_radius(x: Array, y: Array, pressure: Array, spacing: float, center: tuple[float, float]) -> float:
-    """Return the radius at which the pressure of a circular contact vanishes, NaN if it is not circular."""
-    loaded = pressure > 0
-    if not loaded.any():
-        return math.nan
-    points = np.stack([x[loaded], y[loaded]])
-    small, large = np.linalg.eigvalsh(np.cov(points, aweights=pressure[loaded], bias=True))
-    if small < _CIRCULAR**2 * large:
-        return math.nan
-    return edge_radius(x, y, pressure, spacing, center)
 
 
 class NormalWindow(Window["NormalSolution"]):
@@ -313,7 +304,9 @@ class NormalWindow(Window["NormalSolution"]):
     def _more_fields(self, solution: NormalSolution) -> dict[str, NDArray[Any]]:
         return {}
 
-    def _more_history(self, solution: NormalSolution, before: NormalSolution | None) -> dict[str, float]:
+    def _more_history(
+        self, solution: NormalSolution, before: NormalSolution | None, edges: ContactEdges
+    ) -> dict[str, float]:
         inside = solution.zone > 0
         work = float(solution.pressure[inside] @ self.closing(solution)[inside])
         return {

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .edges import ContactEdges
 from .estimators import area_radius
 from .load_history import LoadStep
 from .messages import listed
@@ -82,12 +83,14 @@ class FrictionWindow(Window["ContactState"]):
         known = ("pressure", "gap", "zone")
         return {name: getattr(solution, name) for name in self.state if name not in known}
 
-    def _more_history(self, solution: ContactState, before: ContactState | None) -> dict[str, float]:
+    def _more_history(
+        self, solution: ContactState, before: ContactState | None, edges: ContactEdges
+    ) -> dict[str, float]:
         static = self.case.solver.algorithm == "static"  # nothing has gone before
         spent_before = 0.0 if before is None or static else before.dissipated_energy
         return {
             **{name: getattr(solution, name) for name in (*_SCALARS, *RESIDUALS.values())},
-            **self._stick_measures(solution.zone == 1),
+            **self._stick_measures(solution, edges),
             "max_traction": float(np.hypot(solution.traction_x, solution.traction_y).max()),
             "dissipated_energy_step": solution.dissipated_energy - spent_before,
             "elastic_energy": self._elastic_energy(solution),
@@ -95,13 +98,20 @@ class FrictionWindow(Window["ContactState"]):
             "cuts": solution.cuts,
         }
 
-    def _stick_measures(self, stick: NDArray[np.bool_]) -> dict[str, float]:
+    def _stick_measures(self, solution: ContactState, edges: ContactEdges) -> dict[str, float]:
         """Return size and place of the stick zone; NaN for its place where there is none."""
+        stick, mu = solution.zone == 1, self.case.friction_coefficient
+        reserve = np.zeros(stick.shape)  # not looked at where nothing slips
+        if math.isfinite(mu):
+            reserve = mu * solution.pressure - np.hypot(solution.traction_x, solution.traction_y)
+        edge = edges.stick(stick, reserve)
         x, y = self.lattice.x[stick], self.lattice.y[stick]
         some = x.size > 0
         return {
             "stick_area": self.lattice.cell_area * x.size,
             "stick_radius": area_radius(stick, self.lattice.cell_area),
+            "stick_area_fit": edge.area,
+            "stick_radius_fit": edge.radius,
             "stick_center_x": float(x.mean()) if some else math.nan,
             "stick_center_y": float(y.mean()) if some else math.nan,
             "stick_min_x": float(x.min()) if some else math.nan,

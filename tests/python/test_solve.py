@@ -49,7 +49,7 @@ def test_a_step_holds_what_the_solution_says() -> None:
     assert history["max_pressure"] == pytest.approx(hertz.max_pressure, rel=2e-3)
     assert history["approach"] == pytest.approx(hertz.approach, rel=1e-3)
     assert history["contact_radius"] == pytest.approx(hertz.contact_radius, abs=0.5 * lattice.spacing)
-    assert history["contact_radius_fit"] == pytest.approx(hertz.contact_radius, abs=0.06 * lattice.spacing)
+    assert history["contact_radius_fit"] == pytest.approx(hertz.contact_radius, abs=0.03 * lattice.spacing)
     # U = integral of P d(approach) = (2/5) P approach for a sphere
     assert history["elastic_energy"] == pytest.approx(0.4 * 100.0 * float(history["approach"]), rel=5e-3)
     # ... and exactly half the work of the pressure on the elastic closing, gap - initial gap + approach
@@ -144,7 +144,7 @@ def test_the_load_may_return_to_zero_and_come_back() -> None:
     assert_array_equal(result.zone.values[2], 0)
     assert float(result.elastic_energy[2]) == 0.0
     assert float(result.contact_area[2]) == 0.0
-    assert math.isnan(float(result.contact_radius_fit[2]))
+    assert float(result.contact_radius_fit[2]) == 0.0
     p_max = float(result.max_pressure[0])
     assert_allclose(result.pressure.values[3], result.pressure.values[0], rtol=0, atol=1e-7 * p_max)
 

@@ -100,6 +100,7 @@ class ContactEdges:
         band = self._band = _Band(contact)
         inside = band.take(contact)
         opened = band.take(candidate) & ~inside
+        self._pressure = pressure
         within = _distances(band, inside, band.take(pressure) ** 2) + _INWARD
         gap_there = np.where(opened, band.take(gap), 0.0)
         beyond = _distances(band, opened, np.cbrt(gap_there**2)) - _INWARD
@@ -108,6 +109,27 @@ class ContactEdges:
     def contact(self) -> Edge:
         """Return the contact area."""
         return self._edge(self._contact, self._band, self._distance)
+
+    def squares(self) -> Array:
+        """Return squares of the pressure (Pa^2) that are good to interpolate linearly, shape (n_row, n_col).
+
+        At nodes in contact the layer of the lattice next to the edge is taken off; beyond the edge the
+        squares go on below zero. They are NaN away from the edge, and where nothing is known about it.
+        """
+        band = self._band
+        inside = band.take(self._contact)
+        square = band.take(self._pressure) ** 2
+        away, slope, inward = _layered_distances(band, inside, square)
+        # under the rim of a punch the pressure rises towards the edge
+        outside = ~band.around(inside)
+        rises = np.where((outside @ _TO * inward).sum(axis=1) > 0.0, 1.0, 0.0)
+        rises = band.spread(np.where(inside & outside.any(axis=1), rises, np.nan))
+        slope = np.where(rises < 0.5, slope, np.nan)
+        within = np.where(away < _SQUARE[-1], slope * away, square)
+        beyond = np.where(band.take(self._candidate), slope * self._distance, np.nan)
+        squares = np.full(self._contact.shape, np.nan)
+        band.put(np.where(inside, np.where(np.isnan(slope), np.nan, within), beyond), squares)
+        return squares
 
     def stick(self, stick: Mask, reserve: Array) -> Edge:
         """Return the part of the contact area that sticks.
@@ -124,7 +146,7 @@ class ContactEdges:
         inside = band.take(stick)
         contact = band.take(self._contact)
         square = np.where(inside, band.take(reserve), 0.0) ** 2
-        within, inward = _layered_distances(band, inside, square)
+        within, _, inward = _layered_distances(band, inside, square)
         # Slip tells little about the distance, since its power depends on how far the edge moved in the step;
         # so nodes outside get theirs from those inside.
         seen = band.around(within) - np.einsum("nkc,kc->nk", band.around(inward), _TO)
@@ -174,7 +196,6 @@ class _Band:
     MARGIN = _FAR + 2
 
     def __init__(self, zone: Mask) -> None:
-        self._shape = zone.shape
         self.n_col = zone.shape[1] + 2 * self.MARGIN
         steps: Index = _STEPS @ np.array([self.n_col, 1])
         row, col = np.nonzero(boundary(zone))
@@ -182,6 +203,10 @@ class _Band:
         for _ in range(_FAR + 1):
             self.nodes = np.unique(np.concatenate([self.nodes, (self.nodes[:, None] + steps).ravel()]))
         self._beside = self.place(self.nodes[:, None] + steps)
+        row, col = np.divmod(self.nodes, self.n_col)
+        row, col = row - self.MARGIN, col - self.MARGIN
+        self._known = (row >= 0) & (row < zone.shape[0]) & (col >= 0) & (col < zone.shape[1])
+        self._at = row[self._known], col[self._known]
 
     def place(self, nodes: Index) -> Index:
         """Return where nodes are in the band; its length for nodes that are not in it."""
@@ -192,13 +217,13 @@ class _Band:
 
     def take(self, field: NDArray[Any]) -> NDArray[Any]:
         """Return a field at the nodes of the band; 0 outside the window."""
-        row, col = np.divmod(self.nodes, self.n_col)
-        row, col = row - self.MARGIN, col - self.MARGIN
-        n_row, n_col = self._shape
-        known = (row >= 0) & (row < n_row) & (col >= 0) & (col < n_col)
         values = np.zeros(self.nodes.size, dtype=field.dtype)
-        values[known] = field[row[known], col[known]]
+        values[self._known] = field[self._at]
         return values
+
+    def put(self, values: Array, field: Array) -> None:
+        """Set a field at the nodes of the band."""
+        field[self._at] = values[self._known]
 
     def around(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the values at the six neighbors, shape (n, 6, ...); NaN or False outside the band."""
@@ -228,8 +253,8 @@ def _distances(band: _Band, zone: Mask, values: Array) -> Array:
     return np.where(np.isnan(away), _HALF_WAY, away)
 
 
-def _layered_distances(band: _Band, zone: Mask, square: Array) -> tuple[Array, Array]:
-    """Distances from the edge from one side only, and the direction inwards; NaN where there is no slope.
+def _layered_distances(band: _Band, zone: Mask, square: Array) -> tuple[Array, Array, Array]:
+    """Distances from the edge from one side only, slope at the edge, direction inwards; NaN if unknown.
 
     The layer at the edge is taken off first, with the slope further inside. The slope at the edge itself then
     follows from those of the parabola that the squares are along the normal n: k^2 = S'^2 - 2 S S".
@@ -250,7 +275,7 @@ def _layered_distances(band: _Band, zone: Mask, square: Array) -> tuple[Array, A
     known = np.where(whole[:, None], np.column_stack([at_edge, inward]), np.nan)
     slope, inward = np.split(band.spread(known), [1], axis=1)
     inward = inward / np.hypot(*inward.T)[:, None]
-    return _calibrated(_quotient(square, slope[:, 0])), inward
+    return _calibrated(_quotient(square, slope[:, 0])), slope[:, 0], inward
 
 
 def _calibrated(square: Array) -> Array:

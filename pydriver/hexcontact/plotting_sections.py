@@ -183,7 +183,13 @@ def draw_section(figure: FigureBase, view: StepView, angle: float, through: Poin
         axes.plot((cut.origin + cut.fine) * to_length, exact, label=name, **cut.beside(EXACT))
         apart = 100 * (p - hertz_on(view, cut, cut.place)) / view.hertz.max_pressure
         bottom.axhline(0.0, color=GUIDE, lw=0.7)
-        bottom.plot(place, apart, "o-" if few else "-", ms=2.5, lw=0.7, color=COMPUTED)
+        bottom.plot(place, apart, "o-" if few else "-", ms=2.5, lw=0.7, color=COMPUTED, label="as solved")
+        if view.pressure_field is not None:
+            to_edge = view.pressure_field(*cut.points) - hertz_on(view, cut, cut.place)
+            style: dict[str, Any] = {"color": THIRD, "marker": "s" if few else "", "mfc": "none", "ms": 3.5}
+            apart = 100 * to_edge / view.hertz.max_pressure
+            bottom.plot(place, apart, lw=0.7, label="to the edge", **style)
+            bottom.legend(fontsize=8, ncols=2, loc="lower center", handlelength=1.2)
         bottom.set_ylabel(f"{'error' if view.hertz_holds else 'difference'}\n(% of $p_0$)")
         axes.tick_params(labelbottom=False)
         axes.legend(loc="lower center")

@@ -339,8 +339,7 @@ def _edge_of(view: StepView) -> Edge | None:
         gap = view.field("gap")
     except ValueError:
         return None
-    start = float(view.x[0, 0]), float(view.y[0, 0])
-    return ContactEdges(view.pressure, gap, view.contact, np.isfinite(gap), view.basis, start).contact()
+    return ContactEdges(view.pressure, gap, view.contact, np.isfinite(gap), view.basis, view.start).contact()
 
 
 def _fitted(

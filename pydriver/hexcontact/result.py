@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import xarray
 
     from .lattice import Lattice
+    from .pressure_field import PressureField
 
 _COORDINATES = ("step", "row", "col", "x", "y")
 _TOLD = (  # of the last step when a result is printed
@@ -394,6 +395,36 @@ class Result:
         if number in numbers:
             return self.dataset.sel(step=number)
         raise IndexError(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
+
+    def pressure_field(self, number: int = -1) -> PressureField:
+        """Return the pressure of a load step at any point, a function of x and y (m).
+
+        It goes to zero like a square root at the edge of the contact, which runs between the nodes; the mean
+        error against Hertz is a fourth or a fifth of that of the nodal pressures joined linearly.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, the first is 1; -1 is the last one.
+
+        Raises
+        ------
+        IndexError
+            If there is no such step.
+        ValueError
+            If pressure or gap of the step were not kept.
+        """
+        from .pressure_field import PressureField
+
+        data = self.step(number)
+        for name in ("pressure", "gap"):
+            if name not in data or not np.isfinite(data[name].values).any():
+                raise ValueError(
+                    f"the {name} of step {int(data['step'])} was not kept (output.fields, output.every)"
+                )
+        lattice = self.lattice
+        start = float(lattice.x[0, 0]), float(lattice.y[0, 0])
+        return PressureField(data["pressure"].values, data["gap"].values, lattice.basis, start)
 
     @property
     def history(self) -> pandas.DataFrame:

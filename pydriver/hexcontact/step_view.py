@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from .pressure_field import PressureField, linear
 from .result import Result
 from .variables import NOT_KEPT
 
@@ -187,21 +189,20 @@ class StepView:
 
         It is linear on the triangles of the lattice as in the solution, and 0 outside the window.
         """
-        origin = np.array([self.x[0, 0], self.y[0, 0]])
-        points = np.stack([np.ravel(x), np.ravel(y)], axis=1) - origin
-        col, row = np.linalg.solve(self.basis.T, points.T)
-        col, row = np.round(col, 9), np.round(row, 9)  # a node is a node
-        i, j = np.floor(col).astype(int), np.floor(row).astype(int)
-        u, v = col - i, row - j
-        padded = np.pad(self.pressure if values is None else values, 1)
+        return linear(self.pressure if values is None else values, self.basis, self.start, x, y)
 
-        def node(dj: int, di: int) -> Array:
-            n_row, n_col = padded.shape
-            return padded[np.clip(j + dj + 1, 0, n_row - 1), np.clip(i + di + 1, 0, n_col - 1)]
+    @property
+    def start(self) -> tuple[float, float]:
+        """Position of the first node of the window, m."""
+        return float(self.x[0, 0]), float(self.y[0, 0])
 
-        lower = (1 - u - v) * node(0, 0) + u * node(0, 1) + v * node(1, 0)
-        upper = (u + v - 1) * node(1, 1) + (1 - v) * node(0, 1) + (1 - u) * node(1, 0)
-        return np.asarray(np.where(u + v <= 1, lower, upper).reshape(np.shape(x)))
+    @functools.cached_property
+    def pressure_field(self) -> PressureField | None:
+        """Pressure at any point, to the edge between the nodes; None if the gap was not kept."""
+        try:
+            return PressureField(self.pressure, self.field("gap"), self.basis, self.start)
+        except ValueError:
+            return None
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
         """Limits of a picture of the contact: x_min, x_max, y_min, y_max."""

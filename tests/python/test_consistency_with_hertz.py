@@ -187,3 +187,20 @@ def test_flat_punch() -> None:
     part = r < 0.8 * radius
     np.testing.assert_allclose(p[part], punch.pressure(r[part]), rtol=0.01)
     assert ((p > 0) == (r <= 1e-3 * (1 + 1e-12))).all()
+
+
+@pytest.mark.parametrize("ratio", [1.0, 4.0])
+def test_the_error_of_the_approach_is_known(ratio: float) -> None:
+    """It is -l_e^2 (1/R_x + 1/R_y)/32 in the mean over places on the lattice (theory page, section 12)."""
+    e_star = modulus(STEEL, RIGID)
+    hertz = analytic.hertz_ellipse(e_star, np.diag([1 / (0.02 * ratio), 1 / 0.02]), normal_load=50.0)
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(10):
+        spacing = hertz.semi_minor / rng.uniform(10, 20)
+        surface = Paraboloid(radius_x=0.02 * ratio, radius_y=0.02, offset=tuple(rng.uniform(0, spacing, 2)))
+        case = Case(body_1={**STEEL, "surface": surface}, body_2=RIGID, spacing=spacing, normal_load=50.0)
+        error = float(case.run().step(-1).approach) - hertz.approach
+        found.append(32 * error / (spacing**2 * (1 / ratio + 1) / 0.02))
+    assert np.mean(found) == pytest.approx(-0.96, abs=0.08)
+    assert np.std(found) < 0.1

@@ -10,6 +10,7 @@ Lattice arrays have shape (n_row, n_col). Distances are in spacings, positive in
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,11 +120,11 @@ class ContactEdges:
         band = self._band
         inside = band.take(self._contact)
         square = band.take(self._pressure) ** 2
-        away, slope, inward = _layered_distances(band, inside, square)
+        away, slope, inward_x, inward_y = _layered_distances(band, inside, square)
         # under the rim of a punch the pressure rises towards the edge
-        outside = ~band.around(inside)
-        rises = np.where((outside @ _TO * inward).sum(axis=1) > 0.0, 1.0, 0.0)
-        rises = band.spread(np.where(inside & outside.any(axis=1), rises, np.nan))
+        to_inside_x, to_inside_y = band.gradient(inside.astype(float))
+        rises = np.where(to_inside_x * inward_x + to_inside_y * inward_y < 0.0, 1.0, 0.0)
+        rises = band.spread(np.where(inside & band.next_to(~inside), rises, np.nan))
         slope = np.where(rises < 0.5, slope, np.nan)
         within = np.where(away < _SQUARE[-1], slope * away, square)
         beyond = np.where(band.take(self._candidate), slope * self._distance, np.nan)
@@ -146,78 +147,94 @@ class ContactEdges:
         inside = band.take(stick)
         contact = band.take(self._contact)
         square = np.where(inside, band.take(reserve), 0.0) ** 2
-        within, _, inward = _layered_distances(band, inside, square)
+        within, _, inward_x, inward_y = _layered_distances(band, inside, square)
         # Slip tells little about the distance, since its power depends on how far the edge moved in the step;
         # so nodes outside get theirs from those inside.
-        seen = band.around(within) - np.einsum("nkc,kc->nk", band.around(inward), _TO)
-        beyond = _mean(np.where(band.around(inside), seen, np.nan))
-        distance = np.where(inside, np.maximum(within, _LEAST), np.minimum(beyond, 0.0))
+        seen = (
+            np.where(near, away - (to_x * x + to_y * y), np.nan)
+            for near, away, x, y, (to_x, to_y) in zip(
+                *map(band.neighbors, (inside, within, inward_x, inward_y)), _TO, strict=True
+            )
+        )
+        distance = np.where(inside, np.maximum(within, _LEAST), np.minimum(band.mean(seen), 0.0))
         distance = np.where(np.isnan(distance), np.where(inside, _HALF_WAY, -_HALF_WAY), distance)
         # where the stick area reaches the edge of the contact, that is its edge
         slipping = contact & ~inside
-        distance[~slipping & ~(inside & band.around(slipping).any(axis=1))] = np.inf
-        of_contact = np.append(self._distance, np.inf)[self._band.place(band.nodes)]
+        distance[~slipping & ~(inside & band.next_to(slipping))] = np.inf
+        of_contact = band.values_of(self._band, self._distance, np.inf)
         return self._edge(stick, band, np.minimum(distance, of_contact))
 
     def _edge(self, zone: Mask, band: _Band, distance: Array) -> Edge:
         """Cut the triangles at the edge of a zone where the distance, linear between the nodes, is zero."""
         count = np.pad(zone, 1).astype(np.int8)
-        n_col = count.shape[1]
         sides = count[:-1, 1:] + count[1:, :-1]
-        whole, cut = 0, []
-        for corner, third in ((count[:-1, :-1], 0), (count[1:, 1:], n_col + 1)):
+        covered, segments = 0.0, []
+        for corner, third in ((count[:-1, :-1], 0), (count[1:, 1:], 1)):  # lower and upper triangles
             inside = corner + sides
-            whole += int(np.count_nonzero(inside == 3))
             row, col = np.nonzero((inside == 1) | (inside == 2))
-            first = row * n_col + col
-            cut.append(np.stack([first + third, first + 1, first + n_col], axis=1))
-        row, col = np.divmod(np.concatenate(cut), n_col)
-        at = band.place((row + _Band.MARGIN - 1) * band.n_col + col + _Band.MARGIN - 1)
-        points = self._start + np.stack([col - 1.0, row - 1.0], axis=-1) @ self._basis
+            corners = np.array([[third, 0, 1], [third, 1, 0]])[:, None] - 1  # less the padding
+            share, ends = self._cut(row[:, None] + corners[0], col[:, None] + corners[1], band, distance)
+            covered += int(np.count_nonzero(inside == 3)) + float(share.sum())
+            segments.append(ends)
+        (a, b), (c, d) = self._basis.tolist()
+        return Edge(0.5 * (a * d - b * c) * covered, np.concatenate(segments))
+
+    def _cut(self, row: Index, col: Index, band: _Band, distance: Array) -> tuple[Array, Array]:
+        """Return what share of triangles is inside, and the pieces of the edge; nodes of shape (n, 3)."""
+        at = band.place(row, col)
         signed = distance[at]
         inside = signed > 0.0
         touchable = band.take(self._candidate)[at].all(axis=1)
         # the corner that is on its own side goes first
         alone = np.where(inside.sum(axis=1) == 1, inside.argmax(axis=1), (~inside).argmax(axis=1))
         order = (alone[:, None] + np.arange(3)) % 3
-        signed, points = np.take_along_axis(signed, order, 1), np.take_along_axis(points, order[..., None], 1)
+        signed = np.take_along_axis(signed, order, 1)
+        row, col = np.take_along_axis(row, order, 1), np.take_along_axis(col, order, 1)
         way = signed[:, :1] / (signed[:, :1] - signed[:, 1:])
         tip = way.prod(axis=1)
         share = np.where(signed[:, 0] > 0.0, tip, 1.0 - tip)
         share = np.where(touchable, share, inside.mean(axis=1))
-        (a, b), (c, d) = self._basis.tolist()
-        ends = points[:, :1] + way[:, :, None] * (points[:, 1:] - points[:, :1])
-        return Edge(0.5 * (a * d - b * c) * (whole + float(share.sum())), ends[touchable])
+        way, row, col = way[touchable], row[touchable], col[touchable]
+        steps = (values[:, :1] + way * (values[:, 1:] - values[:, :1]) for values in (col, row))
+        return share, self._start + np.stack(list(steps), axis=-1) @ self._basis
 
 
 class _Band:
-    """The nodes about the edge of a zone, numbered across the window with a margin."""
+    """The nodes about the edge of a zone, in one list, and which of them are neighbors.
+
+    Nodes have numbers, counted over the window with a margin.
+    """
 
     MARGIN = _FAR + 2
 
     def __init__(self, zone: Mask) -> None:
-        self.n_col = zone.shape[1] + 2 * self.MARGIN
+        near = np.pad(boundary(zone), self.MARGIN)
+        self.n_col = near.shape[1]
         steps: Index = _STEPS @ np.array([self.n_col, 1])
-        row, col = np.nonzero(boundary(zone))
-        self.nodes: Index = (row + self.MARGIN) * self.n_col + col + self.MARGIN
+        near = near.ravel()
         for _ in range(_FAR + 1):
-            self.nodes = np.unique(np.concatenate([self.nodes, (self.nodes[:, None] + steps).ravel()]))
-        self._beside = self.place(self.nodes[:, None] + steps)
-        row, col = np.divmod(self.nodes, self.n_col)
+            near = np.logical_or.reduce([near, *(np.roll(near, step) for step in steps)])
+        nodes = np.flatnonzero(near)
+        self._nodes, self.size = nodes, nodes.size
+        self._places = np.full(near.size, self.size, dtype=np.int32)
+        self._places[nodes] = np.arange(self.size)
+        self._beside = [self._places[nodes + step] for step in steps]
+        row, col = np.divmod(nodes, self.n_col)
         row, col = row - self.MARGIN, col - self.MARGIN
         self._known = (row >= 0) & (row < zone.shape[0]) & (col >= 0) & (col < zone.shape[1])
         self._at = row[self._known], col[self._known]
 
-    def place(self, nodes: Index) -> Index:
-        """Return where nodes are in the band; its length for nodes that are not in it."""
-        if not self.nodes.size:
-            return np.zeros(nodes.shape, dtype=np.int64)
-        found = np.minimum(np.searchsorted(self.nodes, nodes), self.nodes.size - 1)
-        return np.where(self.nodes[found] == nodes, found, self.nodes.size)
+    def place(self, row: Index, col: Index) -> NDArray[np.int32]:
+        """Return where nodes of the window are in the band; its size for nodes that are not in it."""
+        return np.asarray(self._places[(row + self.MARGIN) * self.n_col + col + self.MARGIN])
+
+    def values_of(self, other: _Band, values: Array, default: float) -> Array:
+        """Return what stands at the nodes of another band of the same window."""
+        return np.asarray(np.append(values, default)[other._places[self._nodes]])
 
     def take(self, field: NDArray[Any]) -> NDArray[Any]:
         """Return a field at the nodes of the band; 0 outside the window."""
-        values = np.zeros(self.nodes.size, dtype=field.dtype)
+        values = np.zeros(self.size, dtype=field.dtype)
         values[self._known] = field[self._at]
         return values
 
@@ -225,57 +242,71 @@ class _Band:
         """Set a field at the nodes of the band."""
         field[self._at] = values[self._known]
 
-    def around(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return the values at the six neighbors, shape (n, 6, ...); NaN or False outside the band."""
-        beyond = False if values.dtype == bool else np.nan
-        nothing = np.full_like(values, beyond, shape=(1, *values.shape[1:]))
-        return np.asarray(np.concatenate([values, nothing])[self._beside])
+    def neighbors(self, values: NDArray[Any]) -> Iterator[NDArray[Any]]:
+        """Yield the values at the first to sixth neighbor of each node; NaN or False outside the band."""
+        longer = np.append(values, False if values.dtype == bool else np.nan)
+        return (longer[beside] for beside in self._beside)
+
+    def surrounded(self, zone: Mask) -> Mask:
+        """Nodes of a zone whose neighbors are in it, too."""
+        return np.logical_and.reduce([zone, *self.neighbors(zone)])
+
+    def next_to(self, zone: Mask) -> Mask:
+        """Nodes that have a neighbor in a zone."""
+        return np.logical_or.reduce(list(self.neighbors(zone)))
+
+    def gradient(self, values: Array) -> tuple[Array, Array]:
+        """Return the gradient along x and y, per spacing."""
+        x, y = np.zeros(self.size), np.zeros(self.size)
+        for value, (to_x, to_y) in zip(self.neighbors(values), _TO / 3.0, strict=True):
+            x += to_x * value
+            y += to_y * value
+        return x, y
+
+    def mean(self, values: Iterable[Array]) -> Array:
+        """Mean of those of the six values, one from each neighbor, that are not NaN; NaN if there is none."""
+        total, count = np.zeros(self.size), np.zeros(self.size, dtype=np.int8)
+        for value in values:
+            known = ~np.isnan(value)
+            total[known] += value[known]
+            count += known
+        return np.divide(total, count, out=np.full(self.size, np.nan), where=count > 0)
 
     def spread(self, values: Array) -> Array:
         """Fill in what is NaN with the mean of the neighbors, from the nearest nodes on."""
         for _ in range(_FAR):
-            values = np.where(np.isnan(values), _mean(self.around(values)), values)
+            values = np.where(np.isnan(values), self.mean(self.neighbors(values)), values)
         return values
-
-
-def _mean(values: Array) -> Array:
-    """Mean over the neighbors (axis 1) that have a value; NaN if none has."""
-    known = ~np.isnan(values)
-    total, count = np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1)
-    return np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
 
 
 def _distances(band: _Band, zone: Mask, values: Array) -> Array:
     """Distances of the nodes of a zone from its edge, where some values vanish in proportion to them."""
-    whole = zone & band.around(zone).all(axis=1)
-    slope = np.where(whole, np.hypot(*(band.around(values) @ _TO / 3.0).T), np.nan)
+    slope = np.where(band.surrounded(zone), np.hypot(*band.gradient(values)), np.nan)
     away = _quotient(values, band.spread(slope))
     return np.where(np.isnan(away), _HALF_WAY, away)
 
 
-def _layered_distances(band: _Band, zone: Mask, square: Array) -> tuple[Array, Array, Array]:
-    """Distances from the edge from one side only, slope at the edge, direction inwards; NaN if unknown.
+def _layered_distances(band: _Band, zone: Mask, square: Array) -> tuple[Array, Array, Array, Array]:
+    """Distances from the edge from one side only, slope there, direction inwards (x, y); NaN if unknown.
 
     The layer at the edge is taken off first, with the slope further inside. The slope at the edge itself then
     follows from those of the parabola that the squares are along the normal n: k^2 = S'^2 - 2 S S".
     """
-    whole = zone & band.around(zone).all(axis=1)
-    slope = band.spread(np.where(whole, np.hypot(*(band.around(square) @ _TO / 3.0).T), np.nan))
+    whole = band.surrounded(zone)
+    slope = band.spread(np.where(whole, np.hypot(*band.gradient(square)), np.nan))
     away = _calibrated(_quotient(square, slope))
     smooth = np.where(away < _SQUARE[-1], slope * away, square)
-    around = band.around(smooth)
-    gradient = around @ _TO / 3.0
-    steepness = np.hypot(*gradient.T)
-    inward = gradient / np.where(steepness > 0.0, steepness, np.nan)[:, None]
-    # second derivative along n from those along the three lines of nodes: n = cos, sin of an angle
-    along = around[:, :3] + around[:, 3:] - 2.0 * smooth[:, None]
-    turn = 2.0 * ((inward @ _TO[:3].T) ** 2) - 1.0  # cos 2(angle to the line)
-    bend = (along * (1.0 + 2.0 * turn)).sum(axis=1) / 3.0
+    x, y = band.gradient(smooth)
+    steepness = np.where(whole, np.hypot(x, y), np.nan)
+    x, y = _quotient(x, steepness), _quotient(y, steepness)
+    # second derivative along n from those along the three lines of nodes at angles t to n
+    bend = np.zeros(band.size)
+    for value, (to_x, to_y) in zip(band.neighbors(smooth), _TO, strict=True):
+        bend += (value - smooth) * (4.0 * (to_x * x + to_y * y) ** 2 - 1.0) / 3.0  # 1 + 2 cos 2t
     at_edge = np.sqrt(np.maximum(steepness**2 - 2.0 * smooth * bend, (0.5 * steepness) ** 2))
-    known = np.where(whole[:, None], np.column_stack([at_edge, inward]), np.nan)
-    slope, inward = np.split(band.spread(known), [1], axis=1)
-    inward = inward / np.hypot(*inward.T)[:, None]
-    return _calibrated(_quotient(square, slope[:, 0])), slope[:, 0], inward
+    slope, x, y = (band.spread(values) for values in (at_edge, x, y))
+    length = np.hypot(x, y)
+    return _calibrated(_quotient(square, slope)), slope, _quotient(x, length), _quotient(y, length)
 
 
 def _calibrated(square: Array) -> Array:
@@ -284,4 +315,5 @@ def _calibrated(square: Array) -> Array:
 
 
 def _quotient(values: Array, slope: Array) -> Array:
-    return np.divide(values, slope, out=np.full_like(values, np.nan), where=slope > 0.0)
+    """Divide by a slope; NaN where there is none but by rounding."""
+    return np.divide(values, slope, out=np.full_like(values, np.nan), where=slope > 1e-9 * np.abs(values))

@@ -267,7 +267,7 @@ class NormalWindow(Window["NormalSolution"]):
     """Contact without friction; every step stands for itself."""
 
     state = ("pressure", "gap", "zone")
-    arrays = 12
+    arrays = 24  # of a rough surface, whose edges are everywhere
 
     def _set_up(self, gap: Array) -> None:
         from .native import NormalContact

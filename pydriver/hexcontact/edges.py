@@ -27,7 +27,8 @@ _STEPS = np.array([(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)])  # to th
 _TO = np.stack([_STEPS[:, 1] + 0.5 * _STEPS[:, 0], np.sqrt(0.75) * _STEPS[:, 0]], axis=1)  # in the plane
 _FAR = 3  # steps over which nodes next to the edge get their slope from nodes that have one
 _LEAST = 1e-9  # distance of a node inside
-_HALF_WAY = 0.5  # distance of a node where there is no slope: the zone is too small or too narrow
+_HALF_WAY = 0.5  # distance of a node where there is no slope: the zone is too small, or not sharply bounded
+_LEAST_SLOPE = 0.5  # at the edge, squared, of that further inside: for (distance^m)^2 it is 1/m - 1
 
 # Next to an edge the solution on the lattice has a layer of its own: nodes at _DISTANCE have squares (of the
 # pressure, of the reserve of friction) as if they were at _SQUARE. Measured on the contacts of Hertz and of
@@ -290,7 +291,8 @@ def _layered_distances(band: _Band, zone: Mask, square: Array) -> tuple[Array, A
     """Distances from the edge from one side only, slope there, direction inwards (x, y); NaN if unknown.
 
     The layer at the edge is taken off first, with the slope further inside. The slope at the edge itself then
-    follows from those of the parabola that the squares are along the normal n: k^2 = S'^2 - 2 S S".
+    follows from those of the parabola that the squares S are along the normal n: k^4 = S'^2 - 2 S S". Where
+    this is little or negative they vanish with a higher power than the first.
     """
     whole = band.surrounded(zone)
     slope = band.spread(np.where(whole, np.hypot(*band.gradient(square)), np.nan))
@@ -303,9 +305,11 @@ def _layered_distances(band: _Band, zone: Mask, square: Array) -> tuple[Array, A
     bend = np.zeros(band.size)
     for value, (to_x, to_y) in zip(band.neighbors(smooth), _TO, strict=True):
         bend += (value - smooth) * (4.0 * (to_x * x + to_y * y) ** 2 - 1.0) / 3.0  # 1 + 2 cos 2t
-    at_edge = np.sqrt(np.maximum(steepness**2 - 2.0 * smooth * bend, (0.5 * steepness) ** 2))
+    at_edge = steepness**2 - 2.0 * smooth * bend
+    flat = band.spread(np.where(whole, at_edge < _LEAST_SLOPE * steepness**2, np.nan)) > 0.5
+    at_edge = np.sqrt(np.maximum(at_edge, _LEAST_SLOPE * steepness**2))
     slope, x, y = (band.spread(values) for values in (at_edge, x, y))
-    length = np.hypot(x, y)
+    slope, length = np.where(flat, np.nan, slope), np.hypot(x, y)
     return _calibrated(_quotient(square, slope)), slope, _quotient(x, length), _quotient(y, length)
 
 

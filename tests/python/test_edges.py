@@ -257,6 +257,18 @@ def test_small_stick_areas() -> None:
         assert edge.radius == pytest.approx(1.0, abs=0.045 * spacing)
 
 
+def test_reserve_with_another_power() -> None:
+    """The edge of a growing stick area is smooth: what vanishes as its power 3/2 gives no distance."""
+    lattice = Lattice(1.0, -20, -30, 41, 61)
+    everywhere = np.ones(lattice.shape, dtype=bool)
+    edges = ContactEdges(1.0 * everywhere, 0.0 * everywhere, everywhere, everywhere, lattice.basis)
+    for c in (6.3, 9.1, 11.4):
+        r = np.hypot(lattice.x, lattice.y)
+        stick, reserve = r < c, np.maximum(c - r, 0.0) ** 1.5
+        by_nodes = np.sqrt(stick.sum() * lattice.cell_area / np.pi)
+        assert edges.stick(stick, reserve).radius == pytest.approx(by_nodes, abs=0.06)
+
+
 def test_stick_up_to_the_edge_of_the_contact() -> None:
     case = Case(
         body_1={"young_modulus": 1e9, "poisson_ratio": 0.3},

@@ -123,7 +123,7 @@ look_around() {
   compiles_fortran || need 'a Fortran compiler' 'gfortran'
   pkgconfig --version >/dev/null || need 'pkg-config' 'pkg-config'
   links openblas || links lapack blas || need 'OpenBLAS (or LAPACK and BLAS)' 'libopenblas-dev'
-  links fftw3 || need 'FFTW 3' 'libfftw3-dev'
+  links fftw3 fftw3f || need 'FFTW 3' 'libfftw3-dev'
   if [ -n "$python" ]; then
     of=$("$python" -c 'import sys; print("python%d.%d" % sys.version_info[:2])')
     has_headers "$python" || need "the headers of $of" "$of-dev"

@@ -281,7 +281,7 @@ class NormalContact:
         tolerance
             Bound of the residuals.
         max_sweeps
-            Active sets that may be tried.
+            Iterations that may be made on each lattice (direct: active sets).
 
         Returns
         -------

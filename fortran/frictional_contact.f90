@@ -7,13 +7,12 @@ module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, along_x, force_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_friction_systems, only: operators_t, new_operators, operators_memory
-  use hc_friction_iterate, only: iterate_t, cautious
-  use hc_friction_sweep, only: staggered_sweep
-  use hc_friction_newton, only: coupled_sweep
-  use hc_multilevel, only: prolong, restrict_field, level_count
+  use hc_friction_level, only: solve_level
+  use hc_friction_predictor, only: predict
+  use hc_multilevel, only: prolong, restrict_vector, level_count
   implicit none
   private
 
@@ -21,12 +20,6 @@ module hc_frictional_contact
 
   !> Windows below this many nodes a side are not coarsened any further.
   integer, parameter :: smallest_side = 20
-  !> Sweeps without a node that sticks on its own, after which a load counts as not carried.
-  integer, parameter :: max_held = 12
-  !> Sweeps after which tractions that do not settle one after the other are found together, unless they act on
-  !> each other so strongly that it is done sooner: once residuals are near, or a few sweeps later all the same.
-  integer, parameter :: most_apart = 12, patience = 4
-  real(wp), parameter :: near = 0.1_wp
   !> Coarse lattices only have to give a start.
   real(wp), parameter :: coarse_tolerance = 1.0e-4_wp
 
@@ -116,10 +109,14 @@ contains
     end if
     work = 0.0_wp
     guess = start
-    if (.not. any(start%pressure > 0.0_wp) .and. size(self%operators) > 1) then
+    if (size(self%operators) == 1) then
+      continue
+    else if (.not. any(start%pressure > 0.0_wp)) then
       call coarse_guess(self, reference, target, max_sweeps, guess, work, error)
-      if (allocated(error)) return
+    else
+      call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, work, error)
     end if
+    if (allocated(error)) return
     call solve_level(self%problem, self%operators(1), guess, reference, target, tolerance, max_sweeps, state, error)
     state%operator_applications = state%operator_applications + work
   end subroutine solve_step
@@ -148,9 +145,9 @@ contains
     integer :: l
 
     work = 0.0_wp
-    origin(2)%value = restricted(self%problem%lattice, reference, self%coarse(2)%lattice)
+    origin(2)%value = restrict_vector(self%problem%lattice, reference, self%coarse(2)%lattice)
     do l = 3, size(self%operators)
-      origin(l)%value = restricted(self%coarse(l - 1)%lattice, origin(l - 1)%value, self%coarse(l)%lattice)
+      origin(l)%value = restrict_vector(self%coarse(l - 1)%lattice, origin(l - 1)%value, self%coarse(l)%lattice)
     end do
     do l = size(self%operators), 2, -1
       associate (problem => self%coarse(l))
@@ -168,19 +165,6 @@ contains
     if (allocated(coarser%pressure)) call prolong_state(self%coarse(2), coarser, self%problem, guess)
   end subroutine coarse_guess
 
-  !> Values of both components of a field at the coarse nodes.
-  pure function restricted(fine_lattice, fine, coarse_lattice) result(coarse)
-    type(lattice_t), intent(in) :: fine_lattice, coarse_lattice
-    real(wp), intent(in) :: fine(:, :, :)
-    real(wp), allocatable :: coarse(:, :, :)
-    integer :: m
-
-    allocate (coarse(coarse_lattice%extent(1), coarse_lattice%extent(2), size(fine, 3)))
-    do m = 1, size(fine, 3)
-      coarse(:, :, m) = restrict_field(fine_lattice, fine(:, :, m), coarse_lattice)
-    end do
-  end function restricted
-
   !> Tractions and motions of a coarse state as a start on the finer lattice.
   pure subroutine prolong_state(coarse_problem, coarse, problem, state)
     type(friction_problem_t), intent(in) :: coarse_problem
@@ -197,76 +181,5 @@ contains
     end do
     state%motion = coarse%motion
   end subroutine prolong_state
-
-  !> Sweeps on one lattice.
-  subroutine solve_level(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
-    !> The problem
-    type(friction_problem_t), intent(in) :: problem
-    !> Operator and preconditioners
-    type(operators_t), intent(inout), target :: operators
-    !> State to start from
-    type(contact_state_t), intent(in) :: start
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Sweeps that may be made
-    integer, intent(in) :: max_sweeps
-    !> Solution, converged or not
-    type(contact_state_t), intent(out) :: state
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-
-    type(iterate_t) :: now
-    real(wp), allocatable :: displacement(:, :, :)
-    integer :: sweep, held, apart
-    logical :: failed
-
-    held = 0
-    operators%flexibility%applications = 0.0_wp
-    operators%preconditioning = 0.0_wp
-    call new_friction_state(state, problem%lattice)
-    allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
-    call now%begin(problem, operators, start, reference, target, tolerance, error)
-    if (allocated(error)) return
-    ! sweeps that find pressure and shear traction one after the other
-    apart = max_sweeps
-    if (now%pressing) apart = most_apart
-    if (problem%couples_strongly()) then
-      apart = 1
-      now%caution = cautious
-    end if
-    do sweep = 1, max_sweeps
-      failed = .true.
-      if (sweep > apart .and. (max(now%residual_normal, now%residual_tangential) < near .or. sweep > apart + patience)) then
-        call coupled_sweep(now, failed, error)
-        if (allocated(error)) return
-      end if
-      if (failed) call staggered_sweep(now, error)
-      if (allocated(error)) return
-      if (.not. now%is_finite()) exit
-      if (now%held) held = held + 1
-      if (now%held .and. problem%overloads(target, sum(now%p))) held = max_held
-      state%sweeps = sweep
-      if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
-          .and. .not. now%sliding .and. held < max_held) cycle
-
-      ! what is recorded fulfils the bounds exactly, and is judged by a product of its own
-      state%pressure = reshape(max(now%p, 0.0_wp), shape(state%pressure))
-      state%traction = reshape(now%on_cone(), shape(state%traction))
-      state%motion = now%motion
-      call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
-      if (allocated(error)) return
-      call problem%conclude(target, tolerance, reference, displacement, state)
-      if (state%converged .or. now%sliding .or. held >= max_held) exit
-      call now%refresh(error)
-      if (allocated(error)) return
-    end do
-    state%sliding = .not. state%converged .and. any(target%control(along_x:) == force_control) .and. &
-                    (now%sliding .or. held > 1)
-    state%operator_applications = operators%work()
-  end subroutine solve_level
 
 end module hc_frictional_contact

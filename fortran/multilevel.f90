@@ -9,7 +9,7 @@ module hc_multilevel
   implicit none
   private
 
-  public :: level_count, prolong, prolong_edge, restrict_field, restrict_mask
+  public :: level_count, prolong, prolong_vector, prolong_edge, restrict_field, restrict_vector, restrict_mask
 
 contains
 
@@ -111,6 +111,23 @@ contains
     fine = sqrt(max(fine, 0.0_wp))
   end subroutine prolong_edge
 
+  !> Interpolate all components of a field.
+  pure subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine)
+    !> Coarse lattice and window
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse field (n_col, n_row, number of components)
+    real(wp), intent(in) :: coarse(:, :, :)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine field (n_col, n_row, number of components)
+    real(wp), intent(out) :: fine(:, :, :)
+    integer :: m
+
+    do m = 1, size(fine, 3)
+      call prolong(coarse_lattice, coarse(:, :, m), fine_lattice, fine(:, :, m))
+    end do
+  end subroutine prolong_vector
+
   !> Values of a field at the coarse nodes.
   pure function restrict_field(fine_lattice, fine, coarse_lattice) result(coarse)
     !> Fine lattice and window
@@ -126,6 +143,23 @@ contains
     start = 2*coarse_lattice%first - fine_lattice%first + 1
     coarse = fine(start(1)::2, start(2)::2)
   end function restrict_field
+
+  !> Values of all components of a field at the coarse nodes.
+  pure function restrict_vector(fine_lattice, fine, coarse_lattice) result(coarse)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine field (n_col, n_row, number of components)
+    real(wp), intent(in) :: fine(:, :, :)
+    !> Coarse lattice and window, inside the fine one
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse field (n_col, n_row, number of components)
+    real(wp) :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2), size(fine, 3))
+    integer :: m
+
+    do m = 1, size(fine, 3)
+      coarse(:, :, m) = restrict_field(fine_lattice, fine(:, :, m), coarse_lattice)
+    end do
+  end function restrict_vector
 
   !> Values of a mask at the coarse nodes.
   pure function restrict_mask(fine_lattice, fine, coarse_lattice) result(coarse)

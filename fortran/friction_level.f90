@@ -1,0 +1,98 @@
+!> A load step with friction on one lattice.
+!>
+!> Sweeps that find pressure and shear traction one after the other (friction_sweep),
+!> and where that is not enough both together (friction_newton).
+module hc_friction_level
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, along_x, force_control
+  use hc_friction_problem, only: friction_problem_t
+  use hc_friction_systems, only: operators_t
+  use hc_friction_iterate, only: iterate_t, cautious
+  use hc_friction_sweep, only: staggered_sweep
+  use hc_friction_newton, only: coupled_sweep
+  implicit none
+  private
+
+  public :: solve_level
+
+  !> Sweeps without a node that sticks on its own, after which a load counts as not carried.
+  integer, parameter :: max_held = 12
+  !> Sweeps after which tractions that do not settle one after the other are found together, unless they act on
+  !> each other so strongly that it is done sooner: once residuals are near, or a few sweeps later all the same.
+  integer, parameter :: most_apart = 12, patience = 4
+  real(wp), parameter :: near = 0.1_wp
+contains
+
+  !> Sweeps on one lattice.
+  subroutine solve_level(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> Operator and preconditioners
+    type(operators_t), intent(inout), target :: operators
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Sweeps that may be made
+    integer, intent(in) :: max_sweeps
+    !> Solution, converged or not
+    type(contact_state_t), intent(out) :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(iterate_t) :: now
+    real(wp), allocatable :: displacement(:, :, :)
+    integer :: sweep, held, apart
+    logical :: failed
+
+    held = 0
+    operators%flexibility%applications = 0.0_wp
+    operators%preconditioning = 0.0_wp
+    call new_friction_state(state, problem%lattice)
+    allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+    call now%begin(problem, operators, start, reference, target, tolerance, error)
+    if (allocated(error)) return
+    ! sweeps that find pressure and shear traction one after the other
+    apart = max_sweeps
+    if (now%pressing) apart = most_apart
+    if (problem%couples_strongly()) then
+      apart = 1
+      now%caution = cautious
+    end if
+    do sweep = 1, max_sweeps
+      failed = .true.
+      if (sweep > apart .and. (max(now%residual_normal, now%residual_tangential) < near .or. sweep > apart + patience)) then
+        call coupled_sweep(now, failed, error)
+        if (allocated(error)) return
+      end if
+      if (failed) call staggered_sweep(now, error)
+      if (allocated(error)) return
+      if (.not. now%is_finite()) exit
+      if (now%held) held = held + 1
+      if (now%held .and. problem%overloads(target, sum(now%p))) held = max_held
+      state%sweeps = sweep
+      if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
+          .and. .not. now%sliding .and. held < max_held) cycle
+
+      ! what is recorded fulfils the bounds exactly, and is judged by a product of its own
+      state%pressure = reshape(max(now%p, 0.0_wp), shape(state%pressure))
+      state%traction = reshape(now%on_cone(), shape(state%traction))
+      state%motion = now%motion
+      call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
+      if (allocated(error)) return
+      call problem%conclude(target, tolerance, reference, displacement, state)
+      if (state%converged .or. now%sliding .or. held >= max_held) exit
+      call now%refresh(error)
+      if (allocated(error)) return
+    end do
+    state%sliding = .not. state%converged .and. any(target%control(along_x:) == force_control) .and. &
+                    (now%sliding .or. held > 1)
+    state%operator_applications = operators%work()
+  end subroutine solve_level
+
+end module hc_friction_level

@@ -110,7 +110,7 @@ contains
       rhs = -now%h - now%closing
       if (n_constraint == 0) rhs = rhs + now%motion(normal)
       goal = final_accuracy*now%tolerance
-      if (changed) goal = max(inner_accuracy*min(now%residual_normal, 1.0_wp), goal)
+      if (changed .or. now%pressing) goal = max(inner_accuracy*min(now%residual_normal, 1.0_wp), goal)
       call projected_cg(now%pressure, contact, constraint, mb, rhs, now%p, now%w, &
                         goal*now%problem%normal_compliance*maxval(abs(now%p)), max_iterations, &
                         multiplier(:n_constraint), residual, iterations, error)

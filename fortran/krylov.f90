@@ -165,6 +165,7 @@ contains
     real(wp), allocatable :: r(:), z(:), d(:), ad(:)
     real(wp) :: rz, rz_old, curvature, step, correction(size(constraint, 2))
     integer :: n, i, m, n_threads
+    logical :: independent
 
     n = size(x)
     n_threads = system%n_threads
@@ -177,13 +178,19 @@ contains
     do
       ! The share of the constraints is taken out of the residual before it is
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
+      ! What is left is normal to M B, which keeps the projected preconditioner
+      ! symmetric even if the given M B is not quite what its name says.
       call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
-      call system%precondition(r, z, error)
-      if (allocated(error)) return
-      call project(active, constraint, mb, z, correction, n_threads)
+      do m = 1, size(multiplier)
+        correction(m) = dot(mb(:, m), r, n_threads)
+      end do
+      call solve_gram(mb, constraint, correction, independent, n_threads)
       multiplier = multiplier - correction
       call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
       if (residual <= tolerance .or. iterations >= max_iterations) exit
+      call system%precondition(r, z, error)
+      if (allocated(error)) return
+      call project(active, constraint, mb, z, correction, n_threads)
 
       rz = dot(r, z, n_threads)
       step = 0.0_wp

@@ -62,6 +62,9 @@ module hc_friction_iterate
     real(wp) :: best = huge(1.0_wp)
     !> Share of the next step that is taken if that residual does not fall
     real(wp) :: share = 0.5_wp
+    !> About the pressure that an approach of the contact causes, and the shear traction of each rigid motion,
+    !> components along x and y: what constraints are fulfilled with
+    real(wp), allocatable :: lift(:, :), drag(:, :)
     !> Nothing has been solved yet
     logical :: first = .true.
   contains

@@ -92,12 +92,14 @@ contains
         changed = any(contact .neqv. now%contact)
       end if
 
-      if (changed .or. .not. allocated(mb)) then
-        now%contact = contact
-        if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, contact)
-        call precondition_constraints(now%pressure, contact, constraint, mb, error)
+      now%contact = contact
+      if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, contact)
+      if (.not. allocated(now%lift)) then
+        call precondition_constraints(now%pressure, contact, constraint, now%lift, error)
         if (allocated(error)) return
       end if
+      mb = now%lift
+      where (.not. spread(contact, 2, n_constraint)) mb = 0.0_wp
       if (changed) then
         now%p = merge(max(now%p, 0.0_wp), 0.0_wp, contact)
         if (n_constraint == 1) then
@@ -131,7 +133,7 @@ contains
     real(wp), allocatable :: u(:), missing(:), multiplier(:)
     type(driven_motions_t) :: driven
     real(wp) :: goal, residual, motion(n_motion)
-    integer :: n, iterations
+    integer :: n, k, iterations
     logical :: independent, holding
 
     n = size(now%p)
@@ -147,9 +149,27 @@ contains
       call now%shear%to_frame(now%q, x)
       call now%constraints(active, driven, constraint, missing)
       multiplier = driven%multipliers(now%motion)
-      call precondition_constraints(now%shear, active, constraint, mb, error)
-      if (allocated(error)) return
-      call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
+      independent = .false.
+      if (allocated(now%drag)) then
+        if (size(now%drag, 2) == size(missing)) then
+          if (.not. allocated(mb)) allocate (mb, mold=constraint)
+          do k = 1, size(missing)
+            call now%shear%to_frame(now%drag(:, k), mb(:, k))
+          end do
+          where (.not. spread(active, 2, size(missing))) mb = 0.0_wp
+          call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
+        end if
+      end if
+      if (.not. independent) then
+        call precondition_constraints(now%shear, active, constraint, mb, error)
+        if (allocated(error)) return
+        call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
+        if (allocated(now%drag)) deallocate (now%drag)
+        allocate (now%drag, mold=mb)
+        do k = 1, size(missing)
+          call now%shear%to_plane(mb(:, k), now%drag(:, k))
+        end do
+      end if
       if (independent) then
         call now%shear%product(x, ax, error)
         if (allocated(error)) return

@@ -82,12 +82,15 @@ contains
     allocate (constraint(n, n_constraint))
     do area = 1, merge(max_areas, max_areas_alone, now%pressing)
       gap = now%h + now%closing + now%w - now%motion(normal)
+      now%residual_normal = gap_residual(now%problem, now%p, gap)
+      missing = 0.0_wp
+      if (n_constraint == 1) missing = now%target%value(normal)/cell_area - sum(now%p)
+      if (now%residual_normal <= final_accuracy*now%tolerance .and. &
+          abs(missing(1)) <= final_accuracy*now%tolerance*sum(now%p)) return
       if (now%first .and. area == 1) then
         contact = now%contact
         changed = .true.
       else
-        now%residual_normal = gap_residual(now%problem, now%p, gap)
-        if (now%residual_normal <= final_accuracy*now%tolerance) return
         contact = now%contact_area(gap)
         changed = any(contact .neqv. now%contact)
       end if
@@ -155,6 +158,9 @@ contains
           if (.not. allocated(mb)) allocate (mb, mold=constraint)
           do k = 1, size(missing)
             call now%shear%to_frame(now%drag(:, k), mb(:, k))
+            where (now%shear%compliance > 0.0_wp)
+              mb(:n, k) = now%shear%weight**2*mb(:n, k) + (1.0_wp - now%shear%weight**2)/now%shear%compliance*constraint(:n, k)
+            end where
           end do
           where (.not. spread(active, 2, size(missing))) mb = 0.0_wp
           call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)

@@ -27,7 +27,7 @@ module hc_friction_predictor
   !> Nodes that a coarse contact should have at least.
   integer, parameter :: enough_nodes = 100
   !> Coarse lattices only have to give a start, and that soon.
-  real(wp), parameter :: coarse_tolerance = 1.0e-3_wp
+  real(wp), parameter :: coarse_tolerance = 1.0e-2_wp
   integer, parameter :: coarse_sweeps = 20
 
 contains

@@ -20,6 +20,7 @@ module hc_friction_sweep
 
   !> Accuracy of a linear solution, relative to the residual at its start.
   real(wp), parameter :: inner_accuracy = 0.1_wp
+  real(wp), parameter :: late_accuracy = 0.03_wp, press_accuracy = 0.05_wp
   !> Accuracy of the last linear solution, relative to the tolerance.
   real(wp), parameter :: final_accuracy = 0.2_wp
   !> Component across the direction of slip, relative to the largest traction, that is taken for an answer.
@@ -35,8 +36,10 @@ module hc_friction_sweep
   integer, parameter :: tired = 10
   real(wp), parameter :: least_caution = 1.0e-3_wp
   integer, parameter :: max_iterations = 400
+  real(wp), parameter :: enough = 0.1_wp
+  integer, parameter :: max_again = 1
   !> Contact areas that are tried before the shear traction is looked at again.
-  integer, parameter :: max_areas = 2, max_areas_alone = 60
+  integer, parameter :: max_areas = 1, max_areas_alone = 60
 
 contains
 
@@ -46,6 +49,8 @@ contains
     type(iterate_t), intent(inout) :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    real(wp) :: before
+    integer :: again
 
     call press(now, error)
     if (allocated(error)) return
@@ -53,8 +58,13 @@ contains
       call now%operators%apply([normal], now%p, [along_x, along_y], now%dragged, error)
       if (allocated(error)) return
     end if
-    call shear_off(now, error)
-    if (allocated(error)) return
+    if (.not. now%first) call now%find_residuals()
+    before = min(now%residual_tangential, 1.0_wp)
+    do again = 1, merge(max_again, 1, now%pressing)
+      call shear_off(now, error)
+      if (allocated(error)) return
+      if (now%residual_tangential <= max(enough*before, now%tolerance) .or. now%sliding .or. now%held) exit
+    end do
     if (now%pressing) then
       call now%operators%apply([along_x, along_y], now%on_cone(), [normal], now%closing, error)
       if (allocated(error)) return
@@ -115,7 +125,7 @@ contains
       rhs = -now%h - now%closing
       if (n_constraint == 0) rhs = rhs + now%motion(normal)
       goal = final_accuracy*now%tolerance
-      if (changed .or. now%pressing) goal = max(inner_accuracy*min(now%residual_normal, 1.0_wp), goal)
+      if (changed .or. now%pressing) goal = max(press_accuracy*min(now%residual_normal, 1.0_wp), goal)
       call projected_cg(now%pressure, contact, constraint, mb, rhs, now%p, now%w, &
                         goal*now%problem%normal_compliance*maxval(abs(now%p)), max_iterations, &
                         multiplier(:n_constraint), residual, iterations, error)
@@ -184,7 +194,7 @@ contains
         call now%shear%to_frame(moved, rhs)
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
-        goal = goal*merge(inner_accuracy, min(inner_accuracy, max(goal, 1.0e-3_wp)), now%pressing)
+        goal = goal*min(inner_accuracy, max(goal, merge(late_accuracy, 1.0e-3_wp, now%pressing)))
         goal = max(goal, final_accuracy*now%tolerance)
         goal = goal*now%problem%tangential_compliance*now%traction_scale()
         call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal, max_iterations, multiplier, &

@@ -11,9 +11,9 @@ module hc_friction_newton
   use hc_contact_state, only: normal, force_control
   use hc_driven_motions, only: driven_motions_t
   use hc_friction_iterate, only: iterate_t
-  use hc_friction_sweep, only: inner_accuracy, final_accuracy, beyond_reason
+  use hc_friction_sweep, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
   use hc_friction_systems, only: coupled_system_t
-  use hc_krylov, only: projected_gmres, precondition_constraints, fulfil
+  use hc_krylov, only: projected_gmres, fulfil
   implicit none
   private
 
@@ -35,7 +35,7 @@ contains
 
     type(coupled_system_t) :: system
     real(wp), allocatable :: x(:), ax(:), rhs(:), weight(:), columns(:, :), mb(:, :), rows(:, :)
-    real(wp), allocatable :: shear_columns(:, :), plane(:)
+    real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:)
     logical, allocatable :: active(:), shear_active(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
@@ -83,8 +83,15 @@ contains
       missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - sum(now%p)
       multiplier(m) = now%motion(normal)
     end if
-    call precondition_constraints(system, active, columns, mb, error)
+    allocate (mb(3*n, m), source=0.0_wp)
+    call drag_shear(now, shear_active, shear_columns, .false., part, error)
     if (allocated(error)) return
+    mb(n + 1:, :n_shear) = part
+    if (m > n_shear) then
+      call lift_pressure(now, columns(:n, m:), part, error)
+      if (allocated(error)) return
+      mb(:n, m:) = part
+    end if
     call fulfil(rows, mb, missing(:m), x, independent, system%n_threads)
     if (independent) then
       call system%product(x, ax, error)

@@ -16,7 +16,7 @@ module hc_friction_sweep
   implicit none
   private
 
-  public :: staggered_sweep, inner_accuracy, final_accuracy, beyond_reason
+  public :: staggered_sweep, lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
 
   !> Accuracy of a linear solution, relative to the residual at its start.
   real(wp), parameter :: inner_accuracy = 0.1_wp
@@ -107,12 +107,8 @@ contains
 
       now%contact = contact
       if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, contact)
-      if (.not. allocated(now%lift)) then
-        call precondition_constraints(now%pressure, contact, constraint, now%lift, error)
-        if (allocated(error)) return
-      end if
-      mb = now%lift
-      where (.not. spread(contact, 2, n_constraint)) mb = 0.0_wp
+      call lift_pressure(now, constraint, mb, error)
+      if (allocated(error)) return
       if (changed) then
         now%p = merge(max(now%p, 0.0_wp), 0.0_wp, contact)
         if (n_constraint == 1) then
@@ -146,7 +142,7 @@ contains
     real(wp), allocatable :: u(:), missing(:), multiplier(:)
     type(driven_motions_t) :: driven
     real(wp) :: goal, residual, motion(n_motion)
-    integer :: n, k, iterations
+    integer :: n, iterations
     logical :: independent, holding
 
     n = size(now%p)
@@ -162,29 +158,13 @@ contains
       call now%shear%to_frame(now%q, x)
       call now%constraints(active, driven, constraint, missing)
       multiplier = driven%multipliers(now%motion)
-      independent = .false.
-      if (allocated(now%drag)) then
-        if (size(now%drag, 2) == size(missing)) then
-          if (.not. allocated(mb)) allocate (mb, mold=constraint)
-          do k = 1, size(missing)
-            call now%shear%to_frame(now%drag(:, k), mb(:, k))
-            where (now%shear%compliance > 0.0_wp)
-              mb(:n, k) = now%shear%weight**2*mb(:n, k) + (1.0_wp - now%shear%weight**2)/now%shear%compliance*constraint(:n, k)
-            end where
-          end do
-          where (.not. spread(active, 2, size(missing))) mb = 0.0_wp
-          call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
-        end if
-      end if
+      call drag_shear(now, active, constraint, .false., mb, error)
+      if (allocated(error)) return
+      call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
       if (.not. independent) then
-        call precondition_constraints(now%shear, active, constraint, mb, error)
+        call drag_shear(now, active, constraint, .true., mb, error)
         if (allocated(error)) return
         call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
-        if (allocated(now%drag)) deallocate (now%drag)
-        allocate (now%drag, mold=mb)
-        do k = 1, size(missing)
-          call now%shear%to_plane(mb(:, k), now%drag(:, k))
-        end do
       end if
       if (independent) then
         call now%shear%product(x, ax, error)
@@ -233,5 +213,61 @@ contains
       now%share = max(less*now%share, least_share)
     end if
   end subroutine shear_off
+
+  !> About the pressure that an approach of the nodes in contact causes: worked out once a step.
+  subroutine lift_pressure(now, constraint, mb, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout) :: now
+    !> One on the nodes in contact; or no constraint at all (n, 1 or 0)
+    real(wp), intent(in) :: constraint(:, :)
+    !> The pressure, zero off the contact (n, 1 or 0)
+    real(wp), allocatable, intent(out) :: mb(:, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    if (.not. allocated(now%lift)) then
+      call precondition_constraints(now%pressure, now%contact, constraint, now%lift, error)
+      if (allocated(error)) return
+    end if
+    allocate (mb, source=now%lift)
+    where (.not. spread(now%contact, 2, size(mb, 2))) mb = 0.0_wp
+  end subroutine lift_pressure
+
+  !> About the shear traction that rigid motions of the unknowns cause: worked out once a step, if it serves.
+  subroutine drag_shear(now, active, constraint, afresh, mb, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout) :: now
+    !> Unknowns, in the frames (2 n)
+    logical, intent(in) :: active(:)
+    !> Constraint vectors, in the frames (2 n, number of constraints)
+    real(wp), intent(in) :: constraint(:, :)
+    !> Work it out again
+    logical, intent(in) :: afresh
+    !> The traction, in the frames (2 n, number of constraints)
+    real(wp), allocatable, intent(out) :: mb(:, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+    logical :: known
+
+    known = allocated(now%drag) .and. .not. afresh
+    if (known) known = size(now%drag, 2) == size(constraint, 2)
+    if (known) then
+      allocate (mb, mold=constraint)
+      do k = 1, size(mb, 2)
+        call now%shear%to_frame(now%drag(:, k), mb(:, k))
+        call now%shear%soften(constraint(:, k), mb(:, k))
+      end do
+      where (.not. spread(active, 2, size(mb, 2))) mb = 0.0_wp
+    else
+      call precondition_constraints(now%shear, active, constraint, mb, error)
+      if (allocated(error)) return
+      if (allocated(now%drag)) deallocate (now%drag)
+      allocate (now%drag, mold=mb)
+      do k = 1, size(mb, 2)
+        call now%shear%to_plane(mb(:, k), now%drag(:, k))
+      end do
+    end if
+  end subroutine drag_shear
 
 end module hc_friction_sweep

@@ -77,6 +77,8 @@ module hc_friction_systems
     procedure :: to_plane, to_frame
     !> Work the weights out from the compliances
     procedure :: blend
+    !> Let the traction of a slipping node be the smaller the softer it is
+    procedure :: soften
   end type shear_system_t
 
   !> Pressure and shear traction together: the pressure of a slipping node carries mu p e along.
@@ -226,6 +228,22 @@ contains
       end if
     end do
   end subroutine blend
+
+  !> What the preconditioner makes of slip, of a traction that was found in stick.
+  pure subroutine soften(self, displacement, traction)
+    class(shear_system_t), intent(in) :: self
+    !> Displacement, in the frames (2 n)
+    real(wp), intent(in) :: displacement(:)
+    !> Its traction if all nodes stuck, in the frames (2 n)
+    real(wp), intent(inout) :: traction(:)
+    integer :: i
+
+    do i = 1, size(self%weight)
+      if (self%weight(i) < 1.0_wp) then
+        traction(i) = self%weight(i)**2*traction(i) + (1.0_wp - self%weight(i)**2)/self%compliance(i)*displacement(i)
+      end if
+    end do
+  end subroutine soften
 
   !> Components along x and y from those along t and e.
   subroutine to_plane(self, frame, plane)

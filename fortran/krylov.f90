@@ -252,18 +252,19 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type :: direction_t
-      real(wp), allocatable :: v(:)
+      !> Weighted residual, and the product A z that the next one comes from
+      real(wp), allocatable :: v(:), image(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
-    real(wp), allocatable :: z(:), image(:), combined(:)
+    real(wp), allocatable :: z(:), r(:), combined(:)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
     integer :: n, i, k
 
     n = size(x)
     iterations = 0
-    allocate (z(n), image(n))
+    allocate (z(n), r(n))
     basis(1)%v = merge(weight*(rhs - ax + matmul(columns, multiplier)), 0.0_wp, active)
     length = sqrt(dot(basis(1)%v, basis(1)%v, system%n_threads))
     independent = .true.
@@ -276,9 +277,10 @@ contains
     do k = 1, max_iterations
       call expand(basis(k)%v, error)
       if (allocated(error) .or. .not. independent) return
-      call system%product(z, image, error)
+      allocate (basis(k)%image(n))
+      call system%product(z, basis(k)%image, error)
       if (allocated(error)) return
-      basis(k + 1)%v = merge(weight*(image - matmul(columns, share)), 0.0_wp, active)
+      basis(k + 1)%v = merge(weight*(basis(k)%image - matmul(columns, share)), 0.0_wp, active)
       do i = 1, k
         h(i, k) = dot(basis(i)%v, basis(k + 1)%v, system%n_threads)
         basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
@@ -307,12 +309,12 @@ contains
     allocate (combined(n), source=0.0_wp)
     do i = 1, iterations
       combined = combined + y(i)*basis(i)%v
+      ax = ax + y(i)*basis(i)%image
     end do
     call expand(combined, error)
     if (allocated(error)) return
     x = x + z
     multiplier = multiplier + share
-    call system%product(x, ax, error)
 
   contains
 
@@ -322,8 +324,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: j
 
-      image = merge(vector/weight, 0.0_wp, active)
-      call system%precondition(image, z, error)
+      r = merge(vector/weight, 0.0_wp, active)
+      call system%precondition(r, z, error)
       if (allocated(error)) return
       where (.not. active) z = 0.0_wp
       do j = 1, size(share)

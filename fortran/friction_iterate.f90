@@ -65,6 +65,8 @@ module hc_friction_iterate
     !> About the pressure that an approach of the contact causes, and the shear traction of each rigid motion,
     !> components along x and y: what constraints are fulfilled with
     real(wp), allocatable :: lift(:, :), drag(:, :)
+    !> The start knew of no contact
+    logical :: cold = .false.
     !> Nothing has been solved yet
     logical :: first = .true.
   contains
@@ -146,6 +148,7 @@ contains
       end associate
     else
       ! any pressure is better than none
+      self%cold = .true.
       self%contact = self%candidate
       if (target%control(normal) /= force_control) self%contact = self%contact .and. self%h < target%value(normal)
       self%p = merge(1.0_wp, 0.0_wp, self%contact)

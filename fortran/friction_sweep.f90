@@ -99,6 +99,7 @@ contains
           abs(missing(1)) <= final_accuracy*now%tolerance*sum(now%p)) return
       if (now%first .and. area == 1) then
         contact = now%contact
+        if (.not. now%cold) contact = now%contact_area(gap)
         changed = .true.
       else
         contact = now%contact_area(gap)

@@ -128,7 +128,7 @@ contains
     self%origin = reshape(reference, [2*n])
     self%candidate = reshape(problem%candidate, [n])
     self%dragging = abs(problem%pair%lambda_2) > 0.0_wp
-    self%pressing = self%dragging .and. .not. problem%goodman
+    self%pressing = self%dragging .and. problem%friction%resists() .and. .not. problem%goodman
     if (target%control(normal) /= force_control .and. .not. self%pressing) then
       ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
       self%candidate = self%candidate .and. self%h < target%value(normal)

@@ -33,7 +33,8 @@ module hc_friction_predictor
 contains
 
   !> Tractions and motions to start a step from.
-  recursive subroutine predict(problem, coarse, operators, start, reference, target, guess, work, error)
+  recursive subroutine predict(problem, coarse, operators, start, reference, target, guess, &
+                               predicted, work, error)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> The problem on the coarser lattices, and their operators
@@ -47,6 +48,8 @@ contains
     type(load_target_t), intent(in) :: target
     !> State to start from: the old one with new tractions and motions; the old one itself if nothing better is found
     type(contact_state_t), intent(inout) :: guess
+    !> There is something better
+    logical, intent(out) :: predicted
     !> Work, in applications of the full operator
     real(wp), intent(out) :: work
     !> Allocated on failure
@@ -57,8 +60,10 @@ contains
     type(load_target_t) :: coarse_target
     real(wp), allocatable :: origin(:, :, :), displacement(:, :, :)
     real(wp) :: coarser_work
+    logical :: helped
 
     work = 0.0_wp
+    predicted = .false.
     guess = start
     if (size(coarse) == 0) return
     model = coarse(1)
@@ -76,13 +81,14 @@ contains
     coarse_target = target
     where (target%control == force_control) coarse_target%value = before%load + (target%value - start%load)
     if (model%is_pressed(coarse_target)) then
-      call predict(model, coarse(2:), operators(2:), before, origin, coarse_target, first, coarser_work, error)
+      call predict(model, coarse(2:), operators(2:), before, origin, coarse_target, first, helped, coarser_work, error)
       if (allocated(error)) return
       work = work + coarser_work
       call solve_level(model, operators(1), first, origin, coarse_target, coarse_tolerance, coarse_sweeps, after, error)
       if (allocated(error)) return
       work = work + after%operator_applications
-      if (after%converged) call add_change(model, before, after, problem, guess)
+      predicted = after%converged
+      if (predicted) call add_change(model, before, after, problem, guess)
     end if
     work = work*model%lattice%size()/problem%lattice%size()
   end subroutine predict

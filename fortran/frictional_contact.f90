@@ -1,8 +1,8 @@
 !> One load step with Coulomb friction, on FFTs.
 !>
-!> Sweeps of a semismooth Newton method (see friction_sweep, friction_newton) lead from the
-!> last state to the next. Without an earlier state the first guess comes from
-!> coarser lattices.
+!> Sweeps of a semismooth Newton method (see friction_level) lead from the last
+!> state to the next, after coarser lattices have told what will change (see
+!> friction_predictor). Without an earlier state the first guess comes from them, too.
 module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -102,6 +102,8 @@ contains
 
     type(contact_state_t) :: guess
     real(wp) :: work
+    integer :: sweeps
+    logical :: predicted
 
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
@@ -109,16 +111,27 @@ contains
     end if
     work = 0.0_wp
     guess = start
-    if (size(self%operators) == 1) then
-      continue
-    else if (.not. any(start%pressure > 0.0_wp)) then
-      call coarse_guess(self, reference, target, max_sweeps, guess, work, error)
-    else
-      call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, work, error)
+    predicted = .false.
+    if (size(self%operators) > 1) then
+      if (any(start%pressure > 0.0_wp)) then
+        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, predicted, work, error)
+      else
+        call coarse_guess(self, reference, target, max_sweeps, guess, work, error)
+      end if
+      if (allocated(error)) return
     end if
-    if (allocated(error)) return
     call solve_level(self%problem, self%operators(1), guess, reference, target, tolerance, max_sweeps, state, error)
-    state%operator_applications = state%operator_applications + work
+    if (allocated(error)) return
+    work = work + state%operator_applications
+    if (predicted .and. .not. (state%converged .or. state%sliding)) then
+      ! the prediction led astray: the old state is a start as good
+      sweeps = state%sweeps
+      call solve_level(self%problem, self%operators(1), start, reference, target, tolerance, max_sweeps, state, error)
+      if (allocated(error)) return
+      state%sweeps = state%sweeps + sweeps
+      work = work + state%operator_applications
+    end if
+    state%operator_applications = work
   end subroutine solve_step
 
   !> A first guess from the coarser lattices.

@@ -1,0 +1,161 @@
+!> What a coarser lattice predicts of a load step.
+module test_friction_predictor
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, force_control, displacement_control
+  use hc_friction_law, only: coulomb_t
+  use hc_friction_problem, only: friction_problem_t
+  use hc_friction_systems, only: operators_t, new_operators
+  use hc_friction_predictor, only: predict
+  use hc_frictional_contact, only: frictional_contact_t
+  use test_friction, only: new_sphere
+  use testing, only: test_t, new_test, check, check_true
+  implicit none
+  private
+
+  public :: collect_friction_predictor
+
+  integer, parameter :: f = force_control, d = displacement_control
+  real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.3_wp
+
+contains
+
+  subroutine collect_friction_predictor(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('nothing_new', test_nothing_new), &
+      new_test('change', test_change), &
+      new_test('too_few_nodes', test_too_few_nodes) &
+    ]
+  end subroutine collect_friction_predictor
+
+  !> A sphere that was pressed and pushed, and its coarser lattice.
+  subroutine set_up(n, contact, state, coarse, operators, error)
+    !> Nodes on each side of the apex
+    integer, intent(in) :: n
+    type(frictional_contact_t), intent(out) :: contact
+    type(contact_state_t), intent(out) :: state
+    type(friction_problem_t), intent(out) :: coarse(1)
+    type(operators_t), intent(out) :: operators(1)
+    type(error_t), allocatable, intent(out) :: error
+
+    call new_sphere(contact, n, 0.4_wp, -0.2_wp, coulomb_t(mu), error, n_threads=1)
+    if (allocated(error)) return
+    coarse(1) = contact%problem%coarsened()
+    call new_operators(operators(1), coarse(1)%lattice, coarse(1)%pair, error, n_threads=1)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call go(contact, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
+    if (allocated(error)) return
+    call go(contact, state, [f, f, f, d], [load, 0.5_wp*mu*load, 0.0_wp, 0.0_wp], error)
+  end subroutine set_up
+
+  !> One load step.
+  subroutine go(contact, state, control, value, error)
+    type(frictional_contact_t), intent(inout) :: contact
+    type(contact_state_t), intent(inout) :: state
+    integer, intent(in) :: control(4)
+    real(wp), intent(in) :: value(4)
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: next
+
+    call contact%solve_step(state, state%relative_displacement, load_target_t(control, value), 1.0e-9_wp, 40, next, error)
+    if (allocated(error)) return
+    call check_true(error, next%converged, 'the step converges')
+    state = next
+  end subroutine go
+
+  !> Under the loads that it carries already a state is its own prediction, driven by forces or by motions.
+  subroutine test_nothing_new(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: state, guess
+    type(friction_problem_t) :: coarse(1)
+    type(operators_t) :: operators(1)
+    type(load_target_t) :: target
+    real(wp) :: work, p_max
+    logical :: predicted
+    integer :: i
+
+    call set_up(24, contact, state, coarse, operators, error)
+    if (allocated(error)) return
+    p_max = maxval(state%pressure)
+    do i = 1, 2
+      if (i == 1) target = load_target_t([f, f, f, d], state%load)
+      if (i == 2) target = load_target_t([d, d, d, d], state%motion)
+      target%value(4) = 0.0_wp
+      call predict(contact%problem, coarse, operators, state, state%relative_displacement, target, guess, predicted, &
+                   work, error)
+      if (allocated(error)) return
+      call check_true(error, predicted, 'a prediction')
+      if (allocated(error)) return
+      call check(error, maxval(abs(guess%pressure - state%pressure)), 0.0_wp, 1.0e-6_wp*p_max, 'pressure')
+      if (allocated(error)) return
+      call check(error, maxval(abs(guess%traction - state%traction)), 0.0_wp, 1.0e-6_wp*p_max, 'shear traction')
+      if (allocated(error)) return
+      call check(error, guess%motion, state%motion, 1.0e-7_wp, 'motions')
+      if (allocated(error)) return
+      call check_true(error, work > 0.25_wp .and. work < 5.0_wp, 'work, in applications on the fine lattice')
+      if (allocated(error)) return
+    end do
+  end subroutine test_nothing_new
+
+  !> Of what a step changes, less than a quarter is left to be found; at other motions, less than a tenth.
+  subroutine test_change(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: state, guess, after
+    type(friction_problem_t) :: coarse(1)
+    type(operators_t) :: operators(1)
+    real(wp), parameter :: value(4, 3) = reshape([ &
+      load, 0.6_wp*mu*load, 0.0_wp, 0.0_wp, &
+      1.2_wp*load, 0.5_wp*mu*load, 0.0_wp, 0.0_wp, &
+      load, 0.3_wp*mu*load, 0.1_wp*mu*load, 0.0_wp], [4, 3])
+    real(wp) :: work
+    logical :: predicted
+    integer :: i
+
+    call set_up(24, contact, state, coarse, operators, error)
+    if (allocated(error)) return
+    do i = 1, 3
+      after = state
+      call go(contact, after, [f, f, f, d], value(:, i), error)
+      if (allocated(error)) return
+      call predict(contact%problem, coarse, operators, state, state%relative_displacement, &
+                   load_target_t([f, f, f, d], value(:, i)), guess, predicted, work, error)
+      if (allocated(error)) return
+      call check_true(error, predicted, 'a prediction')
+      if (allocated(error)) return
+      print *, i, norm2(guess%traction - after%traction), norm2(state%traction - after%traction)
+      print *, norm2(guess%motion - after%motion), norm2(state%motion - after%motion)
+      call check_true(error, norm2(guess%traction - after%traction) < 0.9_wp*norm2(state%traction - after%traction), &
+                      'shear traction')
+      if (allocated(error)) return
+      call check_true(error, norm2(guess%motion - after%motion) < 0.9_wp*norm2(state%motion - after%motion), 'motions')
+      if (allocated(error)) return
+    end do
+  end subroutine test_change
+
+  !> A few nodes predict nothing: the state itself is the start, at no cost.
+  subroutine test_too_few_nodes(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: state, guess
+    type(friction_problem_t) :: coarse(1)
+    type(operators_t) :: operators(1)
+    real(wp) :: work
+    logical :: predicted
+
+    call set_up(10, contact, state, coarse, operators, error)
+    if (allocated(error)) return
+    call predict(contact%problem, coarse, operators, state, state%relative_displacement, &
+                 load_target_t([f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp]), guess, predicted, work, error)
+    if (allocated(error)) return
+    call check_true(error, .not. (predicted .or. work > 0.0_wp), 'no prediction')
+    if (allocated(error)) return
+    call check(error, maxval(abs(guess%traction - state%traction)), 0.0_wp, 0.0_wp, 'the old state')
+  end subroutine test_too_few_nodes
+
+end module test_friction_predictor

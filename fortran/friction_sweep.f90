@@ -20,6 +20,7 @@ module hc_friction_sweep
 
   !> Accuracy of a linear solution, relative to the residual at its start.
   real(wp), parameter :: inner_accuracy = 0.1_wp
+  !> The same once residuals are small, and of the pressure: its iterations are the cheaper ones.
   real(wp), parameter :: late_accuracy = 0.03_wp, press_accuracy = 0.05_wp
   !> Accuracy of the last linear solution, relative to the tolerance.
   real(wp), parameter :: final_accuracy = 0.2_wp
@@ -36,8 +37,6 @@ module hc_friction_sweep
   integer, parameter :: tired = 10
   real(wp), parameter :: least_caution = 1.0e-3_wp
   integer, parameter :: max_iterations = 400
-  real(wp), parameter :: enough = 0.1_wp
-  integer, parameter :: max_again = 1
   !> Contact areas that are tried before the shear traction is looked at again.
   integer, parameter :: max_areas = 1, max_areas_alone = 60
 
@@ -49,8 +48,6 @@ contains
     type(iterate_t), intent(inout) :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: before
-    integer :: again
 
     call press(now, error)
     if (allocated(error)) return
@@ -58,13 +55,10 @@ contains
       call now%operators%apply([normal], now%p, [along_x, along_y], now%dragged, error)
       if (allocated(error)) return
     end if
+    ! what the new pressure makes of the old shear traction is what has to be mended
     if (.not. now%first) call now%find_residuals()
-    before = min(now%residual_tangential, 1.0_wp)
-    do again = 1, merge(max_again, 1, now%pressing)
-      call shear_off(now, error)
-      if (allocated(error)) return
-      if (now%residual_tangential <= max(enough*before, now%tolerance) .or. now%sliding .or. now%held) exit
-    end do
+    call shear_off(now, error)
+    if (allocated(error)) return
     if (now%pressing) then
       call now%operators%apply([along_x, along_y], now%on_cone(), [normal], now%closing, error)
       if (allocated(error)) return

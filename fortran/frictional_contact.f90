@@ -76,8 +76,8 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
-    ! fields: problem, iterate, states, frames, vectors of conjugate gradients, a dozen directions of GMRES
-    finest = operators_memory(extent, n_threads) + 110*8*int(extent(1), long)*extent(2)
+    ! fields: problem, iterate, states, frames, vectors of conjugate gradients, a dozen directions of GMRES with their products
+    finest = operators_memory(extent, n_threads) + 150*8*int(extent(1), long)*extent(2)
     frictional_contact_memory = finest + finest/3
   end function frictional_contact_memory
 

@@ -102,7 +102,7 @@ contains
     end do
   end subroutine test_nothing_new
 
-  !> Of what a step changes, less than a quarter is left to be found; at other motions, less than a tenth.
+  !> Of the change of a step, mostly that at the fronts is left to be found; of the motions less than a fiftieth.
   subroutine test_change(error)
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
@@ -128,12 +128,10 @@ contains
       if (allocated(error)) return
       call check_true(error, predicted, 'a prediction')
       if (allocated(error)) return
-      print *, i, norm2(guess%traction - after%traction), norm2(state%traction - after%traction)
-      print *, norm2(guess%motion - after%motion), norm2(state%motion - after%motion)
-      call check_true(error, norm2(guess%traction - after%traction) < 0.9_wp*norm2(state%traction - after%traction), &
+      call check_true(error, norm2(guess%traction - after%traction) < 0.6_wp*norm2(state%traction - after%traction), &
                       'shear traction')
       if (allocated(error)) return
-      call check_true(error, norm2(guess%motion - after%motion) < 0.9_wp*norm2(state%motion - after%motion), 'motions')
+      call check_true(error, norm2(guess%motion - after%motion) < 0.02_wp*norm2(state%motion - after%motion), 'motions')
       if (allocated(error)) return
     end do
   end subroutine test_change

@@ -21,7 +21,7 @@ module hc_frictional_contact
   !> Windows below this many nodes a side are not coarsened any further.
   integer, parameter :: smallest_side = 20
   !> Coarse lattices only have to give a start.
-  real(wp), parameter :: coarse_tolerance = 1.0e-2_wp
+  real(wp), parameter :: coarse_tolerance = 1.0e-3_wp
 
   !> A contact problem with friction on a hierarchy of lattices.
   type, extends(friction_solver_t) :: frictional_contact_t

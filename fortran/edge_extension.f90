@@ -210,9 +210,12 @@ contains
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
-    real(sp) :: value(size(self%node)), smooth(size(self%node)), total
+    real(sp), allocatable :: value(:), smooth(:)
+    real(sp) :: total
     integer :: r, k, s, i
 
+    if (.not. allocated(self%node)) return                                     ! not set up: zero beyond the edge
+    allocate (value(size(self%node)), smooth(size(self%node)))
     do r = 1, size(self%ring) - 1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
         do k = first, last
@@ -242,9 +245,12 @@ contains
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
-    real(sp) :: value(size(self%node)), share(size(self%node)), total
+    real(sp), allocatable :: value(:), share(:)
+    real(sp) :: total
     integer :: r, k, s, i
 
+    if (.not. allocated(self%node)) return
+    allocate (value(size(self%node)), share(size(self%node)))
     do r = size(self%ring) - 1, 1, -1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
         value(first:last) = field(self%node(first:last))

@@ -259,7 +259,7 @@ contains
         end if
       end do
     end associate
-    call self%shear%blend()
+    call self%shear%blend(self%contact)
   end subroutine classify
 
   !> Let the nodes stick that slip least: without any, nothing resists a prescribed load.

@@ -49,6 +49,8 @@ contains
     call now%classify(.false., shear_active)
     system%operators => now%operators
     system%shear => now%shear
+    call now%pressure%take(now%contact)
+    system%edge = now%pressure%edge
     system%n_threads = now%operators%n_threads
     allocate (active(3*n), x(3*n), ax(3*n), rhs(3*n), weight(3*n), plane(2*n))
     active(:n) = now%contact

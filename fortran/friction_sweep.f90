@@ -101,6 +101,7 @@ contains
       end if
 
       now%contact = contact
+      if (changed) call now%pressure%take(contact)
       if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, contact)
       call lift_pressure(now, constraint, mb, error)
       if (allocated(error)) return

@@ -21,6 +21,7 @@ module hc_friction_systems
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
+  use hc_edge_extension, only: edge_extension_t, new_edge_extension
   use hc_krylov, only: linear_system_t
   implicit none
   private
@@ -53,7 +54,11 @@ module hc_friction_systems
   !> Pressure on the nodes in contact.
   type, extends(linear_system_t) :: pressure_system_t
     type(operators_t), pointer :: operators => null()
+    !> Continuation of displacements beyond the contact
+    type(edge_extension_t) :: edge
   contains
+    !> Take the nodes in contact
+    procedure :: take => take_contact
     procedure :: product => pressure_product
     procedure :: precondition => pressure_precondition
   end type pressure_system_t
@@ -69,13 +74,15 @@ module hc_friction_systems
     real(wp), allocatable :: weight(:)
     !> Elastic compliance 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa]
     real(wp) :: elastic_compliance = 0.0_wp
+    !> Continuation of displacements beyond the contact
+    type(edge_extension_t), private :: edge
     real(wp), allocatable, private :: from(:), onto(:)
   contains
     procedure :: product => shear_product
     procedure :: precondition => shear_precondition
     !> Components along x and y from those in the frames, and back
     procedure :: to_plane, to_frame
-    !> Work the weights out from the compliances
+    !> Take the nodes in contact; work the weights out from the compliances
     procedure :: blend
     !> Let the traction of a slipping node be the smaller the softer it is
     procedure :: soften
@@ -88,6 +95,8 @@ module hc_friction_systems
     type(operators_t), pointer :: operators => null()
     !> Frames and compliances of the nodes
     type(shear_system_t), pointer :: shear => null()
+    !> Continuation of displacements beyond the contact
+    type(edge_extension_t) :: edge
     !> mu at slipping nodes, 0 elsewhere
     real(wp), allocatable :: slope(:)
   contains
@@ -157,9 +166,10 @@ contains
   end function work
 
   !> Apply a preconditioner to vectors, and count it.
-  subroutine precondition(operators, preconditioner, n_component, x, y)
+  subroutine precondition(operators, preconditioner, edge, n_component, x, y)
     type(operators_t), intent(inout) :: operators
     type(preconditioner_t), intent(inout) :: preconditioner
+    type(edge_extension_t), intent(in) :: edge
     integer, intent(in) :: n_component
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
@@ -169,9 +179,18 @@ contains
       displacement(1:n(1), 1:n(2), 1:n_component) => x
       traction(1:n(1), 1:n(2), 1:n_component) => y
     end associate
-    call preconditioner%apply(displacement, traction)
+    call preconditioner%apply(displacement, traction, edge)
     operators%preconditioning = operators%preconditioning + preconditioner%cost
   end subroutine precondition
+
+  !> Take the nodes in contact.
+  subroutine take_contact(self, contact)
+    class(pressure_system_t), intent(inout) :: self
+    !> Nodes in contact (n)
+    logical, intent(in) :: contact(:)
+
+    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent))
+  end subroutine take_contact
 
   subroutine pressure_product(self, x, y, error)
     class(pressure_system_t), intent(inout) :: self
@@ -188,7 +207,7 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    call precondition(self%operators, self%operators%normal, 1, x, y)
+    call precondition(self%operators, self%operators%normal, self%edge, 1, x, y)
   end subroutine pressure_precondition
 
   !> A shear system in which every node sticks.
@@ -212,11 +231,14 @@ contains
   end subroutine new_shear_system
 
   !> chi falls with log D from 1 to 0; the symbol does not see the softest nodes at all.
-  subroutine blend(self)
+  subroutine blend(self, contact)
     class(shear_system_t), intent(inout) :: self
+    !> Nodes in contact (n)
+    logical, intent(in) :: contact(:)
     real(wp) :: ratio
     integer :: i
 
+    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent))
     do i = 1, size(self%weight)
       ratio = self%compliance(i)/(blend_end*self%elastic_compliance)
       if (ratio <= 1.0_wp/blend_range) then
@@ -307,7 +329,7 @@ contains
     y(:n) = self%weight*x(:n)
     y(n + 1:) = self%weight*x(n + 1:)
     call self%to_plane(y, self%from)
-    call precondition(self%operators, self%operators%tangential, 2, self%from, self%onto)
+    call precondition(self%operators, self%operators%tangential, self%edge, 2, self%from, self%onto)
     call self%to_frame(self%onto, y)
     do i = 1, n
       y(i) = self%weight(i)*y(i)
@@ -345,7 +367,7 @@ contains
     integer :: n
 
     n = size(x)/3
-    call precondition(self%operators, self%operators%normal, 1, x(:n), y(:n))
+    call precondition(self%operators, self%operators%normal, self%edge, 1, x(:n), y(:n))
     call self%shear%precondition(x(n + 1:), y(n + 1:), error)
   end subroutine coupled_precondition
 

@@ -357,7 +357,7 @@ contains
     system%direction(2, :) = sin(2.0_wp*pi*angle)
     ! stick, and slip with compliances from far below to far above that of a node
     system%compliance = [(merge(0.0_wp, system%elastic_compliance*10.0_wp**(0.4_wp*(i - 14)), modulo(i, 3) == 0), i=1, n)]
-    call system%blend()
+    call system%blend(spread(.true., 1, size(system%weight)))
     call random_number(x)
     call system%product(x, y, error)
     if (allocated(error)) return

@@ -15,7 +15,7 @@
 module hc_krylov
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_lapack, only: dgesv
+  use hc_lapack, only: ddot, dgesv
   implicit none
   private
 
@@ -90,23 +90,23 @@ contains
     logical, intent(out) :: independent
     !> Threads to use
     integer, intent(in) :: n_threads
-    real(wp) :: share(size(missing))
+    real(wp) :: share(size(missing)), inverse(size(missing), size(missing))
     integer :: m
 
-    share = missing
-    call solve_gram(rows, mb, share, independent, n_threads)
+    call invert_gram(rows, mb, inverse, independent, n_threads)
     if (.not. independent) return
+    share = matmul(inverse, missing)
     do m = 1, size(missing)
       x = x + share(m)*mb(:, m)
     end do
   end subroutine fulfil
 
-  !> share <- (C^T M B)^-1 share.
-  subroutine solve_gram(rows, mb, share, independent, n_threads)
+  !> (C^T M B)^-1, zero if the constraints depend on each other.
+  subroutine invert_gram(rows, mb, inverse, independent, n_threads)
     !> C and M B
     real(wp), intent(in) :: rows(:, :), mb(:, :)
-    !> Right-hand side and solution
-    real(wp), intent(inout) :: share(:)
+    !> The inverse
+    real(wp), intent(out) :: inverse(:, :)
     !> The matrix can be inverted
     logical, intent(out) :: independent
     !> Threads to use
@@ -115,6 +115,7 @@ contains
     integer :: m, k, info, pivot(size(mb, 2))
 
     independent = .true.
+    inverse = 0.0_wp
     if (size(mb, 2) == 0) return
     do m = 1, size(mb, 2)
       do k = 1, size(mb, 2)
@@ -127,12 +128,13 @@ contains
     scale = sqrt(scale)
     do m = 1, size(mb, 2)
       gram(:, m) = gram(:, m)/(scale*scale(m))
+      inverse(m, m) = 1.0_wp/scale(m)
     end do
-    share = share/scale
-    call dgesv(size(mb, 2), 1, gram, size(mb, 2), pivot, share, size(mb, 2), info)
+    call dgesv(size(mb, 2), size(mb, 2), gram, size(mb, 2), pivot, inverse, size(mb, 2), info)
     independent = info == 0 .and. all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
-    share = share/scale
-  end subroutine solve_gram
+    inverse = inverse/spread(scale, 2, size(mb, 2))
+    if (.not. independent) inverse = 0.0_wp
+  end subroutine invert_gram
 
   !> Preconditioned conjugate gradients with projection on the constraints.
   subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, &
@@ -164,12 +166,14 @@ contains
 
     real(wp), allocatable :: r(:), z(:), d(:), ad(:)
     real(wp) :: rz, rz_old, curvature, step, correction(size(constraint, 2))
+    real(wp) :: inverse(size(constraint, 2), size(constraint, 2))
     integer :: n, i, m, n_threads
     logical :: independent
 
     n = size(x)
     n_threads = system%n_threads
     allocate (r(n), z(n), d(n), ad(n))
+    call invert_gram(constraint, mb, inverse, independent, n_threads)
     iterations = 0
     rz_old = 0.0_wp
     do m = 1, size(multiplier)
@@ -184,13 +188,15 @@ contains
       do m = 1, size(multiplier)
         correction(m) = dot(mb(:, m), r, n_threads)
       end do
-      call solve_gram(mb, constraint, correction, independent, n_threads)
-      multiplier = multiplier - correction
-      call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
+      if (size(multiplier) > 0) then
+        correction = matmul(correction, inverse)
+        multiplier = multiplier - correction
+        call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
+      end if
       if (residual <= tolerance .or. iterations >= max_iterations) exit
       call system%precondition(r, z, error)
       if (allocated(error)) return
-      call project(active, constraint, mb, z, correction, n_threads)
+      call project(active, constraint, mb, inverse, z, n_threads)
 
       rz = dot(r, z, n_threads)
       step = 0.0_wp
@@ -260,14 +266,16 @@ contains
     real(wp), allocatable :: z(:), r(:), combined(:)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
+    real(wp) :: inverse(size(multiplier), size(multiplier))
     integer :: n, i, k
 
     n = size(x)
     iterations = 0
+    call invert_gram(rows, mb, inverse, independent, system%n_threads)
+    if (.not. independent) return
     allocate (z(n), r(n))
     basis(1)%v = merge(weight*(rhs - ax + matmul(columns, multiplier)), 0.0_wp, active)
     length = sqrt(dot(basis(1)%v, basis(1)%v, system%n_threads))
-    independent = .true.
     if (.not. length > 0.0_wp) return
     basis(1)%v = basis(1)%v/length
     g = 0.0_wp
@@ -276,7 +284,7 @@ contains
 
     do k = 1, max_iterations
       call expand(basis(k)%v, error)
-      if (allocated(error) .or. .not. independent) return
+      if (allocated(error)) return
       allocate (basis(k)%image(n))
       call system%product(z, basis(k)%image, error)
       if (allocated(error)) return
@@ -331,8 +339,7 @@ contains
       do j = 1, size(share)
         share(j) = -dot(rows(:, j), z, system%n_threads)
       end do
-      call solve_gram(rows, mb, share, independent, system%n_threads)
-      if (.not. independent) return
+      share = matmul(inverse, share)
       z = z + matmul(mb, share)
     end subroutine expand
 
@@ -366,19 +373,17 @@ contains
   end subroutine constrained_residual
 
   !> z <- z - M B (B^T M B)^-1 B^T z on the active nodes, zero elsewhere.
-  subroutine project(active, constraint, mb, z, share, n_threads)
+  subroutine project(active, constraint, mb, inverse, z, n_threads)
     !> Active nodes
     logical, intent(in) :: active(:)
-    !> B and M B
-    real(wp), intent(in) :: constraint(:, :), mb(:, :)
+    !> B, M B and (B^T M B)^-1
+    real(wp), intent(in) :: constraint(:, :), mb(:, :), inverse(:, :)
     !> Vector to be projected
-    real(wp), intent(inout) :: z(:)
-    !> (B^T M B)^-1 B^T z: how much of B is in the residual
-    real(wp), intent(out) :: share(:)
+    real(wp), intent(inout), contiguous :: z(:)
     !> Threads to use
     integer, intent(in) :: n_threads
 
-    logical :: independent
+    real(wp) :: share(size(mb, 2))
     integer :: i, m
 
     !$omp parallel do schedule(static) num_threads(n_threads)
@@ -389,7 +394,7 @@ contains
     do m = 1, size(mb, 2)
       share(m) = dot(constraint(:, m), z, n_threads)
     end do
-    call solve_gram(constraint, mb, share, independent, n_threads)
+    share = matmul(inverse, share)
     do m = 1, size(mb, 2)
       !$omp parallel do schedule(static) num_threads(n_threads)
       do i = 1, size(z)
@@ -402,7 +407,7 @@ contains
   !> Scalar product, summed in fixed blocks.
   real(wp) function dot(a, b, n_threads)
     !> Vectors of equal length
-    real(wp), intent(in) :: a(:), b(:)
+    real(wp), intent(in), contiguous :: a(:), b(:)
     !> Threads to use
     integer, intent(in) :: n_threads
     real(wp) :: part((size(a) + sum_block - 1)/sum_block)
@@ -412,7 +417,7 @@ contains
     do k = 1, size(part)
       from = (k - 1)*sum_block + 1
       to = min(k*sum_block, size(a))
-      part(k) = dot_product(a(from:to), b(from:to))
+      part(k) = ddot(to - from + 1, a(from:to), 1, b(from:to), 1)
     end do
     !$omp end parallel do
     dot = sum(part)

@@ -5,9 +5,17 @@ module hc_lapack
   implicit none
   private
 
-  public :: dgemm, dposv, dgesv, dsgesv, dgelss, spotrf, spotrs
+  public :: ddot, dgemm, dposv, dgesv, dsgesv, dgelss, spotrf, spotrs
 
   interface
+    !> Scalar product
+    pure real(wp) function ddot(n, dx, incx, dy, incy)
+      import :: wp
+      implicit none
+      integer, intent(in) :: n, incx, incy
+      real(wp), intent(in) :: dx(*), dy(*)
+    end function ddot
+
     !> C = alpha A B + beta C
     subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
       import :: wp

@@ -95,7 +95,7 @@ contains
 
     call invert_gram(rows, mb, inverse, independent, n_threads)
     if (.not. independent) return
-    share = matmul(inverse, missing)
+    share = [(dot_product(inverse(m, :), missing), m=1, size(share))]
     do m = 1, size(missing)
       x = x + share(m)*mb(:, m)
     end do
@@ -189,7 +189,7 @@ contains
         correction(m) = dot(mb(:, m), r, n_threads)
       end do
       if (size(multiplier) > 0) then
-        correction = matmul(correction, inverse)
+        correction = [(dot_product(inverse(:, m), correction), m=1, size(correction))]
         multiplier = multiplier - correction
         call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
       end if
@@ -339,7 +339,7 @@ contains
       do j = 1, size(share)
         share(j) = -dot(rows(:, j), z, system%n_threads)
       end do
-      share = matmul(inverse, share)
+      share = [(dot_product(inverse(j, :), share), j=1, size(share))]
       z = z + matmul(mb, share)
     end subroutine expand
 
@@ -394,7 +394,7 @@ contains
     do m = 1, size(mb, 2)
       share(m) = dot(constraint(:, m), z, n_threads)
     end do
-    share = matmul(inverse, share)
+    share = [(dot_product(inverse(m, :), share), m=1, size(share))]
     do m = 1, size(mb, 2)
       !$omp parallel do schedule(static) num_threads(n_threads)
       do i = 1, size(z)

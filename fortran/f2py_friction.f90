@@ -108,7 +108,7 @@ contains
   end subroutine create_frictional_contact
 
   !> Advance a state to given loads or motions.
-  subroutine advance_friction(handle, control, target, static, tolerance, max_sweeps, max_cuts, n_node, &
+  subroutine advance_friction(handle, control, target, static, interpolated, tolerance, max_sweeps, max_cuts, n_node, &
                               fields, numbers, new_fields, zone, new_numbers, residuals, sweeps, cuts, &
                               operator_applications, flags, code, message)
     !f2py threadsafe
@@ -120,6 +120,8 @@ contains
     real(c_double), intent(in) :: target(4)
     !> Not zero: the load is applied to the undeformed bodies at once
     integer(c_int), intent(in) :: static
+    !> Not zero: the slip of a node that enters counts from where it stood when its gap closed
+    integer(c_int), intent(in) :: interpolated
     !> Bound of the residuals
     real(c_double), intent(in) :: tolerance
     !> Active sets that may be tried, times that a step may be halved
@@ -154,7 +156,7 @@ contains
       if (associated(slot%friction)) then
         call unpack_state(slot%lattice, fields, numbers, state)
         call advance(slot%friction, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
-                     next, error)
+                     next, error, interpolated /= 0)
       else
         call raise(error, status%bad_handle, 'the handle is not that of a contact problem with friction')
       end if

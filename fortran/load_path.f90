@@ -10,6 +10,7 @@ module hc_load_path
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, force_control
   use hc_friction_problem, only: friction_solver_t
+  use hc_entry_state, only: solve_with_entry
   implicit none
   private
 
@@ -18,7 +19,7 @@ module hc_load_path
 contains
 
   !> Advance a state to given loads or motions.
-  subroutine advance(solver, state, target, static, tolerance, max_sweeps, max_cuts, next, error)
+  subroutine advance(solver, state, target, static, tolerance, max_sweeps, max_cuts, next, error, interpolated)
     !> Method
     class(friction_solver_t), intent(inout) :: solver
     !> State to go on from
@@ -37,14 +38,20 @@ contains
     type(contact_state_t), intent(out) :: next
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> Slip of a node that enters counts from where it stood when its gap closed; default: from the beginning of the step
+    logical, intent(in), optional :: interpolated
 
     type(contact_state_t) :: now, trial
-    real(wp), allocatable :: undeformed(:, :, :)
+    real(wp), allocatable :: undeformed(:, :, :), slipped(:, :, :)
+    logical :: from_entry
     real(wp) :: done, part, work
     integer :: cuts, sweeps
 
+    from_entry = .false.
+    if (present(interpolated)) from_entry = interpolated
     now = state
     undeformed = 0.0_wp*state%relative_displacement
+    slipped = undeformed
     done = 0.0_wp
     part = 1.0_wp
     work = 0.0_wp
@@ -53,6 +60,8 @@ contains
     do
       if (static) then
         call solver%solve_step(now, undeformed, between(state, target, done + part), tolerance, max_sweeps, trial, error)
+      else if (from_entry) then
+        call solve_with_entry(solver, now, between(state, target, done + part), tolerance, max_sweeps, trial, error)
       else
         call solver%solve_step(now, now%relative_displacement, between(state, target, done + part), tolerance, &
                                max_sweeps, trial, error)
@@ -68,6 +77,7 @@ contains
           trial%accumulated_slip = now%accumulated_slip + norm2(trial%slip_increment, dim=3)
           trial%dissipated_energy = now%dissipated_energy + dissipation(solver, trial)
         end if
+        slipped = slipped + trial%slip_increment
         now = trial
         done = done + part
         if (done >= 1.0_wp .or. touches_rim(now)) exit
@@ -87,6 +97,7 @@ contains
     if (.not. static .and. cuts > 0 .and. next%converged) then
       ! the slip of the step is that of all its parts
       next%slip_increment = next%relative_displacement - state%relative_displacement
+      if (from_entry) next%slip_increment = slipped
       where (spread(next%pressure <= 0.0_wp, 3, 2)) next%slip_increment = 0.0_wp
     end if
   end subroutine advance

@@ -66,6 +66,7 @@ class SolverSettings:
     method: str = "auto"
     tolerance: float = 1e-8
     coupling: str = "full"
+    entry: str = "implicit"
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class Case:
         Entries of [[load]] instead, for anything more; twist in rad.
     friction_coefficient : float, optional
         Coefficient of friction; frictionless if absent.
-    algorithm, method, tolerance, coupling : optional
+    algorithm, method, tolerance, coupling, entry : optional
         Keys of [solver].
     fields, every : optional
         Keys of [output].
@@ -192,6 +193,7 @@ class Case:
         method: str | None = None,
         tolerance: float | None = None,
         coupling: str | None = None,
+        entry: str | None = None,
         fields: Sequence[str] | None = None,
         every: int | None = None,
         title: str = "",
@@ -221,7 +223,10 @@ class Case:
                 center=center,
                 origin=origin,
             ),
-            solver=given(algorithm=algorithm, method=method, tolerance=tolerance, coupling=coupling) or None,
+            solver=given(
+                algorithm=algorithm, method=method, tolerance=tolerance, coupling=coupling, entry=entry
+            )
+            or None,
             load=[with_radians(load) for load in loads],
             output=given(fields=fields, every=every) or None,
         )
@@ -280,8 +285,13 @@ class Case:
         self.body_1, self.body_2 = _body(deck.body.body_1), _body(deck.body.body_2)
         self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
         algorithm, problems = algorithm_of(deck)
+        given_solver = deck.solver
         self.solver = SolverSettings(
-            algorithm, deck.solver.method, deck.solver.tolerance, deck.solver.coupling
+            algorithm,
+            given_solver.method,
+            given_solver.tolerance,
+            given_solver.coupling,
+            given_solver.entry,
         )
         self.output = OutputSettings(
             Path(deck.output.file) if deck.output.file else None, deck.output.fields or (), deck.output.every

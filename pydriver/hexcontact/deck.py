@@ -153,6 +153,13 @@ class Solver(Table):
     coupling: Annotated[str, Word(("full", "goodman"))] = Field(
         "full", description="goodman: shear does not move the pressure (for comparison)"
     )
+    entry: Annotated[str, Word(("implicit", "interpolated"))] = Field(
+        "implicit",
+        description=(
+            "incremental, nodes that come into contact: implicit: their slip counts from the beginning of "
+            "the load step; interpolated: from the moment their gap closed"
+        ),
+    )
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ _api = _core.hc_f2py_friction
 
 Array = NDArray[np.float64]
 Coupling = Literal["full", "goodman"]
+Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS = (  # in the order of fortran/f2py_friction.f90
@@ -194,6 +195,7 @@ class FrictionalContact:
         value: Sequence[float],
         *,
         static: bool = False,
+        entry: Entry = "implicit",
         tolerance: float = 1e-8,
         max_sweeps: int = 40,
         max_cuts: int = 6,
@@ -210,6 +212,9 @@ class FrictionalContact:
             Normal load, tangential loads [N] and torque [N m], or approach, shifts [m] and twist [rad].
         static
             The load is applied to the undeformed bodies at once; `state` only serves as a start.
+        entry
+            What the slip of a node that comes into contact counts from: ``"implicit"``: the beginning of
+            the step; ``"interpolated"``: where it stood when its gap closed. A static load knows neither.
         tolerance
             Bound of all residuals.
         max_sweeps
@@ -230,6 +235,8 @@ class FrictionalContact:
             raise DeckError(f"value = {value!r}: expected four finite numbers")
         if control[0] == "force" and value[0] < 0:
             raise DeckError(f"normal_load = {value[0]!r}: expected a number not below zero")
+        if entry not in ("implicit", "interpolated"):
+            raise DeckError(f"entry = {entry!r}: expected 'implicit' or 'interpolated'")
         if not 0 < tolerance < 1:
             raise DeckError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
         fields = np.empty((self.lattice.size, len(_FIELDS)), order="F")
@@ -244,6 +251,7 @@ class FrictionalContact:
             [_CONTROLS[word] for word in control],
             value,
             int(static),
+            int(entry == "interpolated"),
             tolerance,
             max_sweeps,
             max_cuts,

@@ -33,6 +33,7 @@ def metadata_of(case: Case) -> Metadata:
             "friction_coefficient": case.friction_coefficient,
             "algorithm": case.solver.algorithm,
             "coupling": case.solver.coupling,
+            "entry": case.solver.entry,
             "tolerance": case.solver.tolerance,
         },
     )

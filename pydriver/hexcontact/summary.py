@@ -109,7 +109,9 @@ def _friction(case: Case) -> str:
     mu = case.friction_coefficient
     law = "no slip (coefficient inf)" if math.isinf(mu) else f"coefficient {mu:g}"
     goodman = ", shear does not move the pressure" * (case.solver.coupling == "goodman")
-    return f"{law}, {case.solver.algorithm}{goodman}"
+    interpolated = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
+    entry = ", entry interpolated" * interpolated
+    return f"{law}, {case.solver.algorithm}{entry}{goodman}"
 
 
 def _history(case: Case) -> str:
@@ -297,6 +299,8 @@ def _algorithm(attributes: Mapping[str, Any]) -> str:
     algorithm = str(attributes.get("algorithm", "unknown"))
     if algorithm in ("static", "incremental"):
         algorithm += f", friction coefficient {float(attributes['friction_coefficient']):g}"
+    if algorithm.startswith("incremental"):
+        algorithm += ", entry interpolated" * (attributes.get("entry") == "interpolated")
     return algorithm + ", coupling goodman" * (attributes.get("coupling") == "goodman")
 
 

@@ -138,6 +138,12 @@ _ALL = (
         _of("verify_no_slip", "sphere"),
     ),
     Check(
+        "entry",
+        "Few load steps of a growing contact",
+        "Nodes that come into contact, with both values of solver.entry, against exact solutions.",
+        _of("verify_entry", "entry"),
+    ),
+    Check(
         "unloading",
         "Dissimilar sphere pressed and let go",
         "Normal unloading with friction: slip reverses from the edge inwards.",

@@ -36,6 +36,7 @@ DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"
 S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
+_ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
 
 
 # --- memory ---------------------------------------------------------------------------------------
@@ -47,8 +48,10 @@ def memory_needed(case: Case, lattice: Lattice) -> int:
 
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
     operator = native.memory_needed("fft", lattice.n_row, lattice.n_col, operator_only=True)
-    arrays = kind_of(case).arrays * _ITEM * lattice.size
-    return case.memory_needed(lattice) + len(bodies) * operator + arrays
+    arrays = kind_of(case).arrays
+    if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
+        arrays += _ENTRY_ARRAYS
+    return case.memory_needed(lattice) + len(bodies) * operator + arrays * _ITEM * lattice.size
 
 
 def require_memory(case: Case, lattice: Lattice, steps_held: int = 0) -> None:

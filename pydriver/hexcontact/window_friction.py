@@ -63,6 +63,7 @@ class FrictionWindow(Window["ContactState"]):
             [motion.control for motion in target.targets],
             values,
             static=self.case.solver.algorithm == "static",
+            entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
             tolerance=self.case.solver.tolerance,
         )
 

@@ -9,6 +9,7 @@ module test_load_path
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t, new_friction_problem
   use hc_frictional_contact, only: frictional_contact_t
+  use hc_entry_state, only: entry_displacement
   use hc_load_path, only: advance, touches_rim
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_true
@@ -56,7 +57,10 @@ contains
       new_test('motions', test_motions), &
       new_test('rim', test_rim), &
       new_test('half_steps', test_half_steps), &
-      new_test('any_start', test_any_start) &
+      new_test('any_start', test_any_start), &
+      new_test('entry_ring', test_entry_ring), &
+      new_test('entry_patch', test_entry_patch), &
+      new_test('entry_oblique', test_entry_oblique) &
     ]
   end subroutine collect_load_path
 
@@ -372,5 +376,130 @@ contains
     if (allocated(error)) return
     call check_true(error, maxval(abs(next%traction - state(1)%traction)) > 0.05_wp*mu, 'another history, another traction')
   end subroutine test_any_start
+
+  !> A circular contact grows by 4 and by 12 spacings: near its edge s - s_e is linear in the distance d if the
+  !> edge slips, and goes with d^(3/2) if it sticks. Found to 2 and 1 % of the motion outside.
+  subroutine test_entry_ring(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(recorder_t) :: solver
+    type(contact_state_t) :: before, after
+    real(wp), allocatable :: r(:, :), u(:, :, :), expected(:, :, :)
+    real(wp), parameter :: old = 0.4_wp, power(2) = [1.0_wp, 1.5_wp], allowed(2) = [0.025_wp, 0.015_wp]
+    real(wp) :: new, scale
+    integer :: i, k
+
+    call new_sphere(solver%frictional_contact_t, 40, 0.0_wp, 0.0_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    associate (x => solver%problem%x, y => solver%problem%y)
+      r = sqrt(x**2 + y**2)
+      do i = 1, 2
+        do k = 1, 2
+          new = old + merge(4, 12, i == 1)*1.3_wp/40
+          call edge_state(old, before)
+          call edge_state(new, after)
+          u = entry_displacement(solver%problem, before, after)
+          allocate (expected, mold=u)
+          expected = 0.0_wp
+          where (r > old .and. r < new)
+            expected(:, :, 1) = (r - old)**power(k)*x/r
+            expected(:, :, 2) = (r - old)**power(k)*y/r
+          end where
+          scale = (new - old)**power(k)
+          call check_true(error, count(abs(u(:, :, 1)) > 0.0_wp) > 100, 'many nodes enter')
+          if (allocated(error)) return
+          call check(error, sqrt(sum((u - expected)**2)/count(r > old .and. r < new))/scale, 0.0_wp, allowed(k), 'mean error')
+          if (allocated(error)) return
+          call check_true(error, all(abs(u) <= 0.0_wp .or. spread(r > old .and. r < new, 3, 2)), 'zero elsewhere')
+          if (allocated(error)) return
+          deallocate (expected)
+        end do
+      end do
+    end associate
+
+  contains
+
+    !> Pressure and gap at the edge of a contact, and the displacement outside.
+    subroutine edge_state(radius, state)
+      real(wp), intent(in) :: radius
+      type(contact_state_t), intent(out) :: state
+      real(wp) :: far(size(r, 1), size(r, 2))
+
+      call new_friction_state(state, solver%problem%lattice)
+      far = max(r - radius, 0.0_wp)
+      ! so little pressure that the lattice does not matter
+      state%pressure = 1.0e-6_wp*sqrt(max(radius - r, 0.0_wp))
+      state%gap = far**1.5_wp
+      where (r > 0.0_wp)
+        state%relative_displacement(:, :, 1) = -far**power(k)*solver%problem%x/r
+        state%relative_displacement(:, :, 2) = -far**power(k)*solver%problem%y/r
+      end where
+    end subroutine edge_state
+
+  end subroutine test_entry_ring
+
+  !> A new patch, closing at one rate while the bodies shift: each node enters after gap/closing of the shift.
+  subroutine test_entry_patch(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(recorder_t) :: solver
+    type(contact_state_t) :: before, after
+    real(wp), allocatable :: u(:, :, :), gap(:, :)
+    real(wp), parameter :: closing = 0.3_wp, shift(2) = [2.0_wp, -1.0_wp]
+    integer :: i
+
+    call new_sphere(solver%frictional_contact_t, 20, 0.0_wp, 0.0_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    call new_friction_state(before, solver%problem%lattice)
+    ! not touching yet by 0.1
+    before%motion(normal) = -0.1_wp
+    gap = solver%problem%initial_gap + 0.1_wp
+    call new_friction_state(after, solver%problem%lattice)
+    after%gap = max(gap - closing, 0.0_wp)
+    after%pressure = max(closing - gap, 0.0_wp)
+    do i = 1, 2
+      after%relative_displacement(:, :, i) = shift(i)
+    end do
+    u = entry_displacement(solver%problem, before, after)
+    call check_true(error, count(after%pressure > 0.0_wp) > 100, 'many nodes enter')
+    if (allocated(error)) return
+    do i = 1, 2
+      call check(error, maxval(abs(u(:, :, i) - merge(shift(i)*gap/closing, 0.0_wp, after%pressure > 0.0_wp))), 0.0_wp, &
+                 1.0e-12_wp, 'share of the shift')
+      if (allocated(error)) return
+    end do
+    ! nothing enters: nothing is displaced
+    u = entry_displacement(solver%problem, after, after)
+    call check(error, maxval(abs(u)), 0.0_wp, 0.0_wp, 'nothing enters')
+  end subroutine test_entry_patch
+
+  !> Oblique load that makes nothing slip, shift 3SQ/16a (exact for nu = 0): after three steps within the mesh error,
+  !> while slip from the beginning of the step leaves 15 %.
+  subroutine test_entry_oblique(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(recorder_t) :: solver
+    type(contact_state_t) :: state, next
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, ratio = 0.1_wp, exact = 3.0_wp*4.0_wp*ratio*load/16.0_wp
+    real(wp) :: missing(2)
+    integer :: i, step
+
+    call new_sphere(solver%frictional_contact_t, 16, 0.0_wp, 0.0_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    do i = 1, 2
+      call new_friction_state(state, solver%problem%lattice)
+      do step = 1, 3
+        call advance(solver, state, load_target_t(value=(step/3.0_wp)**3*load*[1.0_wp, ratio, 0.0_wp, 0.0_wp]), .false., &
+                     1.0e-8_wp, 40, 6, next, error, interpolated=i == 2)
+        if (allocated(error)) return
+        call check_true(error, next%converged, 'converged')
+        if (allocated(error)) return
+        state = next
+      end do
+      missing(i) = abs(state%motion(along_x))/exact - 1.0_wp
+    end do
+    call check_true(error, abs(missing(1)) > 0.1_wp, 'slip from the beginning of the step')
+    if (allocated(error)) return
+    call check(error, missing(2), 0.0_wp, 3.0e-3_wp, 'slip from the entry')
+    if (allocated(error)) return
+    call check_true(error, state%dissipated_energy <= 1.0e-12_wp .and. all(state%zone /= 2), 'nothing slips')
+  end subroutine test_entry_oblique
 
 end module test_load_path

@@ -4,13 +4,13 @@
 !> its relative displacement at the beginning of the step, as if it had not moved freely until
 !> its gap closed. Here it counts from an estimate of that moment's,
 !>
-!>     s_e = s^n + psi D,   D = s^{n+1} - s^n of the nodes outside, carried inwards,
+!>     s_e = s^n + m_1/M_1 (D - C) + m_2/M_2 C,
 !>
-!> whose share psi rises from 0 at the old edge of the contact to 1 at the new one. Like
-!> the gap, s - s_e of a free surface near the edge is a sum of a part that is linear in the
-!> distance d (the edge slips) and one with d^(3/2) (it sticks); gap^(2/3) and the gap itself are
-!> measures of both that need no geometry. How much there is of each shows in how D grows
-!> outwards. D belongs to the solution, so that the two are iterated (see docs/theory.md, section 11).
+!> with D = s^{n+1} - s^n of the nodes that are still outside, carried inwards. Near the old edge
+!> s_e - s^n is a sum of a part that is linear in the distance d from it, as the edge slips, and one with
+!> d^(3/2), C, as it sticks. The gap at the beginning of the step measures both without any geometry: m_1 is its power
+!> 2/3, m_2 the gap itself; M_1, M_2 are what they lose during the step outside. How much there is of C shows in how D
+!> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory.md, section 11).
 module hc_entry_state
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -28,9 +28,9 @@ module hc_entry_state
   !> Near an edge on a lattice gap^(2/3) closes as (gap + g_0)^(2/3), g_0 this times the closing that
   !> the pressure at the edge makes at a node. Found from the moments at which nodes enter a Hertzian contact.
   real(wp), parameter :: edge_gap = 0.11_wp
-  !> The share of the d^(3/2) part is found this much too small, since D is known from the first node outside on.
+  !> The part C is found too small by this much of D, which is known from the first node outside on.
   real(wp), parameter :: missed_share = 0.12_wp
-  !> Spacings along the edge over which that share is found.
+  !> Spacings along the edge over which C is found.
   integer, parameter :: along_edge = 3
 
   !> Corrections of the entry state in one load step.
@@ -41,6 +41,17 @@ module hc_entry_state
   real(wp), parameter :: dependent = 1.0e-7_wp
   !> Accuracy of a solution: at the beginning; relative to the residual that the entry state leaves; of the last one.
   real(wp), parameter :: first_tolerance = 1.0e-3_wp, relative_tolerance = 0.05_wp, last_tolerance = 0.5_wp
+
+  !> What is carried inwards from the nodes outside.
+  type :: carried_t
+    !> Motion D of the step, and the part of it that grows with d^(3/2)
+    real(wp) :: moved(2) = 0.0_wp
+    real(wp) :: curved(2) = 0.0_wp
+    !> Closing of both measures of the gap during the step
+    real(wp) :: closed(2) = 0.0_wp
+    !> g_0
+    real(wp) :: lattice_gap = 0.0_wp
+  end type carried_t
 
 contains
 
@@ -188,11 +199,6 @@ contains
     type(contact_state_t), intent(in) :: before, after
     real(wp), allocatable :: displacement(:, :, :)
 
-    !> D and the closing of both measures of the gap during the step, of nodes outside or carried inwards; their g_0
-    !> and the part of D that grows with d^(3/2)
-    type :: carried_t
-      real(wp) :: moved(2) = 0.0_wp, closed(2) = 0.0_wp, edge_gap = 0.0_wp, curved(2) = 0.0_wp
-    end type carried_t
     type(carried_t), allocatable :: carried(:, :)
     type(carried_t) :: sum_of
     real(wp), allocatable :: gap(:, :), edge_pressure(:, :)
@@ -245,16 +251,16 @@ contains
         total = total + weight
         sum_of%moved = sum_of%moved + weight*carried(c, r)%moved
         sum_of%closed = sum_of%closed + weight*carried(c, r)%closed
-        sum_of%edge_gap = sum_of%edge_gap + weight*carried(c, r)%edge_gap
+        sum_of%lattice_gap = sum_of%lattice_gap + weight*carried(c, r)%lattice_gap
         sum_of%curved = sum_of%curved + weight*carried(c, r)%curved
       end do
       if (total <= 0.0_wp) cycle
       known(col, row) = .true.
-      carried(col, row) = carried_t(sum_of%moved/total, sum_of%closed/total, sum_of%edge_gap/total, sum_of%curved/total)
+      carried(col, row) = carried_t(sum_of%moved/total, sum_of%curved/total, sum_of%closed/total, sum_of%lattice_gap/total)
       share = merge(1.0_wp, 0.0_wp, gap(col, row) > 0.0_wp)
       associate (here => carried(col, row))
-        where (measures(gap(col, row), here%edge_gap) < here%closed)
-          share = measures(gap(col, row), here%edge_gap)/here%closed
+        where (measures(gap(col, row), here%lattice_gap) < here%closed)
+          share = measures(gap(col, row), here%lattice_gap)/here%closed
         end where
         if (attached(col, row)) then
           displacement(col, row, :) = share(1)*(here%moved - here%curved) + share(2)*here%curved
@@ -267,13 +273,13 @@ contains
   contains
 
     !> Motion of a node outside, and how far its gap closed.
-    type(carried_t) function seen_from(col, row, edge_gap)
+    type(carried_t) function seen_from(col, row, lattice_gap)
       integer, intent(in) :: col, row
-      real(wp), intent(in) :: edge_gap
+      real(wp), intent(in) :: lattice_gap
 
       seen_from%moved = after%relative_displacement(col, row, :) - before%relative_displacement(col, row, :)
-      seen_from%closed = measures(gap(col, row), edge_gap) - measures(max(after%gap(col, row), 0.0_wp), edge_gap)
-      seen_from%edge_gap = edge_gap
+      seen_from%closed = measures(gap(col, row), lattice_gap) - measures(max(after%gap(col, row), 0.0_wp), lattice_gap)
+      seen_from%lattice_gap = lattice_gap
     end function seen_from
 
     !> Part C of D that grows with d^(3/2), from how D grows between the first two nodes outside.
@@ -302,7 +308,7 @@ contains
               if (.not. inside(gap, c, r)) cycle
               weight = gap(c, r) - gap(col, row)
               if (weight <= 0.0_wp .or. .not. outside(c, r)) cycle
-              next = seen_from(c, r, here%edge_gap)
+              next = seen_from(c, r, here%lattice_gap)
               total = total + weight
               further%moved = further%moved + weight*next%moved
               further%closed = further%closed + weight*next%closed
@@ -344,11 +350,11 @@ contains
   end function inside
 
   !> What a gap measures of the distance from an edge that slips, and from one that sticks.
-  pure function measures(gap, edge_gap)
-    real(wp), intent(in) :: gap, edge_gap
+  pure function measures(gap, lattice_gap)
+    real(wp), intent(in) :: gap, lattice_gap
     real(wp) :: measures(2)
 
-    measures(1) = (gap + edge_gap)**(2.0_wp/3.0_wp) - edge_gap**(2.0_wp/3.0_wp)
+    measures(1) = (gap + lattice_gap)**(2.0_wp/3.0_wp) - lattice_gap**(2.0_wp/3.0_wp)
     measures(2) = gap
   end function measures
 

@@ -51,7 +51,7 @@ contains
     if (present(interpolated)) from_entry = interpolated
     now = state
     undeformed = 0.0_wp*state%relative_displacement
-    slipped = undeformed
+    allocate (slipped, source=undeformed)
     done = 0.0_wp
     part = 1.0_wp
     work = 0.0_wp

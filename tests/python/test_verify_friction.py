@@ -10,6 +10,7 @@ from hexcontact import (
     verify_cases,
     verify_crossed,
     verify_dissimilar,
+    verify_entry,
     verify_fretting,
     verify_methods,
     verify_no_slip,
@@ -181,6 +182,15 @@ def test_a_little_more_friction_is_a_failure(monkeypatch) -> None:
 RATIO = {
     step: f"{0.1 * (step - 10) / 3.15:.4f}" for step in verify_fretting.STEPS
 }  # what the reference table calls the steps
+
+
+def test_few_steps(monkeypatch) -> None:
+    found = verify_entry.entry(20, 40, (5,))
+    assert judged(found) == 4
+    assert failures(found) == []
+    # as if solver.entry did nothing
+    monkeypatch.setattr(verify_entry, "run", lambda *a, entry="", **k: verify_runs.run(*a, **k))
+    assert len(failures(verify_entry.entry(20, 40, (5,)))) == 3
 
 
 def test_other_materials_are_a_failure(monkeypatch) -> None:

@@ -38,7 +38,7 @@ def entry(mesh: int = 20, fine_mesh: int = 80, step_counts: Sequence[int] = (5, 
     found.notes += [
         "Oblique load: alike spheres, ν = 0.33, μ = 0.3, Q = 0.15 P all the way: no slip, Δ = 3SQ/16a for "
         "ν = 0 (0.1 % for ν = 0.33), and the lattice adds 0.05 %. P_k = P (k/N)³.",
-        "μ = 1: hardly anything slips. Spence's δ/δ_Hertz without slip, |β| = 0.19; the lattice adds some 1e-4.",
+        "μ = 1: hardly anything slips. Spence's δ/δ_Hertz without slip, |β| = 0.19; the lattice adds 1e-4.",
         'entry = "implicit" is not judged: it is of the first order in the load step.',
         "Stick radius: what a load step calls stick does not slip during the step and belongs to its middle, "
         "whatever solver.entry is; so c is divided by the mean of a before and after the step.",

@@ -21,7 +21,7 @@ module hc_friction_level
   !> Sweeps after which tractions that do not settle one after the other are found together, unless they act on
   !> each other so strongly that it is done sooner: once residuals are near, or a few sweeps later all the same.
   integer, parameter :: most_apart = 12, patience = 4
-  real(wp), parameter :: near = 0.3_wp
+  real(wp), parameter :: near = 0.6_wp
 contains
 
   !> Sweeps on one lattice.

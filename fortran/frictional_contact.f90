@@ -12,7 +12,7 @@ module hc_frictional_contact
   use hc_friction_systems, only: operators_t, new_operators, operators_memory
   use hc_friction_level, only: solve_level
   use hc_friction_predictor, only: predict
-  use hc_multilevel, only: prolong, restrict_vector, level_count
+  use hc_multilevel, only: prolong_edge, prolong_shear, restrict_vector, level_count
   implicit none
   private
 
@@ -184,14 +184,11 @@ contains
     type(contact_state_t), intent(in) :: coarse
     type(friction_problem_t), intent(in) :: problem
     type(contact_state_t), intent(inout) :: state
-    integer :: m
-
     if (any(shape(coarse%pressure) /= coarse_problem%lattice%extent)) return
     if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
-    call prolong(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure)
-    do m = 1, 2
-      call prolong(coarse_problem%lattice, coarse%traction(:, :, m), problem%lattice, state%traction(:, :, m))
-    end do
+    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure)
+    call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
+                       state%traction)
     state%motion = coarse%motion
   end subroutine prolong_state
 

@@ -9,7 +9,7 @@ module hc_multilevel
   implicit none
   private
 
-  public :: level_count, prolong, prolong_vector, prolong_edge, restrict_field, restrict_vector, restrict_mask
+  public :: level_count, prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
 
 contains
 
@@ -127,6 +127,47 @@ contains
       call prolong(coarse_lattice, coarse(:, :, m), fine_lattice, fine(:, :, m))
     end do
   end subroutine prolong_vector
+
+  !> Interpolate a shear traction as its ratio to the pressure: where a node slips it stays on the cone.
+  pure subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine)
+    !> Coarse lattice and window
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse pressure (n_col, n_row) and shear traction (n_col, n_row, 2)
+    real(wp), intent(in) :: coarse_pressure(:, :), coarse(:, :, :)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine pressure (n_col, n_row)
+    real(wp), intent(in) :: fine_pressure(:, :)
+    !> Fine shear traction (n_col, n_row, 2)
+    real(wp), intent(out) :: fine(:, :, :)
+    real(wp), allocatable :: ratio(:, :, :)
+    integer :: col, row, k, n, near(2)
+
+    allocate (ratio, mold=coarse)
+    do row = 1, size(coarse, 2)
+      do col = 1, size(coarse, 1)
+        ratio(col, row, :) = 0.0_wp
+        if (coarse_pressure(col, row) > 0.0_wp) then
+          ratio(col, row, :) = coarse(col, row, :)/coarse_pressure(col, row)
+          cycle
+        end if
+        ! beyond the edge: that of the neighbours in contact
+        n = 0
+        do k = 1, size(neighbors, 2)
+          near = [col, row] + neighbors(:, k)
+          if (any(near < 1) .or. any(near > shape(coarse_pressure))) cycle
+          if (.not. coarse_pressure(near(1), near(2)) > 0.0_wp) cycle
+          ratio(col, row, :) = ratio(col, row, :) + coarse(near(1), near(2), :)/coarse_pressure(near(1), near(2))
+          n = n + 1
+        end do
+        if (n > 0) ratio(col, row, :) = ratio(col, row, :)/n
+      end do
+    end do
+    call prolong_vector(coarse_lattice, ratio, fine_lattice, fine)
+    do k = 1, size(fine, 3)
+      fine(:, :, k) = fine(:, :, k)*max(fine_pressure, 0.0_wp)
+    end do
+  end subroutine prolong_shear
 
   !> Values of a field at the coarse nodes.
   pure function restrict_field(fine_lattice, fine, coarse_lattice) result(coarse)

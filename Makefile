@@ -4,6 +4,7 @@
 #   PYTHON=/path/to/python3.12   the interpreter .venv is made with
 #   APT=no                       install no system package, only name what is missing
 #   PYTEST_ARGS='-k deck -x'     more words for pytest
+#   BENCH_ARGS='--only counts'   more words for the benchmarks
 
 VENV := .venv
 STAMPS := $(VENV)/.stamps
@@ -81,8 +82,8 @@ demo: install  ## press a sphere on aluminum, then shear it: history, result and
 verify: install  ## compare with published, discrete and analytic solutions (minutes)
 	hexcontact verify
 
-bench: install  ## timings, as ratios measured side by side
-	meson test -C $(BUILD) --benchmark --verbose
+bench: install  ## work, times, memory, other codes side by side: docs/performance.md (BENCH_ARGS=--quick: two minutes)
+	$(py) tests/bench/run.py --build $(BUILD) $(BENCH_ARGS)
 
 # --- tests -------------------------------------------------------------------
 

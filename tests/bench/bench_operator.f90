@@ -5,6 +5,9 @@
 !> and back; "blocked" are the same transforms in the operator's cache-sized
 !> blocks. Nothing is copied, padded or multiplied in either. All in one run,
 !> best of several repetitions, one thread.
+!>
+!> Arguments are sides of windows: for each a line of seconds instead of the table, to be read by a program
+!> (side; scalar product, bare and blocked transforms; 3x3 product, its bare and blocked transforms).
 program bench_operator
   use, intrinsic :: iso_c_binding, only: c_ptr, c_int
   use, intrinsic :: iso_fortran_env, only: int64
@@ -22,15 +25,21 @@ program bench_operator
   integer, parameter :: sides(4) = [256, 512, 1024, 2048]
   integer :: i
 
-  print '(a)', '| window | scalar product [ms] | over bare FFTs | over blocked FFTs | 3x3 product [ms] | over bare FFTs |'
-  print '(a)', '|---|---|---|---|---|---|'
-  do i = 1, size(sides)
-    call measure(sides(i))
-  end do
-  print '(/,a)', '| kernel table of a window | offsets | seconds |'
-  print '(a)', '|---|---|---|'
-  call measure_table(1024)
-  call measure_table(2048)
+  if (command_argument_count() > 0) then
+    do i = 1, command_argument_count()
+      call print_seconds(side_of_argument(i))
+    end do
+  else
+    print '(a)', '| window | scalar product [ms] | over bare FFTs | over blocked FFTs | 3x3 product [ms] | over bare FFTs |'
+    print '(a)', '|---|---|---|---|---|---|'
+    do i = 1, size(sides)
+      call print_row(sides(i))
+    end do
+    print '(/,a)', '| kernel table of a window | offsets | seconds |'
+    print '(a)', '|---|---|---|'
+    call measure_table(1024)
+    call measure_table(2048)
+  end if
 
 contains
 
@@ -49,18 +58,49 @@ contains
     print '(a,i0,a,i0,a,f0.2,a)', '| ', side, '^2 | ', 2*side - 1, '^2 | ', seconds() - start, ' |'
   end subroutine measure_table
 
+  !> Nodes on a side of a window, from the command line.
+  integer function side_of_argument(i)
+    !> Number of the argument
+    integer, intent(in) :: i
+    character(len=20) :: word
+    integer :: ios
+
+    call get_command_argument(i, word)
+    read (word, *, iostat=ios) side_of_argument
+    if (ios /= 0 .or. side_of_argument < 1) error stop 'expected sides of windows, positive integers'
+  end function side_of_argument
+
   !> One row of the table.
-  subroutine measure(side)
+  subroutine print_row(side)
     !> Nodes on a side of the window
     integer, intent(in) :: side
-    real(wp) :: scalar, full, blocked
+    real(wp) :: t(6)
 
-    call products(side, 1, scalar, blocked)
-    call products(side, 3, full)
-    print '(a,i0,a,f0.2,a,f0.2,a,f0.2,a,f0.2,a,f0.2,a)', '| ', side, '^2 | ', 1e3_wp*scalar, ' | ', &
-      scalar/bare_transforms(side, 1), ' | ', scalar/blocked, ' | ', 1e3_wp*full, ' | ', &
-      full/bare_transforms(side, 3), ' |'
-  end subroutine measure
+    t = measure(side)
+    print '(a,i0,a,f0.2,a,f0.2,a,f0.2,a,f0.2,a,f0.2,a)', '| ', side, '^2 | ', 1e3_wp*t(1), ' | ', t(1)/t(2), ' | ', &
+      t(1)/t(3), ' | ', 1e3_wp*t(4), ' | ', t(4)/t(5), ' |'
+  end subroutine print_row
+
+  !> The same in seconds.
+  subroutine print_seconds(side)
+    !> Nodes on a side of the window
+    integer, intent(in) :: side
+
+    print '(i0,6es14.5)', side, measure(side)
+  end subroutine print_seconds
+
+  !> Seconds of a scalar product, its bare and its blocked transforms; the same of a 3x3 product.
+  function measure(side) result(t)
+    !> Nodes on a side of the window
+    integer, intent(in) :: side
+    real(wp) :: t(6)
+
+    call products(side, 1, t(1), t(3))
+    call products(side, 3, t(4))
+    t(2) = bare_transforms(side, 1)
+    t(5) = bare_transforms(side, 3)
+    t(6) = 3.0_wp*t(3)
+  end function measure
 
   !> Seconds of an application to one or to three components.
   subroutine products(side, n_component, best, blocked)

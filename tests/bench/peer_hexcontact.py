@@ -1,0 +1,148 @@
+"""Runs hexcontact on the problems of the comparison and on timed problems; prints one line of JSON."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from bench import problems
+from bench.square_window import HertzContact, best_of, main, shear_errors
+from hexcontact.lattice import Lattice
+from hexcontact.native import ElasticPair, NormalContact
+from hexcontact.native_friction import FrictionalContact
+
+
+def rhombic_window(side: int, fraction: float) -> tuple[Lattice, HertzContact]:
+    """Return side x side lattice nodes with a fraction of them in contact, contact radius 1."""
+    spacing = float(np.sqrt(np.pi / (fraction * side**2 * np.sqrt(3) / 2)))
+    lattice = Lattice(spacing, -(side // 2), -(side // 2), side, side)
+    # K1(0) of the pyramid: 3 sqrt(3)/2 ln 3 spacings
+    own = 1.5 * np.sqrt(3) * np.log(3) * spacing / np.pi
+    return lattice, HertzContact(lattice.x, lattice.y, 1.0, lattice.cell_area, float(own))
+
+
+def hertz(side: int, fraction: float, tolerance: float, repeats: int, threads: int = 1) -> dict[str, Any]:
+    """Frictionless, from nothing each time."""
+    lattice, contact = rhombic_window(side, fraction)
+    pair = ElasticPair(1 / np.pi, 0.0, 0.0)
+    gap = contact.gap
+    setup, problem = best_of(1, lambda: NormalContact(lattice, pair, gap, threads=threads))
+    solve, solution = best_of(repeats, lambda: problem.solve(normal_load=contact.load, tolerance=tolerance))
+    if not solution.converged:
+        raise RuntimeError(f"not converged, R_n = {solution.residual_normal:.1e}")
+    return {
+        "setup": setup,
+        "solve": solve,
+        "iterations": solution.sweeps,
+        "products": 3 * solution.operator_applications,
+        **contact.errors(solution.pressure, solution.gap, solution.approach),
+    }
+
+
+def cattaneo_mindlin(
+    side: int, fraction: float, tolerance: float, repeats: int, mu: float, share: float, poisson_ratio: float
+) -> dict[str, Any]:
+    """Press, then shear, both by force; alike bodies of that Poisson's ratio."""
+    lattice, contact = rhombic_window(side, fraction)
+    pair = ElasticPair(1 / np.pi, 0.0, poisson_ratio / (1 - poisson_ratio) / np.pi)
+    setup, problem = best_of(
+        1, lambda: FrictionalContact(lattice, pair, contact.gap, friction_coefficient=mu, threads=1)
+    )
+    load = contact.load
+    press, pressed = best_of(
+        repeats,
+        lambda: problem.advance(problem.virgin(), problems.FORCE, (load, 0, 0, 0), tolerance=tolerance),
+    )
+    target = (load, share * mu * load, 0.0, 0.0)
+    shear, sheared = best_of(
+        repeats, lambda: problem.advance(pressed, problems.FORCE, target, tolerance=tolerance)
+    )
+    if not sheared.converged:
+        raise RuntimeError(f"not converged, R_t = {sheared.residual_tangential:.1e}")
+    return {
+        "setup": setup,
+        "press": press,
+        "shear": shear,
+        "iterations": sheared.sweeps,
+        "residual": sheared.residual_tangential,
+        **shear_errors(contact, sheared.zone == 1, sheared.traction_x, mu, share),
+    }
+
+
+def friction(name: str, side: int, threads: int, repeats: int) -> dict[str, Any]:
+    """All steps of a counted problem on a window of side x side nodes."""
+    problem = problems.FRICTIONAL[name]
+    lattice = Lattice(2.7 / (side - 1), -(side // 2), -(side // 2), side, side)
+    before = peak_memory()
+    setup, contact = best_of(
+        1, lambda: problems.frictional_contact(problem.material, lattice, threads=threads)
+    )
+    everything = replace(problem, counted=len(problem.steps))
+    solve, count = best_of(repeats, lambda: problems.run_steps(contact, everything))
+    return {
+        "setup": setup,
+        "solve": solve,
+        "steps": len(problem.steps),
+        "applications": sum(count.applications),
+        "memory": peak_memory() - before,
+    }
+
+
+def normal(side: int, threads: int, repeats: int) -> dict[str, Any]:
+    """The frictionless problem on a window of side x side nodes."""
+    lattice = Lattice(2.7 / (side - 1), -(side // 2), -(side // 2), side, side)
+    before = peak_memory()
+    setup, contact = best_of(1, lambda: problems.hertz_contact(lattice, threads=threads))
+    solve, solution = best_of(
+        repeats, lambda: contact.solve(normal_load=problems.LOAD, tolerance=problems.TOLERANCE)
+    )
+    return {
+        "setup": setup,
+        "solve": solve,
+        "steps": 1,
+        "applications": solution.operator_applications,
+        "memory": peak_memory() - before,
+    }
+
+
+def direct(side: int, spacings_in_radius: float, repeats: int) -> dict[str, Any]:
+    """Explicit matrices and LAPACK, with and without friction, matrix and factorizations included."""
+    lattice = Lattice(1 / spacings_in_radius, -(side // 2), -(side // 2), side, side)
+
+    def frictionless() -> Any:
+        contact = problems.hertz_contact(lattice, method="direct")
+        return contact.solve(normal_load=problems.LOAD, tolerance=problems.TOLERANCE)
+
+    answer: dict[str, Any] = {"frictionless": best_of(repeats, frictionless)[0]}
+    for name in ("N19", "HC"):
+        problem = problems.FRICTIONAL[name]
+        start = time.perf_counter()
+        contact = problems.frictional_contact(problem.material, lattice, method="direct")
+        problems.run_steps(contact, problem)
+        answer[name] = time.perf_counter() - start
+    return answer
+
+
+def peak_memory() -> int:
+    """Most memory that the process had so far, in bytes."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+if __name__ == "__main__":
+    main(
+        {
+            "hertz": hertz,
+            "cattaneo_mindlin": cattaneo_mindlin,
+            "friction": friction,
+            "normal": normal,
+            "direct": direct,
+        }
+    )

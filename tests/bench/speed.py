@@ -1,0 +1,212 @@
+"""Seconds over the bare transforms, threads, memory, the command, the direct method."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from . import worker
+from .report import Table, seconds
+
+ROOT = Path(__file__).parents[2]
+SIZES = (256, 512, 1024, 2048)
+LARGEST_WITH_FRICTION = 1024
+PROBLEMS = {"HERTZ": "Hertz", "HC": "HC (press, shear)", "N19": "N19"}
+TURNS = 3
+
+
+def bare_transforms(program: Path, side: int) -> dict[str, float]:
+    """Return milliseconds of a product and of its transforms alone, each for one and for three components."""
+    done = subprocess.run(
+        [str(program), str(side)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=worker.environment(1),
+    )
+    names = ("scalar", "scalar_bare", "scalar_blocked", "full", "full_bare", "full_blocked")
+    return dict(zip(names, (1e3 * float(word) for word in done.stdout.split()[1:]), strict=True))
+
+
+def operator(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
+    """Return the table of one application of the operator over its bare transforms."""
+    table = Table(
+        "One application of the operator, one thread: milliseconds, and over the transforms alone",
+        ["window", "scalar product", "÷ bare", "÷ blocked", "3×3 product", "÷ bare", "÷ blocked"],
+    )
+    if not program.exists():
+        table.remarks.append(f"Not measured: {program} has not been built.")
+        return [table]
+    for side in sizes or (SIZES[:2] if quick else SIZES):
+        t = bare_transforms(program, side)
+        table.add(
+            f"{side}²",
+            *(
+                f"{x:.2f}"
+                for x in (t["scalar"], t["scalar"] / t["scalar_bare"], t["scalar"] / t["scalar_blocked"])
+            ),
+            *(f"{x:.2f}" for x in (t["full"], t["full"] / t["full_bare"], t["full"] / t["full_blocked"])),
+        )
+        print(f"  {table.rows[-1]}", flush=True)
+    table.remarks.append(
+        "Bare: the pruned transforms as FFTW plans them for the whole array; blocked: in blocks of columns "
+        "that fit the cache. Nothing is copied, padded or multiplied in either."
+    )
+    return [table]
+
+
+def task_of(name: str, side: int, threads: int, repeats: int) -> dict[str, Any]:
+    """Return what the worker is told."""
+    task: dict[str, Any] = {"side": side, "threads": threads, "repeats": repeats}
+    return task | ({"problem": "normal"} if name == "HERTZ" else {"problem": "friction", "name": name})
+
+
+def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
+    """Return seconds over the bare transforms, the gain by two threads, and the memory."""
+    ratio = Table(
+        "A solve over (operator applications × transforms of one), one thread, in the same run",
+        ["problem and window", "set-up [s]", "solve [s]", "applications", "transforms [ms]", "ratio", "goal"],
+    )
+    threads = Table(
+        "Two threads on two cores",
+        [
+            "problem and window",
+            "1 thread [s]",
+            "2 threads [s]",
+            "times faster",
+            "goal",
+            "set-up times faster",
+        ],
+    )
+    memory = Table(
+        "Peak memory of set-up and solve, one thread",
+        ["problem and window", "MB", "bytes a node", "estimate before the run [MB]"],
+    )
+    for name, title in PROBLEMS.items():
+        for side in sizes or (SIZES[:2] if quick else SIZES):
+            if name != "HERTZ" and side > LARGEST_WITH_FRICTION:
+                continue
+            repeats = 3 if side <= 512 else 1
+            one, two, bare = [], [], []
+            for turn in range(TURNS):
+                if turn and one[0].get("solve", 0.0) > 15 / turn:
+                    break
+                one.append(worker.run(task_of(name, side, 1, repeats)))
+                if program.exists():
+                    bare.append(bare_transforms(program, side))
+                two.append(worker.run(task_of(name, side, 2, repeats), threads=2))
+            label = f"{title}, {side}²"
+            single = worker.best(one, "setup", "solve", "memory")
+            double = worker.best(two, "setup", "solve")
+            if "failed" in single or "failed" in double:
+                ratio.add(label, single.get("failed") or double["failed"])
+                continue
+            add_ratio(ratio, label, single, bare, scalar=name == "HERTZ")
+            threads.add(
+                label,
+                seconds(single["solve"]),
+                seconds(double["solve"]),
+                f"{single['solve'] / double['solve']:.2f}",
+                "≥ 1.7" if side >= 512 else "",
+                f"{single['setup'] / double['setup']:.2f}",
+            )
+            memory.add(
+                label,
+                f"{single['memory'] / 1e6:.0f}",
+                f"{single['memory'] / side**2:.0f}",
+                f"{estimated_memory(name, side) / 1e6:.0f}",
+            )
+            print(f"  {ratio.rows[-1]} {threads.rows[-1][2:4]}", flush=True)
+    return [ratio, threads, memory]
+
+
+def add_ratio(
+    table: Table, label: str, answer: dict[str, Any], bare: list[dict[str, float]], *, scalar: bool
+) -> None:
+    """Add a solve and its ratio to the transforms alone."""
+    times = [seconds(answer["setup"]), seconds(answer["solve"]), f"{answer['applications']:.1f}"]
+    if not bare:
+        table.add(label, *times, "not built")
+        return
+    # of one application of the full operator, planned for the whole array or in blocks, whichever is faster
+    if scalar:
+        milliseconds = 3 * min(min(t["scalar_bare"], t["scalar_blocked"]) for t in bare)
+    else:
+        milliseconds = min(min(t["full_bare"], t["full_blocked"]) for t in bare)
+    ratio = answer["solve"] / (answer["applications"] * milliseconds * 1e-3)
+    table.add(label, *times, f"{milliseconds:.2f}", f"{ratio:.2f}", "≤ 1.3")
+
+
+def estimated_memory(name: str, side: int) -> int:
+    """Bytes that the program expects a problem to take."""
+    from hexcontact import native, native_friction
+
+    if name == "HERTZ":
+        return native.memory_needed("fft", side, side)
+    return native_friction.memory_needed("fft", side, side)
+
+
+def command(*, quick: bool) -> list[Table]:
+    """Return the times of the command from the shell."""
+    table = Table("The command, from the shell", ["command", "best [s]", "goal"])
+    program = [sys.executable, "-m", "hexcontact"]
+    installed = shutil.which("hexcontact", path=str(Path(sys.executable).parent))
+    if installed:
+        program = [installed]
+    with tempfile.TemporaryDirectory() as folder:
+        for words, shown, goal in (
+            (["--help"], "hexcontact --help", "< 0.3"),
+            (
+                ["run", str(ROOT / "cases/hertz_spheres.toml"), "--overwrite"],
+                "hexcontact run hertz_spheres.toml (Table 9.1)",
+                "< 1.5",
+            ),
+            (
+                ["run", str(ROOT / "cases/hertz_table_9_2.toml"), "--overwrite"],
+                "hexcontact run hertz_table_9_2.toml",
+                "",
+            ),
+        ):
+            best = float("inf")
+            for _ in range(2 if quick else 5):
+                start = time.perf_counter()
+                subprocess.run(
+                    [*program, *words],
+                    cwd=folder,
+                    check=True,
+                    capture_output=True,
+                    env=worker.environment(1),
+                )
+                best = min(best, time.perf_counter() - start)
+            table.add(shown, f"{best:.2f}", goal)
+            print(f"  {table.rows[-1]}", flush=True)
+    return [table]
+
+
+def direct(*, quick: bool) -> list[Table]:
+    """Return the times of the direct method on the finest mesh of Table 9.2."""
+    table = Table(
+        "Direct method, 51 × 51 nodes, 18.7 spacings in the contact radius (Table 9.2), one thread",
+        ["problem", "seconds", "goal", "18 minutes of the dissertation, times faster"],
+    )
+    # a = 0.7475813 mm, spacing 0.04 mm
+    task = {"problem": "direct", "side": 51, "spacings_in_radius": 0.7475813 / 0.04}
+    answers = [worker.run(task | {"repeats": 2}) for _ in range(1 if quick else 2)]
+    answer = worker.best(answers, "frictionless", "N19", "HC")
+    if "failed" in answer:
+        table.add("all", answer["failed"])
+        return [table]
+    for name, title, goal in (
+        ("frictionless", "frictionless", "< 2"),
+        ("N19", "N19: β = −0.19, µ = 0.1, normal load at once", "< 20, better 5"),
+        ("HC", "HC: alike bodies, µ = 0.5, normal load, then Q = µP/2", "< 20, better 5"),
+    ):
+        table.add(title, f"{answer[name]:.2f}", goal, f"{18 * 60 / answer[name]:.0f}")
+        print(f"  {table.rows[-1]}", flush=True)
+    return [table]

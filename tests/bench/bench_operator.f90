@@ -186,7 +186,7 @@ contains
   pure integer function repeats(side)
     !> Nodes on a side of the window
     integer, intent(in) :: side
-    repeats = max(7, 20*(1024/side)**2)
+    repeats = max(5, 5*(1024/side)**2)
   end function repeats
 
   !> Wall-clock time.

@@ -33,7 +33,7 @@ def hertz(side: int, fraction: float, tolerance: float, repeats: int) -> dict[st
     seconds, result = best_of(repeats, solve)
     if str(result.status) != "converged":
         raise RuntimeError(f"status {result.status} after {result.iterations} iterations")
-    setup = result.timings["build"]
+    setup = seconds * result.timings["build"] / result.timings["total"]
     return {
         "setup": setup,
         "solve": seconds - setup,

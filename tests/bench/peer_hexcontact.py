@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import resource
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench import problems
-from bench.square_window import HertzContact, best_of, main, shear_errors
+from bench.square_window import HertzContact, best_of, clock, main, peak_memory, shear_errors
 from hexcontact.lattice import Lattice
 from hexcontact.native import ElasticPair, NormalContact
 from hexcontact.native_friction import FrictionalContact
@@ -124,16 +122,11 @@ def direct(side: int, spacings_in_radius: float, repeats: int) -> dict[str, Any]
     answer: dict[str, Any] = {"frictionless": best_of(repeats, frictionless)[0]}
     for name in ("N19", "HC"):
         problem = problems.FRICTIONAL[name]
-        start = time.perf_counter()
+        start = clock()
         contact = problems.frictional_contact(problem.material, lattice, method="direct")
         problems.run_steps(contact, problem)
-        answer[name] = time.perf_counter() - start
+        answer[name] = clock() - start
     return answer
-
-
-def peak_memory() -> int:
-    """Most memory that the process had so far, in bytes."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 if __name__ == "__main__":

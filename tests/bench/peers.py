@@ -22,8 +22,12 @@ SHEARED_FRACTION = 0.2
 LONGEST = 90.0
 """Seconds; what would take longer is left out, and said."""
 
+ENOUGH = 10.0
+"""Seconds after which a code is not run again."""
+
 SIZES = (256, 512, 1024, 2048)
 SHEARED_SIZES = (64, 128, 256, 512)
+TURNS = 4
 GROWTH = 6.0
 """What a window of twice as many nodes a side costs at least."""
 
@@ -212,16 +216,17 @@ def side_by_side(
 ) -> dict[str, dict[str, Any]]:
     """Run all codes in turns, short runs several times; the shortest times count."""
     answers: dict[str, list[dict[str, Any]]] = {}
-    for turn in range(4):
+    for turn in range(TURNS):
         for line in lines:
             if turn == 0 and line.expected(side) > LONGEST:
                 remark = left_out(line, side)
                 table.remarks.append(remark)
                 print("  " + remark)
                 continue
-            if turn and (line.label not in answers or taken(answers[line.label][0]) > 15 / turn):
+            before = taken(answers[line.label][0]) if line.label in answers else math.inf
+            if turn and turn * before > ENOUGH:
                 continue
-            repeats = 5 if side <= 256 else 3 if side <= 512 else 1
+            repeats = min(5, math.ceil(0.5 / before)) if turn else 1
             answer = line.answer(task | {"repeats": repeats})
             answers.setdefault(line.label, []).append(answer)
             print(f"  {side}² {line.label}: {short(answer)}", flush=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -88,42 +89,51 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
         "Peak memory of set-up and solve, one thread",
         ["problem and window", "MB", "bytes a node", "estimate before the run [MB]"],
     )
-    for name, title in PROBLEMS.items():
-        for side in sizes or (SIZES[:2] if quick else SIZES):
-            if name != "HERTZ" and side > LARGEST_WITH_FRICTION:
-                continue
-            repeats = 3 if side <= 512 else 1
-            one, two, bare = [], [], []
-            for turn in range(TURNS):
-                if turn and one[0].get("solve", 0.0) > 15 / turn:
-                    break
-                one.append(worker.run(task_of(name, side, 1, repeats)))
-                if program.exists():
-                    bare.append(bare_transforms(program, side))
-                two.append(worker.run(task_of(name, side, 2, repeats), threads=2))
+    # processor time says nothing about threads
+    parallel = os.environ.get("BENCH_CLOCK") != "cpu"
+    for side in sizes or (SIZES[:2] if quick else SIZES):
+        bare = [bare_transforms(program, side)] if program.exists() else []
+        chosen = {k: v for k, v in PROBLEMS.items() if k == "HERTZ" or side <= LARGEST_WITH_FRICTION}
+        for name, title in chosen.items():
+            single, double = timed(name, side, turns=1 if quick else TURNS, both=parallel)
             label = f"{title}, {side}²"
-            single = worker.best(one, "setup", "solve", "memory")
-            double = worker.best(two, "setup", "solve")
             if "failed" in single or "failed" in double:
                 ratio.add(label, single.get("failed") or double["failed"])
                 continue
+            if program.exists():
+                bare.append(bare_transforms(program, side))
             add_ratio(ratio, label, single, bare, scalar=name == "HERTZ")
-            threads.add(
-                label,
-                seconds(single["solve"]),
-                seconds(double["solve"]),
-                f"{single['solve'] / double['solve']:.2f}",
-                "≥ 1.7" if side >= 512 else "",
-                f"{single['setup'] / double['setup']:.2f}",
-            )
+            if parallel:
+                threads.add(
+                    label,
+                    seconds(single["solve"]),
+                    seconds(double["solve"]),
+                    f"{single['solve'] / double['solve']:.2f}",
+                    "≥ 1.7" if side >= 512 else "",
+                    f"{single['setup'] / double['setup']:.2f}",
+                )
             memory.add(
                 label,
                 f"{single['memory'] / 1e6:.0f}",
                 f"{single['memory'] / side**2:.0f}",
                 f"{estimated_memory(name, side) / 1e6:.0f}",
             )
-            print(f"  {ratio.rows[-1]} {threads.rows[-1][2:4]}", flush=True)
-    return [ratio, threads, memory]
+            print(f"  {ratio.rows[-1]} {threads.rows[-1][2:4] if parallel else ''}", flush=True)
+    return [ratio, threads, memory] if parallel else [ratio, memory]
+
+
+def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the best of several runs on one thread and, in turns, on two threads."""
+    repeats = 3 if side <= 512 else 1
+    one: list[dict[str, Any]] = []
+    two: list[dict[str, Any]] = []
+    for turn in range(turns):
+        if turn and one[0].get("solve", 0.0) > 15 / turn:
+            break
+        one.append(worker.run(task_of(name, side, 1, repeats)))
+        if both:
+            two.append(worker.run(task_of(name, side, 2, repeats), threads=2))
+    return worker.best(one, "setup", "solve", "memory"), worker.best(two or one, "setup", "solve")
 
 
 def add_ratio(

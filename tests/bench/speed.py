@@ -19,7 +19,9 @@ ROOT = Path(__file__).parents[2]
 SIZES = (256, 512, 1024, 2048)
 LARGEST_WITH_FRICTION = 1024
 PROBLEMS = {"HERTZ": "Hertz", "HC": "HC (press, shear)", "N19": "N19"}
-TURNS = 3
+TURNS = 2
+LONG_ENOUGH = 10.0
+"""Seconds of a solve that is not run again."""
 
 
 def bare_transforms(program: Path, side: int) -> dict[str, float]:
@@ -128,7 +130,7 @@ def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, An
     one: list[dict[str, Any]] = []
     two: list[dict[str, Any]] = []
     for turn in range(turns):
-        if turn and one[0].get("solve", 0.0) > 15 / turn:
+        if turn and one[0].get("solve", 0.0) > LONG_ENOUGH:
             break
         one.append(worker.run(task_of(name, side, 1, repeats)))
         if both:

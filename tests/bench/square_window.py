@@ -89,8 +89,8 @@ def shear_errors(
 ) -> dict[str, float]:
     """Differences from Cattaneo and Mindlin for Q = share * mu * P.
 
-    Their solution lets slip go along x alone, which is exact for nu = 0: for nu = 0.33 a few percent of
-    the L2 difference are theirs.
+    Their solution lets slip go along x alone, which is exact for nu = 0: for nu = 0.33 some tenths of
+    a percent of the L2 difference are theirs.
     """
     c = contact.a * (1 - share) ** (1 / 3)
     exact = mu * (contact.pressure - hemisphere(contact.x, contact.y, c))

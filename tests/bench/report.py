@@ -36,7 +36,9 @@ class Table:
     def text(self) -> str:
         """Return the table with aligned columns."""
         cells = [row for row in (self.header, *self.rows) if any(row)]
-        widths = [max(len(row[k]) for row in cells if k < len(row)) for k in range(len(self.header))]
+        widths = [
+            max(len(row[k]) for row in cells if len(row) == len(self.header)) for k in range(len(self.header))
+        ]
         lines = [self.caption, ""] if self.caption else []
         for row in cells:
             padded = [

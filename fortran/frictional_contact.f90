@@ -179,7 +179,7 @@ contains
   end subroutine coarse_guess
 
   !> Tractions and motions of a coarse state as a start on the finer lattice.
-  pure subroutine prolong_state(coarse_problem, coarse, problem, state)
+  subroutine prolong_state(coarse_problem, coarse, problem, state)
     type(friction_problem_t), intent(in) :: coarse_problem
     type(contact_state_t), intent(in) :: coarse
     type(friction_problem_t), intent(in) :: problem

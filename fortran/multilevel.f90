@@ -11,6 +11,9 @@ module hc_multilevel
 
   public :: level_count, prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
 
+  !> Smaller fields are left to one thread.
+  integer, parameter :: worth_sharing = 16384
+
 contains
 
   !> Number of lattices, the given one included, when no window gets smaller than it should.
@@ -30,7 +33,7 @@ contains
   end function level_count
 
   !> Interpolate a field from the coarse to the fine lattice; zero outside the coarse window.
-  pure subroutine prolong(coarse_lattice, coarse, fine_lattice, fine)
+  subroutine prolong(coarse_lattice, coarse, fine_lattice, fine)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse field (n_col, n_row)
@@ -41,6 +44,7 @@ contains
     real(wp), intent(out) :: fine(:, :)
     integer :: col, row, i, j
 
+    !$omp parallel do schedule(static) private(col, i, j) if (size(fine) >= worth_sharing)
     do row = 1, size(fine, 2)
       j = fine_lattice%first(2) + row - 1
       do col = 1, size(fine, 1)
@@ -56,6 +60,7 @@ contains
         end if
       end do
     end do
+    !$omp end parallel do
 
   contains
 
@@ -77,7 +82,7 @@ contains
   !> Its square is linear there: the square is continued by a straight line into the
   !> nodes beyond the edge, interpolated, and cut off where it is negative. So the edge
   !> of the fine pressure lies where that of the coarse one does between nodes.
-  pure subroutine prolong_edge(coarse_lattice, coarse, fine_lattice, fine)
+  subroutine prolong_edge(coarse_lattice, coarse, fine_lattice, fine)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse pressure (n_col, n_row)
@@ -112,7 +117,7 @@ contains
   end subroutine prolong_edge
 
   !> Interpolate all components of a field.
-  pure subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine)
+  subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse field (n_col, n_row, number of components)
@@ -129,7 +134,7 @@ contains
   end subroutine prolong_vector
 
   !> Interpolate a shear traction as its ratio to the pressure: where a node slips it stays on the cone.
-  pure subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine)
+  subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse pressure (n_col, n_row) and shear traction (n_col, n_row, 2)

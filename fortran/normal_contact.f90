@@ -21,7 +21,7 @@ module hc_normal_contact
   public :: normal_contact_t, new_normal_contact, normal_contact_memory
 
   !> Windows below this many nodes a side are not coarsened any further.
-  integer, parameter :: smallest_side = 12
+  integer, parameter :: smallest_side = 40
   !> Coarse lattices only have to give a start.
   real(wp), parameter :: coarse_tolerance = 3.0e-2_wp
 

@@ -284,14 +284,14 @@ contains
         call precondition(self, now)
       end if
       if (changed) then
-        call projected_step(now, held, by_load, pressures)
+        call projected_step(self, now, held, by_load, pressures)
         share = 1.0_wp
       else
-        call next_direction(now, by_load, rz_old)
+        call next_direction(self, now, by_load, rz_old)
       end if
       call multiply(self, now)
       if (.not. changed) then
-        share = step_share(now, rz_old)
+        share = step_share(self, now, rz_old)
         if (.not. share > 0.0_wp) then
           ! nothing is left to gain in single precision, and perhaps at all
           if (.not. (self%exact .and. now%stale > 0.0_wp)) return
@@ -474,14 +474,15 @@ contains
     now%n_active = now%n_next
     call find_span(now)
     call new_edge_extension(now%edge, now%active)
-    now%r = 0.0_sp
-    if (.not. allocated(now%punch)) return
     !$omp parallel do schedule(static) num_threads(self%n_threads)
-    do row = 1, size(now%punch, 2)
+    do row = 1, size(now%p, 2)
+      now%r(:, row, 1) = 0.0_sp
+      if (.not. allocated(now%punch)) cycle
       where (.not. now%active(:, row)) now%punch(:, row) = 0.0_sp
     end do
     !$omp end parallel do
-    now%punch_sum = total(now%punch)
+    if (.not. allocated(now%punch)) return
+    now%punch_sum = total(now%punch, self%n_threads)
     if (.not. now%punch_sum > 0.0_wp) deallocate (now%punch)
   end subroutine take_set
 
@@ -498,14 +499,17 @@ contains
   end subroutine find_span
 
   !> Sum in double precision, row by row: it does not depend on the number of threads.
-  pure real(wp) function total(field)
+  real(wp) function total(field, n_threads)
     real(sp), intent(in) :: field(:, :)
+    integer, intent(in) :: n_threads
     real(wp) :: part(size(field, 2))
     integer :: row
 
+    !$omp parallel do schedule(static) num_threads(n_threads)
     do row = 1, size(field, 2)
       part(row) = sum(real(field(:, row), wp))
     end do
+    !$omp end parallel do
     total = sum(part)
   end function total
 
@@ -514,10 +518,21 @@ contains
     class(normal_level_t), intent(inout) :: self
     type(iterate_t), intent(inout) :: now
 
-    now%r(:, :, 1) = merge(1.0_sp, 0.0_sp, now%active)
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do row = 1, size(now%p, 2)
+      now%r(:, row, 1) = merge(1.0_sp, 0.0_sp, now%active(:, row))
+    end do
+    !$omp end parallel do
     call precondition(self, now)
-    now%punch = merge(max(now%z(:, :, 1), 0.0_sp), 0.0_sp, now%active)
-    now%punch_sum = total(now%punch)
+    allocate (now%punch(size(now%p, 1), size(now%p, 2)))
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do row = 1, size(now%p, 2)
+      now%punch(:, row) = merge(max(now%z(:, row, 1), 0.0_sp), 0.0_sp, now%active(:, row))
+    end do
+    !$omp end parallel do
+    now%punch_sum = total(now%punch, self%n_threads)
   end subroutine press_punch
 
   !> r = approach - h - w on the active nodes.
@@ -546,24 +561,29 @@ contains
   end subroutine precondition
 
   !> d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or what is left of p, on a set to be held.
-  subroutine projected_step(now, held, by_load, pressures)
+  subroutine projected_step(self, now, held, by_load, pressures)
+    class(normal_level_t), intent(in) :: self
     type(iterate_t), intent(inout) :: now
     logical, intent(in) :: held, by_load
     !> Sum of the pressures under a prescribed load
     real(wp), intent(in) :: pressures
     real(wp) :: part(size(now%p, 2)), aim, mean
+    real(sp) :: lack
     integer :: col, row
 
     mean = 0.0_wp
     if (by_load .and. .not. held) then
+      !$omp parallel do schedule(static) num_threads(self%n_threads) private(col)
       do row = 1, size(now%p, 2)
         part(row) = 0.0_wp
         do col = now%span(1, row), now%span(2, row)
           if (now%active(col, row)) part(row) = part(row) + now%z(col, row, 1)
         end do
       end do
+      !$omp end parallel do
       mean = sum(part)/now%punch_sum
     end if
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(col, aim)
     do row = 1, size(now%p, 2)
       now%d(:, row, 1) = 0.0_sp
       part(row) = 0.0_wp
@@ -581,17 +601,27 @@ contains
         now%d(col, row, 1) = real(aim - now%p(col, row)/now%p_unit, sp)
       end do
     end do
+    !$omp end parallel do
     if (.not. sum(part) > 0.0_wp) then
       ! none of the pressure is left where it should be
       now%d(:, :, 1) = now%d(:, :, 1) + merge(1.0_sp, 0.0_sp, now%active)
       part = count(now%active, dim=1)
     end if
     ! what was cut off goes where it changes the approach alone
-    if (by_load) now%d(:, :, 1) = now%d(:, :, 1) + real((pressures/now%p_unit - sum(part))/now%punch_sum, sp)*now%punch
+    if (.not. by_load) return
+    lack = real((pressures/now%p_unit - sum(part))/now%punch_sum, sp)
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(col)
+    do row = 1, size(now%p, 2)
+      do col = now%span(1, row), now%span(2, row)
+        now%d(col, row, 1) = now%d(col, row, 1) + lack*now%punch(col, row)
+      end do
+    end do
+    !$omp end parallel do
   end subroutine projected_step
 
   !> Direction of conjugate gradients.
-  subroutine next_direction(now, by_load, rz)
+  subroutine next_direction(self, now, by_load, rz)
+    class(normal_level_t), intent(in) :: self
     type(iterate_t), intent(inout) :: now
     logical, intent(in) :: by_load
     !> r^T z of the last direction, 0: there is none; on return that of the new one
@@ -601,6 +631,7 @@ contains
     real(sp) :: back, mean
     integer :: col, row
 
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(col)
     do row = 1, size(now%p, 2)
       part(row) = 0.0_wp
       sum_z(row) = 0.0_wp
@@ -610,35 +641,41 @@ contains
         sum_z(row) = sum_z(row) + now%z(col, row, 1)
       end do
     end do
+    !$omp end parallel do
     rz_new = sum(part)
     back = 0.0_sp
     if (rz > 0.0_wp) back = real(rz_new/rz, sp)
     mean = 0.0_sp
     if (by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
-    if (.not. rz > 0.0_wp) now%d = 0.0_sp
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(col)
     do row = 1, size(now%p, 2)
+      if (.not. rz > 0.0_wp) now%d(:, row, 1) = 0.0_sp
       do col = now%span(1, row), now%span(2, row)
         if (.not. now%active(col, row)) cycle
         now%d(col, row, 1) = now%z(col, row, 1) + back*now%d(col, row, 1)
         if (by_load) now%d(col, row, 1) = now%d(col, row, 1) - mean*now%punch(col, row)
       end do
     end do
+    !$omp end parallel do
     rz = rz_new
   end subroutine next_direction
 
   !> Length of a step of conjugate gradients; 0 if there is no curvature.
-  pure real(wp) function step_share(now, rz)
+  real(wp) function step_share(self, now, rz)
+    class(normal_level_t), intent(in) :: self
     type(iterate_t), intent(in) :: now
     !> r^T z
     real(wp), intent(in) :: rz
     real(wp) :: part(size(now%p, 2)), curvature
     integer :: row
 
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         part(row) = sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))
       end associate
     end do
+    !$omp end parallel do
     curvature = sum(part)
     step_share = 0.0_wp
     if (curvature > 0.0_wp .and. rz > 0.0_wp) step_share = rz/curvature

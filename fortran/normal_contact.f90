@@ -11,7 +11,7 @@ module hc_normal_contact
   use hc_convolution_single, only: convolution_memory
   use hc_flexibility_fft, only: fft_memory
   use hc_normal_kernel, only: normal_kernel_t, new_normal_kernel
-  use hc_contact_state, only: contact_state_t, check_problem
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem
   use hc_preconditioner, only: preconditioner_memory
   use hc_normal_level, only: normal_level_t
   use hc_multilevel, only: level_count, prolong_edge, restrict_field, restrict_mask
@@ -25,11 +25,29 @@ module hc_normal_contact
   !> Coarse lattices only have to give a start.
   real(wp), parameter :: coarse_tolerance = 3.0e-2_wp
 
+  !> A part of the finest window is worth operators of its own below this share of its nodes.
+  real(wp), parameter :: part_worth = 0.6_wp
+  !> Parts that are tried, and their tolerance.
+  integer, parameter :: part_tries = 3
+  real(wp), parameter :: part_tolerance = 0.8_wp
+  !> Nodes around the first guess of the contact: so many, and its extent over this.
+  integer, parameter :: least_margin = 6, margin_part = 16
+  !> Sides of parts grow in steps of at least this share of them.
+  integer, parameter :: step_part = 16
+
   !> A frictionless contact problem on a hierarchy of lattices.
   type :: normal_contact_t
     private
     !> From the finest to the coarsest lattice
     type(normal_level_t), allocatable :: level(:)
+    !> The part of the finest lattice around the contact, and its first column and row there
+    type(normal_level_t), allocatable :: inner
+    integer :: corner(2) = 0
+    type(elastic_pair_t) :: pair
+    !> The kernel on the finest lattice
+    type(normal_kernel_t) :: kernel
+    !> Threads to use
+    integer :: n_threads = 0
   contains
     !> Solve for a normal load or an approach
     procedure :: solve
@@ -57,6 +75,8 @@ contains
     type(normal_kernel_t) :: kernel
     integer :: l
 
+    self%pair = pair
+    if (present(n_threads)) self%n_threads = n_threads
     call check_problem(lattice, initial_gap, candidate, error)
     if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, smallest_side)))
@@ -73,10 +93,14 @@ contains
             level%candidate = restrict_mask(finer%lattice, finer%candidate, level%lattice)
           end associate
         end if
-        if (l == 1) call new_normal_kernel(kernel, lattice, pair%lambda_1, n_threads)
+        if (l == 1) then
+          call new_normal_kernel(self%kernel, lattice, pair%lambda_1, n_threads)
+          kernel = self%kernel
+        end if
         ! the kernel grows with the spacing
         kernel%factor = pair%lambda_1*2.0_wp**(l - 1)
-        call level%prepare(pair, kernel, l == 1, error, n_threads)
+        ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
+        call level%prepare(pair, kernel, l == 1, l > 1, error, n_threads)
         if (allocated(error)) return
       end associate
     end do
@@ -91,8 +115,8 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
-    ! fields: gap, candidates, state, what an iteration needs, and the kernel
-    finest = fft_memory(extent, .true., n_threads) + preconditioner_memory(extent, n_threads, .false.) &
+    ! the operators of a part besides; fields: gap, candidates, state, what an iteration needs, and the kernel
+    finest = 7*fft_memory(extent, .true., n_threads)/5 + preconditioner_memory(extent, n_threads, .false.) &
              + convolution_memory(extent, good_size(2*extent - 1), 1, 1, n_threads) &
              + 16*8*int(extent(1), long)*extent(2) + 8*int(maxval(extent), long)**2
     normal_contact_memory = finest + finest/3
@@ -128,13 +152,132 @@ contains
         else
           where (level%candidate) state%pressure = 1.0_wp
         end if
-        call level%solve(control, target, merge(tolerance, max(tolerance, coarse_tolerance), l == 1), max_sweeps, state, error)
-        if (allocated(error)) return
-        work = work + real(level%lattice%size(), wp)/self%level(1)%lattice%size()*level%work()
-        if (l > 1) call move_alloc(state%pressure, coarse%pressure)
+        if (l > 1) then
+          call level%solve(control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          if (allocated(error)) return
+          work = work + share_of(level, self%level(1))*level%work()
+          call move_alloc(state%pressure, coarse%pressure)
+        else
+          call solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
+          if (allocated(error)) return
+        end if
       end associate
     end do
     state%operator_applications = work
   end subroutine solve
+
+  !> Nodes of a part of a lattice over those of the whole.
+  pure real(wp) function share_of(part, whole)
+    type(normal_level_t), intent(in) :: part, whole
+    share_of = real(part%lattice%size(), wp)/whole%lattice%size()
+  end function share_of
+
+  !> Solve on the finest lattice: on the part around the contact, if that is much smaller than the window.
+  !>
+  !> The gap elsewhere follows from one product over the window; should the bodies overlap there,
+  !> the part grows.
+  subroutine solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
+    class(normal_contact_t), intent(inout), target :: self
+    !> force_control or displacement_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Bound of both residuals
+    real(wp), intent(in) :: tolerance
+    !> Iterations that may be made
+    integer, intent(in) :: max_sweeps
+    !> On entry its pressure is the start, up to a factor; on return the solution
+    type(contact_state_t), intent(inout) :: state
+    !> Work, in applications of the full operator on the finest lattice
+    real(wp), intent(inout) :: work
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(contact_state_t) :: part
+    integer :: low(2), high(2), sweeps, try
+
+    associate (whole => self%level(1))
+      sweeps = 0
+      do try = 1, part_tries
+        call frame(state%pressure > 0.0_wp, low, high)
+        if (try > 1) call frame(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. whole%candidate), low, high)
+        if (product(high - low + 1) > part_worth*whole%lattice%size()) exit
+        call take_part(self, low, high, error)
+        if (allocated(error)) return
+        associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
+          part%pressure = state%pressure(first(1):last(1), first(2):last(2))
+          ! the product over the window sees what single precision left
+          call inner%solve(control, target, part_tolerance*tolerance, max_sweeps, part, error)
+          if (allocated(error)) return
+          work = work + share_of(inner, whole)*inner%work()
+          sweeps = sweeps + part%sweeps
+          call new_contact_state(state, whole%lattice)
+          state%pressure(first(1):last(1), first(2):last(2)) = part%pressure
+        end associate
+        state%motion = part%motion
+        call whole%conclude_anew(control, target, tolerance, state, error)
+        if (allocated(error)) return
+        work = work + whole%work()
+        state%sweeps = sweeps
+        if (state%converged .or. .not. part%converged) return
+      end do
+      if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
+      call whole%prepare(self%pair, self%kernel, .true., .true., error, self%n_threads)
+      if (allocated(error)) return
+      call whole%solve(control, target, tolerance, max_sweeps, state, error)
+      if (allocated(error)) return
+      state%sweeps = state%sweeps + sweeps
+      work = work + whole%work()
+    end associate
+  end subroutine solve_finest
+
+  !> First and last column and row of some nodes, with a margin all around as far as the window goes.
+  pure subroutine frame(nodes, low, high)
+    logical, intent(in) :: nodes(:, :)
+    integer, intent(out) :: low(2), high(2)
+    integer :: d, margin, step
+    logical :: line(maxval(shape(nodes)))
+
+    do d = 1, 2
+      line = .false.
+      line(:size(nodes, d)) = any(nodes, dim=3 - d)
+      low(d) = max(findloc(line, .true., dim=1), 1)
+      high(d) = findloc(line, .true., dim=1, back=.true.)
+      if (high(d) == 0) high(d) = size(nodes, d)
+      margin = least_margin + (high(d) - low(d) + 1)/margin_part
+      ! in steps of a power of two, so that loads that are alike share a part
+      step = least_margin
+      do while (step*step_part < high(d) - low(d))
+        step = 2*step
+      end do
+      low(d) = max((low(d) - margin - 1)/step*step + 1, 1)
+      high(d) = min((high(d) + margin + step - 1)/step*step, size(nodes, d))
+    end do
+  end subroutine frame
+
+  !> Set up the part of the finest lattice between some columns and rows, unless it is at hand.
+  !>
+  !> No other part is taken, be it large enough: a load gives the same bits whatever came before it.
+  subroutine take_part(self, low, high, error)
+    class(normal_contact_t), intent(inout) :: self
+    integer, intent(in) :: low(2), high(2)
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    if (allocated(self%inner)) then
+      if (all(low == self%corner) .and. all(high - low + 1 == self%inner%lattice%extent)) return
+      deallocate (self%inner)
+    end if
+    allocate (self%inner)
+    self%corner = low
+    associate (inner => self%inner, whole => self%level(1))
+      inner%lattice = whole%lattice
+      inner%lattice%first = whole%lattice%first + low - 1
+      inner%lattice%extent = high - low + 1
+      inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
+      inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
+      call inner%prepare(self%pair, self%kernel, .true., .true., error, self%n_threads)
+    end associate
+  end subroutine take_part
 
 end module hc_normal_contact

@@ -20,7 +20,7 @@ module hc_normal_level
   use hc_fftw, only: good_size
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_normal_kernel, only: normal_kernel_t
-  use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t
+  use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t, threads_for
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control
   use hc_contact_residuals, only: conclude, normal_self_compliance
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, single_cost
@@ -56,9 +56,9 @@ module hc_normal_level
     type(preconditioner_t), private :: preconditioner
     !> The flexibility in single precision, in units of that of the preconditioner
     type(convolution_t), private :: single
-    !> The flexibility in double precision, if it is there
+    !> The flexibility in double precision; is it there, and is the rest?
     type(fft_flexibility_t), private :: flexibility
-    logical, private :: exact = .false.
+    logical, private :: exact = .false., iterating = .false.
     !> Self-compliance of a node [m/Pa]
     real(wp), private :: compliance = 0.0_wp
     !> Work in single precision, in applications of the full operator
@@ -68,6 +68,8 @@ module hc_normal_level
   contains
     !> Operators
     procedure :: prepare
+    !> Gap, zones, load and residuals of a given pressure
+    procedure :: conclude_anew
     !> Solve for a normal load or an approach
     procedure :: solve
     !> Work so far, in applications of the full operator
@@ -113,15 +115,15 @@ module hc_normal_level
 
 contains
 
-  !> Operators of a problem whose lattice, gap and candidates are known.
-  subroutine prepare(self, pair, kernel, exact, error, n_threads)
+  !> Operators of a problem whose lattice, gap and candidates are known; those that are there are kept.
+  subroutine prepare(self, pair, kernel, exact, iterating, error, n_threads)
     class(normal_level_t), intent(inout) :: self
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
     !> The kernel on this lattice
     type(normal_kernel_t), intent(in), target :: kernel
-    !> The operator is wanted in double precision, too
-    logical, intent(in) :: exact
+    !> The operator in double precision is wanted; what iterations need is wanted
+    logical, intent(in) :: exact, iterating
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
@@ -129,25 +131,56 @@ contains
     type(rounded_kernel_t) :: rounded
 
     self%pair = pair
-    self%exact = exact
     self%compliance = normal_self_compliance(self%lattice, pair)
+    self%n_threads = threads_for(self%lattice%extent, n_threads)
+    if (exact .and. .not. self%exact) then
+      call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., n_threads=n_threads, &
+                               kernel=kernel)
+      if (allocated(error)) return
+      self%exact = .true.
+    end if
+    if (self%iterating .or. .not. iterating) return
     call new_preconditioner(self%preconditioner, self%lattice, pair, error, n_threads)
     if (allocated(error)) return
     call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, error, &
                          n_threads=n_threads)
     if (allocated(error)) return
-    self%n_threads = self%single%n_threads
-    if (exact) then
-      call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., n_threads=n_threads, &
-                               kernel=kernel)
-      if (allocated(error)) return
+    if (self%exact) then
       self%single%spectrum = real(self%flexibility%convolution%spectrum/self%preconditioner%unit, sp)
     else
       rounded%kernel => kernel
       rounded%unit = self%preconditioner%unit
       call self%single%transform_kernels(rounded, error)
     end if
+    self%iterating = .true.
   end subroutine prepare
+
+  !> Gap, zones, load and residuals of a given pressure at a given approach.
+  subroutine conclude_anew(self, control, target, tolerance, state, error)
+    class(normal_level_t), intent(inout), target :: self
+    !> force_control or displacement_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Bound of the residuals
+    real(wp), intent(in) :: tolerance
+    !> State whose pressure and approach are known
+    type(contact_state_t), intent(inout), target :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), pointer, contiguous :: field(:, :, :), closing(:, :, :)
+
+    associate (n => self%lattice%extent)
+      field(1:n(1), 1:n(2), 1:1) => state%pressure
+      closing(1:n(1), 1:n(2), 1:1) => state%gap
+    end associate
+    self%flexibility%applications = 0.0_wp
+    self%single_work = 0.0_wp
+    call self%flexibility%apply([normal], field, [normal], closing, error)
+    if (allocated(error)) return
+    state%gap = self%initial_gap + state%gap - state%motion(normal)
+    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance)
+  end subroutine conclude_anew
 
   pure subroutine rounded_row(self, j, k)
     class(rounded_kernel_t), intent(in) :: self

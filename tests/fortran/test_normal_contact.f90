@@ -37,7 +37,9 @@ contains
       new_test('scattered_nodes', test_scattered), &
       new_test('tight_tolerance', test_tight), &
       new_test('residual_is_true', test_true_residual), &
-      new_test('few_products', test_few_products) &
+      new_test('few_products', test_few_products), &
+      new_test('part_of_window', test_part), &
+      new_test('part_that_grows', test_growing_part) &
     ]
   end subroutine collect_normal_contact
 
@@ -344,5 +346,62 @@ contains
       n = 2*n
     end do
   end subroutine test_few_products
+
+  !> A small contact off the middle of a large window is solved on a part of it: same pressure, far less work.
+  subroutine test_part(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 180
+    type(normal_contact_t) :: solver
+    type(contact_state_t) :: state, again, small
+    type(lattice_t) :: lattice
+    real(wp) :: gap(n, n), x(n, n), y(n, n)
+    logical :: candidate(n, n)
+    type(elastic_pair_t), parameter :: pair = elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp)
+
+    call new_lattice(lattice, equilateral_basis(0.05_wp), [-50, -30], [n, n], error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    gap = 0.5_wp*(x**2 + y**2)
+    candidate = .true.
+    call new_normal_contact(solver, lattice, pair, gap, candidate, error)
+    if (allocated(error)) return
+    call solver%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 60, state, error)
+    if (allocated(error)) return
+    call check_true(error, state%converged .and. 3.0_wp*state%operator_applications < 4.0_wp, 'little work')
+    if (allocated(error)) return
+    call check(error, state%motion(normal), 1.0_wp, 2.0e-4_wp, 'approach of Hertz')
+    if (allocated(error)) return
+    ! another load, which needs another part, and the first one again
+    call solver%solve(force_control, 0.1_wp, 1.0e-8_wp, 60, small, error)
+    if (allocated(error)) return
+    call solver%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 60, again, error)
+    if (allocated(error)) return
+    call check_true(error, small%converged .and. all(abs(again%pressure - state%pressure) <= 0.0_wp), 'history leaves no trace')
+    if (allocated(error)) return
+    call check_true(error, minval(state%gap) > -1.0e-9_wp .and. all(state%gap(1, :) > 0.1_wp), 'the gap is known everywhere')
+  end subroutine test_part
+
+  !> A pillar between the nodes of the coarse lattices is found all the same: the part grows to it.
+  subroutine test_growing_part(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 180
+    type(normal_contact_t) :: solver
+    type(contact_state_t) :: state
+    type(lattice_t) :: lattice
+    real(wp) :: gap(n, n), x(n, n), y(n, n)
+    logical :: candidate(n, n)
+
+    call new_lattice(lattice, equilateral_basis(0.05_wp), [-90, -90], [n, n], error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    gap = 0.5_wp*(x**2 + y**2)
+    gap(150, 60) = 0.0_wp
+    candidate = .true.
+    call new_normal_contact(solver, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error)
+    if (allocated(error)) return
+    call solver%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 200, state, error)
+    if (allocated(error)) return
+    call check_true(error, state%converged .and. state%pressure(150, 60) > 0.0_wp, 'the pillar carries its share')
+  end subroutine test_growing_part
 
 end module test_normal_contact

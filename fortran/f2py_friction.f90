@@ -11,7 +11,7 @@ module hc_f2py_friction
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t, new_friction_problem
-  use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory
+  use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_flexibility_dense, only: dense_memory
   use hc_load_path, only: advance, touches_rim
@@ -43,7 +43,7 @@ contains
     if (method == direct) then
       bytes = dense_memory(extent, normal_only=.false.)
     else
-      bytes = frictional_contact_memory(extent, n_threads)
+      bytes = windowed_friction_memory(extent, n_threads)
     end if
   end subroutine friction_memory_needed
 
@@ -81,7 +81,7 @@ contains
     type(error_t), allocatable :: error
     type(friction_problem_t) :: problem
     type(coulomb_t) :: friction
-    type(frictional_contact_t), pointer :: fft
+    type(windowed_friction_t), pointer :: fft
     type(direct_friction_t), pointer :: dense
 
     friction%no_slip = coefficient > 0.5_wp*huge(1.0_wp)
@@ -100,7 +100,7 @@ contains
       else
         allocate (fft)
         slot%friction => fft
-        call new_frictional_contact(fft, problem, error, n_threads)
+        call new_windowed_friction(fft, problem, error, n_threads)
       end if
     end if
     if (allocated(error)) call free_slot(handle)

@@ -26,6 +26,7 @@ module hexcontact
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory
+  use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_load_path, only: advance, touches_rim
   implicit none

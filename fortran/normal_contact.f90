@@ -14,6 +14,7 @@ module hc_normal_contact
   use hc_contact_state, only: contact_state_t, new_contact_state, check_problem
   use hc_preconditioner, only: preconditioner_memory
   use hc_normal_level, only: normal_level_t
+  use hc_window_part, only: frame, is_worth, part_of
   use hc_multilevel, only: level_count, prolong_edge, restrict_field, restrict_mask
   implicit none
   private
@@ -21,19 +22,13 @@ module hc_normal_contact
   public :: normal_contact_t, new_normal_contact, normal_contact_memory
 
   !> Windows below this many nodes a side are not coarsened any further.
-  integer, parameter :: smallest_side = 40
+  integer, parameter :: smallest_side = 20
   !> Coarse lattices only have to give a start.
   real(wp), parameter :: coarse_tolerance = 3.0e-2_wp
 
-  !> A part of the finest window is worth operators of its own below this share of its nodes.
-  real(wp), parameter :: part_worth = 0.6_wp
-  !> Parts that are tried, and their tolerance.
+  !> Parts of the window that are tried, and their tolerance.
   integer, parameter :: part_tries = 3
   real(wp), parameter :: part_tolerance = 0.8_wp
-  !> Nodes around the first guess of the contact: so many, and its extent over this.
-  integer, parameter :: least_margin = 6, margin_part = 16
-  !> Sides of parts grow in steps of at least this share of them.
-  integer, parameter :: step_part = 16
 
   !> A frictionless contact problem on a hierarchy of lattices.
   type :: normal_contact_t
@@ -201,7 +196,7 @@ contains
       do try = 1, part_tries
         call frame(state%pressure > 0.0_wp, low, high)
         if (try > 1) call frame(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. whole%candidate), low, high)
-        if (product(high - low + 1) > part_worth*whole%lattice%size()) exit
+        if (.not. is_worth(low, high, whole%lattice)) exit
         call take_part(self, low, high, error)
         if (allocated(error)) return
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
@@ -231,30 +226,6 @@ contains
     end associate
   end subroutine solve_finest
 
-  !> First and last column and row of some nodes, with a margin all around as far as the window goes.
-  pure subroutine frame(nodes, low, high)
-    logical, intent(in) :: nodes(:, :)
-    integer, intent(out) :: low(2), high(2)
-    integer :: d, margin, step
-    logical :: line(maxval(shape(nodes)))
-
-    do d = 1, 2
-      line = .false.
-      line(:size(nodes, d)) = any(nodes, dim=3 - d)
-      low(d) = max(findloc(line, .true., dim=1), 1)
-      high(d) = findloc(line, .true., dim=1, back=.true.)
-      if (high(d) == 0) high(d) = size(nodes, d)
-      margin = least_margin + (high(d) - low(d) + 1)/margin_part
-      ! in steps of a power of two, so that loads that are alike share a part
-      step = least_margin
-      do while (step*step_part < high(d) - low(d))
-        step = 2*step
-      end do
-      low(d) = max((low(d) - margin - 1)/step*step + 1, 1)
-      high(d) = min((high(d) + margin + step - 1)/step*step, size(nodes, d))
-    end do
-  end subroutine frame
-
   !> Set up the part of the finest lattice between some columns and rows, unless it is at hand.
   !>
   !> No other part is taken, be it large enough: a load gives the same bits whatever came before it.
@@ -271,9 +242,7 @@ contains
     allocate (self%inner)
     self%corner = low
     associate (inner => self%inner, whole => self%level(1))
-      inner%lattice = whole%lattice
-      inner%lattice%first = whole%lattice%first + low - 1
-      inner%lattice%extent = high - low + 1
+      inner%lattice = part_of(whole%lattice, low, high)
       inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
       inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
       call inner%prepare(self%pair, self%kernel, .true., .true., error, self%n_threads)

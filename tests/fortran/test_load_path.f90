@@ -9,6 +9,7 @@ module test_load_path
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t, new_friction_problem
   use hc_frictional_contact, only: frictional_contact_t
+  use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction
   use hc_entry_state, only: entry_displacement
   use hc_load_path, only: advance, touches_rim
   use test_friction, only: new_sphere
@@ -58,6 +59,7 @@ contains
       new_test('rim', test_rim), &
       new_test('half_steps', test_half_steps), &
       new_test('any_start', test_any_start), &
+      new_test('part_of_window', test_part_of_window), &
       new_test('entry_ring', test_entry_ring), &
       new_test('entry_patch', test_entry_patch), &
       new_test('entry_oblique', test_entry_oblique) &
@@ -501,5 +503,47 @@ contains
     if (allocated(error)) return
     call check_true(error, state%dissipated_energy <= 1.0e-12_wp .and. all(state%zone /= 2), 'nothing slips')
   end subroutine test_entry_oblique
+
+  !> A contact that grows from a small part of the window to most of it, and is sheared: as on the whole window all along,
+  !> with less work while it is small.
+  subroutine test_part_of_window(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: tolerance = 1.0e-9_wp, load(5) = [0.01_wp, 0.03_wp, 0.1_wp, 0.9_wp, 0.9_wp], &
+                           shear(5) = [0.0_wp, 0.0_wp, 0.004_wp, 0.01_wp, 0.05_wp]
+    type(frictional_contact_t) :: whole
+    type(windowed_friction_t) :: windowed
+    type(contact_state_t) :: state, expected, next
+    real(wp) :: scale
+    integer :: i
+
+    call new_sphere(whole, 35, 0.3_wp, -0.15_wp, coulomb_t(0.2_wp), error)
+    if (allocated(error)) return
+    call new_windowed_friction(windowed, whole%problem, error)
+    if (allocated(error)) return
+    call new_friction_state(state, whole%problem%lattice)
+    expected = state
+    do i = 1, size(load)
+      call whole%solve_step(expected, expected%relative_displacement, &
+                            load_target_t([f, f, f, d], [load(i), shear(i), 0.0_wp, 0.0_wp]), tolerance, 60, next, error)
+      if (allocated(error)) return
+      expected = next
+      call windowed%solve_step(state, state%relative_displacement, &
+                               load_target_t([f, f, f, d], [load(i), shear(i), 0.0_wp, 0.0_wp]), tolerance, 60, next, error)
+      if (allocated(error)) return
+      state = next
+      call check_true(error, state%converged .and. expected%converged, 'both converge')
+      if (allocated(error)) return
+      scale = maxval(expected%pressure)
+      call check(error, maxval(abs(state%pressure - expected%pressure)), 0.0_wp, 1.0e-7_wp*scale, 'pressure')
+      if (allocated(error)) return
+      call check(error, maxval(abs(state%traction - expected%traction)), 0.0_wp, 1.0e-7_wp*scale, 'shear traction')
+      if (allocated(error)) return
+      call check(error, maxval(abs(state%relative_displacement - expected%relative_displacement)), 0.0_wp, &
+                 1.0e-7_wp*expected%motion(normal), 'relative displacement, outside the part too')
+      if (allocated(error)) return
+      if (i == 2) call check_true(error, 2.0_wp*state%operator_applications < expected%operator_applications, 'less work')
+      if (allocated(error)) return
+    end do
+  end subroutine test_part_of_window
 
 end module test_load_path

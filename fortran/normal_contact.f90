@@ -14,6 +14,7 @@ module hc_normal_contact
   use hc_contact_state, only: contact_state_t, new_contact_state, check_problem
   use hc_preconditioner, only: preconditioner_memory
   use hc_normal_level, only: normal_level_t
+  use hc_normal_steps, only: solve_level
   use hc_window_part, only: frame, is_worth, part_of
   use hc_multilevel, only: level_count, prolong_edge, restrict_field, restrict_mask
   implicit none
@@ -148,7 +149,7 @@ contains
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
-          call level%solve(control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          call solve_level(level, control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
@@ -202,7 +203,7 @@ contains
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
           part%pressure = state%pressure(first(1):last(1), first(2):last(2))
           ! the product over the window sees what single precision left
-          call inner%solve(control, target, part_tolerance*tolerance, max_sweeps, part, error)
+          call solve_level(inner, control, target, part_tolerance*tolerance, max_sweeps, part, error)
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
           sweeps = sweeps + part%sweeps
@@ -219,7 +220,7 @@ contains
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
       call whole%prepare(self%pair, self%kernel, .true., .true., error, self%n_threads)
       if (allocated(error)) return
-      call whole%solve(control, target, tolerance, max_sweeps, state, error)
+      call solve_level(whole, control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
       state%sweeps = state%sweeps + sweeps
       work = work + whole%work()

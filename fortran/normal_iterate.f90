@@ -1,0 +1,478 @@
+!> The state of an iteration for frictionless contact, and the passes over its fields.
+module hc_normal_iterate
+  use hc_precision, only: wp, sp, pi
+  use hc_error, only: error_t, status, raise
+  use hc_edge_extension, only: edge_extension_t, new_edge_extension
+  use hc_normal_level, only: normal_level_t
+  implicit none
+  private
+
+  public :: iterate_t, begin, rescale, balance, judge, take_set, press_punch, find_residual, projected_step, &
+            next_direction, step_share, advance, load_lack, fit_load
+
+  !> Scale of the classification parameter: r = this/(2 pi lambda_1 a), a the contact radius.
+  real(wp), parameter :: classification_scale = 10.0_wp
+  !> Length c of a projected step: M is a little more than the inverse.
+  real(wp), parameter :: step_length = 0.85_wp
+  !> Error of a product in single precision, relative to its largest value.
+  real(wp), parameter :: single_error = epsilon(1.0_sp)
+
+  !> Present state of an iteration; fields are (n_col, n_row).
+  !>
+  !> Those in single precision are zero off the active nodes, r but for the rings of the
+  !> continuation and z and kd everywhere; their units are p_unit and p_unit times that of the preconditioner.
+  type :: iterate_t
+    !> Pressure [Pa] and the closing of the gap that it causes [m]
+    real(wp), allocatable :: p(:, :), w(:, :)
+    !> Residual, preconditioned residual, direction and its product
+    real(sp), allocatable :: r(:, :, :), z(:, :, :), d(:, :, :), kd(:, :, :)
+    !> About the pressure of a rigid punch over the active nodes: M times one; zero off them
+    real(sp), allocatable :: punch(:, :)
+    real(wp) :: punch_sum = 0.0_wp
+    logical, allocatable :: active(:, :)
+    !> Columns between which the active nodes of each row lie, now and before: no pressure outside
+    integer, allocatable :: span(:, :)
+    type(edge_extension_t) :: edge
+    real(wp) :: approach = 0.0_wp
+    !> Unit of the pressure in single precision [Pa], and of the closing of the gap [m]
+    real(wp) :: p_unit = 1.0_wp, w_unit = 1.0_wp
+    !> Error that products in single precision may have left in w [m]
+    real(wp) :: stale = 0.0_wp
+    real(wp) :: p_max = 0.0_wp
+    !> Residual R_n, and the same on the active nodes alone
+    real(wp) :: residual = huge(1.0_wp), residual_active = huge(1.0_wp)
+    !> Active nodes, now and next
+    integer :: n_active = 0, n_next = 0
+  end type iterate_t
+
+contains
+
+  !> Pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
+  subroutine begin(level, now, by_load, target, candidate, start, error)
+    type(normal_level_t), intent(inout) :: level
+    type(iterate_t), intent(inout) :: now
+    logical, intent(in) :: by_load
+    real(wp), intent(in) :: target
+    logical, intent(in) :: candidate(:, :)
+    real(wp), intent(in) :: start(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n(2), stat
+
+    n = level%lattice%extent
+    allocate (now%p(n(1), n(2)), now%w(n(1), n(2)), stat=stat)
+    if (stat == 0) allocate (now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
+                             source=0.0_sp, stat=stat)
+    if (stat == 0) allocate (now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
+      return
+    end if
+    now%p = merge(max(start, 0.0_wp), 0.0_wp, candidate)
+    if (.not. any(now%p > 0.0_wp)) now%p = merge(1.0_wp, 0.0_wp, candidate)
+    now%approach = target
+    if (by_load) now%p = target/(level%lattice%cell_area()*sum(sum(now%p, dim=1)))*now%p
+    now%active = now%p > 0.0_wp
+    now%n_active = count(now%active)
+    now%span(1, :) = n(1) + 1
+    now%span(2, :) = 0
+    call find_span(now)
+    now%p_unit = maxval(now%p)
+    now%w_unit = now%p_unit*level%preconditioner%unit
+    now%w = 0.0_wp
+    now%d(:, :, 1) = real(now%p/now%p_unit, sp)
+    now%p = 0.0_wp
+    call level%multiply(now%d, now%kd)
+    call advance(level, now, 1.0_wp)
+    if (.not. by_load) then
+      call rescale(level, now)
+      now%p_unit = maxval(now%p)
+      now%w_unit = now%p_unit*level%preconditioner%unit
+    end if
+  end subroutine begin
+
+  !> Scale the pressure so that it has the least energy under a prescribed approach.
+  subroutine rescale(level, now)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    real(wp) :: overlap(size(now%p, 2)), resistance(size(now%p, 2)), factor
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        overlap(row) = sum(now%p(from:to, row)*(now%approach - level%initial_gap(from:to, row)), &
+                           mask=now%active(from:to, row))
+        resistance(row) = dot_product(now%p(from:to, row), now%w(from:to, row))
+      end associate
+    end do
+    !$omp end parallel do
+    factor = sum(overlap)/sum(resistance)
+    if (.not. factor > 0.0_wp) factor = now%approach/maxval(now%w)
+    now%p = factor*now%p
+    now%w = factor*now%w
+    now%stale = factor*now%stale
+  end subroutine rescale
+
+  !> The approach at which gap and pressure are in balance under a prescribed load.
+  !>
+  !> The residual then has no part along the motion of the punch; before there is one, the mean gap
+  !> under the pressure vanishes.
+  subroutine balance(level, now)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    real(wp) :: weight(size(now%p, 2)), lift(size(now%p, 2)), u
+    integer :: col, row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, u)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        weight(row) = 0.0_wp
+        lift(row) = 0.0_wp
+        if (allocated(now%punch)) then
+          do col = from, to
+            u = now%punch(col, row)
+            weight(row) = weight(row) + u
+            ! the gap may be infinite where nothing can touch
+            if (u > 0.0_wp) lift(row) = lift(row) + u*(level%initial_gap(col, row) + now%w(col, row))
+          end do
+        else
+          do col = from, to
+            u = now%p(col, row)
+            weight(row) = weight(row) + u
+            if (u > 0.0_wp) lift(row) = lift(row) + u*(level%initial_gap(col, row) + now%w(col, row))
+          end do
+        end if
+      end associate
+    end do
+    !$omp end parallel do
+    now%approach = sum(lift)/sum(weight)
+  end subroutine balance
+
+  !> Residuals, and the set that the present pressure and gap call for.
+  subroutine judge(level, now, candidate, next, changed)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    logical, intent(in) :: candidate(:, :)
+    logical, intent(out) :: next(:, :)
+    !> The new set is another one
+    logical, intent(out) :: changed
+    real(wp) :: r, gap, p, p_max, worst, worst_active
+    integer :: col, row, n_next, n_changed
+    logical :: enters
+
+    r = classification_scale/(2.0_wp*pi*level%pair%lambda_1*sqrt(level%lattice%cell_area()*now%n_active/pi))
+    p_max = 0.0_wp
+    worst = 0.0_wp
+    worst_active = 0.0_wp
+    n_next = 0
+    n_changed = 0
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, gap, p, enters) &
+    !$omp& reduction(max: p_max, worst, worst_active) reduction(+: n_next, n_changed)
+    do row = 1, size(now%p, 2)
+      next(:, row) = .false.
+      do col = 1, size(now%p, 1)
+        gap = level%initial_gap(col, row) + now%w(col, row) - now%approach
+        if (col < now%span(1, row) .or. col > now%span(2, row)) then
+          if (gap >= 0.0_wp) cycle                                             ! no pressure there, and none called for
+        end if
+        if (.not. candidate(col, row)) cycle
+        p = now%p(col, row)
+        enters = p - r*gap > 0.0_wp
+        next(col, row) = enters
+        p_max = max(p_max, p)
+        worst = max(worst, abs(min(p, gap/level%compliance)))
+        if (enters) n_next = n_next + 1
+        if (now%active(col, row)) then
+          worst_active = max(worst_active, abs(gap))
+          if (.not. enters) n_changed = n_changed + 1
+        else
+          if (enters) n_changed = n_changed + 1
+        end if
+      end do
+    end do
+    !$omp end parallel do
+    now%p_max = p_max
+    now%residual = worst/p_max
+    now%residual_active = worst_active/(level%compliance*p_max)
+    changed = n_changed > 0 .and. n_next > 0
+    now%n_next = n_next
+    if (n_next > 0) return
+    ! too much pressure everywhere: less of it on the old set
+    next = now%active
+    now%n_next = now%n_active
+  end subroutine judge
+
+  !> Take a new set of active nodes.
+  subroutine take_set(level, now, next)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    !> The new set; on return the old one
+    logical, allocatable, intent(inout) :: next(:, :)
+    logical, allocatable :: swap(:, :)
+    integer :: row
+
+    call move_alloc(now%active, swap)
+    call move_alloc(next, now%active)
+    call move_alloc(swap, next)
+    now%n_active = now%n_next
+    call find_span(now)
+    call new_edge_extension(now%edge, now%active)
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, size(now%p, 2)
+      now%r(:, row, 1) = 0.0_sp
+      if (.not. allocated(now%punch)) cycle
+      where (.not. now%active(:, row)) now%punch(:, row) = 0.0_sp
+    end do
+    !$omp end parallel do
+    if (.not. allocated(now%punch)) return
+    now%punch_sum = total(now%punch, level%n_threads)
+    if (.not. now%punch_sum > 0.0_wp) deallocate (now%punch)
+  end subroutine take_set
+
+  !> Columns between which the active nodes of each row lie, those of earlier sets included.
+  pure subroutine find_span(now)
+    type(iterate_t), intent(inout) :: now
+    integer :: row
+
+    do row = 1, size(now%active, 2)
+      if (.not. any(now%active(:, row))) cycle
+      now%span(1, row) = min(now%span(1, row), findloc(now%active(:, row), .true., dim=1))
+      now%span(2, row) = max(now%span(2, row), findloc(now%active(:, row), .true., dim=1, back=.true.))
+    end do
+  end subroutine find_span
+
+  !> Sum in double precision, row by row: it does not depend on the number of threads.
+  real(wp) function total(field, n_threads)
+    real(sp), intent(in) :: field(:, :)
+    integer, intent(in) :: n_threads
+    real(wp) :: part(size(field, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(n_threads)
+    do row = 1, size(field, 2)
+      part(row) = sum(real(field(:, row), wp))
+    end do
+    !$omp end parallel do
+    total = sum(part)
+  end function total
+
+  !> Pressure of a rigid punch over the active nodes, about, and nowhere negative.
+  subroutine press_punch(level, now)
+    type(normal_level_t), intent(inout) :: level
+    type(iterate_t), intent(inout) :: now
+
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, size(now%p, 2)
+      now%r(:, row, 1) = merge(1.0_sp, 0.0_sp, now%active(:, row))
+    end do
+    !$omp end parallel do
+    call level%precondition(now%edge, now%r, now%z)
+    allocate (now%punch(size(now%p, 1), size(now%p, 2)))
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, size(now%p, 2)
+      now%punch(:, row) = merge(max(now%z(:, row, 1), 0.0_sp), 0.0_sp, now%active(:, row))
+    end do
+    !$omp end parallel do
+    now%punch_sum = total(now%punch, level%n_threads)
+  end subroutine press_punch
+
+  !> r = approach - h - w on the active nodes.
+  subroutine find_residual(level, now)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    integer :: col, row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    do row = 1, size(now%p, 2)
+      do col = now%span(1, row), now%span(2, row)
+        if (.not. now%active(col, row)) cycle
+        now%r(col, row, 1) = real((now%approach - level%initial_gap(col, row) - now%w(col, row))/now%w_unit, sp)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine find_residual
+
+  !> d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or what is left of p, on a set to be held.
+  subroutine projected_step(level, now, held, by_load, pressures)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    logical, intent(in) :: held, by_load
+    !> Sum of the pressures under a prescribed load
+    real(wp), intent(in) :: pressures
+    real(wp) :: part(size(now%p, 2)), aim, mean
+    real(sp) :: lack
+    integer :: col, row
+
+    mean = 0.0_wp
+    if (by_load .and. .not. held) then
+      !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+      do row = 1, size(now%p, 2)
+        part(row) = 0.0_wp
+        do col = now%span(1, row), now%span(2, row)
+          if (now%active(col, row)) part(row) = part(row) + now%z(col, row, 1)
+        end do
+      end do
+      !$omp end parallel do
+      mean = sum(part)/now%punch_sum
+    end if
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, aim)
+    do row = 1, size(now%p, 2)
+      now%d(:, row, 1) = 0.0_sp
+      part(row) = 0.0_wp
+      do col = now%span(1, row), now%span(2, row)
+        aim = 0.0_wp
+        if (now%active(col, row)) then
+          aim = now%p(col, row)/now%p_unit
+          if (.not. held) then
+            aim = aim + step_length*now%z(col, row, 1)
+            if (by_load) aim = aim - step_length*mean*now%punch(col, row)
+          end if
+          aim = max(aim, 0.0_wp)
+          part(row) = part(row) + aim
+        end if
+        now%d(col, row, 1) = real(aim - now%p(col, row)/now%p_unit, sp)
+      end do
+    end do
+    !$omp end parallel do
+    if (.not. sum(part) > 0.0_wp) then
+      ! none of the pressure is left where it should be
+      now%d(:, :, 1) = now%d(:, :, 1) + merge(1.0_sp, 0.0_sp, now%active)
+      part = count(now%active, dim=1)
+    end if
+    ! what was cut off goes where it changes the approach alone
+    if (.not. by_load) return
+    lack = real((pressures/now%p_unit - sum(part))/now%punch_sum, sp)
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    do row = 1, size(now%p, 2)
+      do col = now%span(1, row), now%span(2, row)
+        now%d(col, row, 1) = now%d(col, row, 1) + lack*now%punch(col, row)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine projected_step
+
+  !> Direction of conjugate gradients.
+  subroutine next_direction(level, now, by_load, rz)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    logical, intent(in) :: by_load
+    !> r^T z of the last direction, 0: there is none; on return that of the new one
+    real(wp), intent(inout) :: rz
+    real(wp), dimension(size(now%p, 2)) :: part, sum_z
+    real(wp) :: rz_new
+    real(sp) :: back, mean
+    integer :: col, row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    do row = 1, size(now%p, 2)
+      part(row) = 0.0_wp
+      sum_z(row) = 0.0_wp
+      do col = now%span(1, row), now%span(2, row)
+        if (.not. now%active(col, row)) cycle
+        part(row) = part(row) + real(now%r(col, row, 1), wp)*now%z(col, row, 1)
+        sum_z(row) = sum_z(row) + now%z(col, row, 1)
+      end do
+    end do
+    !$omp end parallel do
+    rz_new = sum(part)
+    back = 0.0_sp
+    if (rz > 0.0_wp) back = real(rz_new/rz, sp)
+    mean = 0.0_sp
+    if (by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    do row = 1, size(now%p, 2)
+      if (.not. rz > 0.0_wp) now%d(:, row, 1) = 0.0_sp
+      do col = now%span(1, row), now%span(2, row)
+        if (.not. now%active(col, row)) cycle
+        now%d(col, row, 1) = now%z(col, row, 1) + back*now%d(col, row, 1)
+        if (by_load) now%d(col, row, 1) = now%d(col, row, 1) - mean*now%punch(col, row)
+      end do
+    end do
+    !$omp end parallel do
+    rz = rz_new
+  end subroutine next_direction
+
+  !> Length of a step of conjugate gradients; 0 if there is no curvature.
+  real(wp) function step_share(level, now, rz)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(in) :: now
+    !> r^T z
+    real(wp), intent(in) :: rz
+    real(wp) :: part(size(now%p, 2)), curvature
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        part(row) = sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))
+      end associate
+    end do
+    !$omp end parallel do
+    curvature = sum(part)
+    step_share = 0.0_wp
+    if (curvature > 0.0_wp .and. rz > 0.0_wp) step_share = rz/curvature
+  end function step_share
+
+  !> p <- p + share d, w <- w + share K d.
+  subroutine advance(level, now, share)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    real(wp), intent(in) :: share
+    real(wp) :: step, lift
+    real(sp) :: largest
+    integer :: col, row
+
+    step = share*now%p_unit
+    lift = share*now%w_unit
+    largest = 0.0_sp
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col) reduction(max: largest)
+    do row = 1, size(now%p, 2)
+      do col = now%span(1, row), now%span(2, row)
+        now%p(col, row) = now%p(col, row) + step*now%d(col, row, 1)
+        ! what left is gone, but for what single precision would leave of it
+        if (.not. now%active(col, row)) now%p(col, row) = 0.0_wp
+      end do
+      do col = 1, size(now%p, 1)
+        now%w(col, row) = now%w(col, row) + lift*now%kd(col, row, 1)
+        largest = max(largest, abs(now%kd(col, row, 1)))
+      end do
+    end do
+    !$omp end parallel do
+    now%stale = now%stale + single_error*abs(lift)*largest
+  end subroutine advance
+
+  !> What the sum of the pressures lacks because of rounding.
+  real(wp) function load_lack(level, now, pressures)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(in) :: now
+    !> What it should be
+    real(wp), intent(in) :: pressures
+    real(wp) :: part(size(now%p, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, size(now%p, 2)
+      part(row) = sum(now%p(:, row))
+    end do
+    !$omp end parallel do
+    load_lack = pressures - sum(part)
+  end function load_lack
+
+  !> Make up for it.
+  subroutine fit_load(level, now, pressures)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    real(wp), intent(in) :: pressures
+    real(wp) :: lack
+
+    lack = load_lack(level, now, pressures)
+    if (allocated(now%punch)) then
+      now%p = now%p + lack/now%punch_sum*now%punch
+    else
+      now%p = pressures/(pressures - lack)*now%p
+    end if
+  end subroutine fit_load
+
+end module hc_normal_iterate

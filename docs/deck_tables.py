@@ -6,14 +6,25 @@ Run it after a change of the deck format: ``python docs/deck_tables.py``.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import PydanticUndefined
-
-from hexcontact import deck, surfaces
+from hexcontact import deck, load_series, surfaces
 from hexcontact.messages import shown
-from hexcontact.validation import Table, expectation
+from hexcontact.validation import (
+    Flag,
+    Kind,
+    Quantity,
+    Several,
+    Table,
+    Text,
+    Whole,
+    Word,
+    WordOr,
+    expectation,
+    kind_of,
+)
 
 PAGE = Path(__file__).with_name("deck.md")
 TABLES: dict[str, type[Table]] = {
@@ -23,43 +34,94 @@ TABLES: dict[str, type[Table]] = {
     "grid": deck.Grid,
     "solver": deck.Solver,
     "load": deck.Load,
+    "series": load_series.Series,
+    "columns": load_series.Columns,
     "output": deck.Output,
 }
 BLOCK = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
+HEADER = ("key", "expected", "unit", "default", "example", "meaning")
+
+
+def row(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
 def default_of(info: Any) -> str:
-    if info.default_factory is not None or info.default in (None, ""):
-        return ""
-    if info.default is PydanticUndefined:
+    if info.is_required():
         return "required"
+    if info.default is None or info.default == "" or info.default_factory is not None:
+        return ""
     return f"`{shown(info.default)}`" if info.default != 0.0 or info.default is False else "0"
 
 
+def innermost(kind: Kind | None) -> Kind | None:
+    while (inner := getattr(kind, "kind", None)) is not None:
+        kind = inner
+    return kind
+
+
+def unit_of(info: Any) -> str:
+    """The unit of a bare number."""
+    kind = innermost(kind_of(info))
+    if isinstance(kind, surfaces.CoefficientKind):
+        return "m^(1-n)"
+    if not isinstance(kind, Quantity):
+        return ""
+    return (kind.dimension.unit or "1") if kind.dimension.bare else "must be given"
+
+
+def example_of(info: Any) -> str:
+    """A value as a deck writes it."""
+    if info.examples:
+        return str(info.examples[0])
+    kind = kind_of(info)
+    if isinstance(kind, WordOr):
+        kind = kind.kind
+    if isinstance(kind, Several):
+        return kind.example
+    if isinstance(kind, Quantity):
+        return kind.dimension.example
+    if isinstance(kind, Word):
+        return f'"{kind.words[-1]}"'
+    if isinstance(kind, Whole):
+        return "10"
+    if isinstance(kind, Flag):
+        return "true"
+    if isinstance(kind, Text):
+        return '"Q [N]"'
+    assert kind is not None, "an example is missing"
+    return kind.expected.partition("such as ")[2]
+
+
+def cells_of(key: str, info: Any) -> list[str]:
+    expected = re.split(r",? such as ", expectation(info))[0]
+    return [f"`{key}`", expected, unit_of(info), default_of(info), f"`{example_of(info)}`", info.description]
+
+
+def documented(table: type[Table]) -> dict[str, Any]:
+    """The keys of a table that are no tables of their own, which have their own chapters."""
+    return {key: info for key, info in table.known_keys().items() if info.description}
+
+
 def keys_of(table: type[Table]) -> str:
-    lines = ["| key | expected | default | meaning |", "|---|---|---|---|"]
-    for key, info in table.known_keys().items():
-        if info.description:
-            expected = expectation(info).replace("|", "\\|")
-            lines.append(f"| `{key}` | {expected} | {default_of(info)} | {info.description} |")
+    lines = [row(HEADER), "|" + "---|" * len(HEADER)]
+    lines += [row(cells_of(key, info)) for key, info in documented(table).items()]
     return "\n".join(lines) + "\n"
 
 
 def shapes() -> str:
-    lines = ["| shape | height | key | expected | default | meaning |", "|---|---|---|---|---|---|"]
+    lines = [row(("shape", "height", *HEADER)), "|" + "---|" * (len(HEADER) + 2)]
     for name, shape in surfaces.SHAPES.items():
-        first = [f"`{name}`", shape.formula.replace("|", "\\|")]
-        for key, info in shape.known_keys().items():
-            if key not in ("shape", "offset"):
-                cells = [*first, f"`{key}`", expectation(info), default_of(info), info.description]
-                lines.append(f"| {' | '.join(cells)} |")
+        first = [f"`{name}`", shape.formula]
+        for key, info in documented(shape).items():
+            if key != "offset":
+                lines.append(row([*first, *cells_of(key, info)]))
                 first = ["", ""]
         if first[0]:
-            lines.append(f"| {' | '.join(first)} | | | | |")
-    offset = surfaces.Flat.model_fields["offset"]
-    lines.append(
-        f"| all | | `offset` | {expectation(offset)} | {default_of(offset)} | {offset.description} |"
-    )
+            lines.append(row([*first, *[""] * len(HEADER)]))
+    lines.append(row(["all", "", *cells_of("offset", surfaces.Flat.model_fields["offset"])]))
     return "\n".join(lines) + "\n"
 
 

@@ -14,8 +14,9 @@ from . import deck as decks
 from . import grid as grids
 from . import native, native_friction
 from .case_arguments import as_toml, body_keys, given, with_radians
-from .case_checks import algorithm_of, field_problems, touching_problems
+from .case_checks import algorithm_of, checked_deck
 from .deck import Deck
+from .deck_assembly import Assembled, assemble
 from .errors import DeckError
 from .grid import Estimate, NoContactFound
 from .lattice import Lattice
@@ -130,8 +131,10 @@ class Case:
         The history.
     output : OutputSettings
         What is kept.
+    deck : Deck
+        The deck, checked and in SI.
     deck_text : str
-        The case as a deck.
+        The case as a deck, whole: with what it includes, what was set, and the series of loads from files.
     lattice : Lattice
         The window to start with.
     window_fixed : bool
@@ -166,6 +169,7 @@ class Case:
     solver: SolverSettings
     load_steps: tuple[LoadStep, ...]
     output: OutputSettings
+    deck: Deck
     deck_text: str
     lattice: Lattice
     window_fixed: bool
@@ -230,7 +234,7 @@ class Case:
             load=[with_radians(load) for load in loads],
             output=given(fields=fields, every=every) or None,
         )
-        self._set_up(data, None, Source(), gap if callable(gap) else array, lattice)
+        self._set_up(assemble(data, None, Source(), Path()), gap if callable(gap) else array, lattice)
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
@@ -250,10 +254,7 @@ class Case:
             If it cannot be read, or with a sentence for each thing that is wrong with it.
         """
         data, text = decks.read_toml(path)
-        if not overrides:
-            return cls._made(data, text, Source(str(path), text))
-        data = decks.with_overrides(data, overrides)
-        return cls._made(data, None, Source(str(path), text, frozenset(overrides)))
+        return cls._made(data, text, Source(str(path), text), Path(path).parent, overrides)
 
     @classmethod
     def from_text(cls, text: str, name: str = "deck") -> Case:
@@ -266,25 +267,34 @@ class Case:
         return cls._made(data, None, Source())
 
     @classmethod
-    def _made(cls, data: Mapping[str, Any], text: str | None, source: Source) -> Case:
+    def _made(
+        cls,
+        data: Mapping[str, Any],
+        text: str | None,
+        source: Source,
+        folder: Path = Path(),
+        overrides: Mapping[str, Any] | None = None,
+    ) -> Case:
         case = cls.__new__(cls)
-        case._set_up(data, text, source, None, None)
+        case._set_up(assemble(data, text, source, folder, overrides), None, None)
         return case
 
     def _set_up(
         self,
-        data: Mapping[str, Any],
-        text: str | None,
-        source: Source,
+        given: Assembled,
         gap: Callable[[Array, Array], ArrayLike] | Array | None,
         lattice: Lattice | None,
     ) -> None:
-        deck = Deck.parse(data, source)
-        self.deck_text = as_toml(data, gap is not None) if text is None else text
+        source = given.source
+        deck, problems = checked_deck(given.data, given.problems, gap is not None)
+        if deck is None or problems:
+            raise deck_error(problems, source)
+        self.deck = deck
+        self.deck_text = as_toml(given.data, gap is not None) if given.text is None else given.text
         self.title = deck.title
         self.body_1, self.body_2 = _body(deck.body.body_1), _body(deck.body.body_2)
         self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
-        algorithm, problems = algorithm_of(deck)
+        algorithm, _ = algorithm_of(deck.friction, deck.solver)
         given_solver = deck.solver
         self.solver = SolverSettings(
             algorithm,
@@ -297,19 +307,11 @@ class Case:
             Path(deck.output.file) if deck.output.file else None, deck.output.fields or (), deck.output.every
         )
         mu = self.friction_coefficient if self.frictional else None
-        self.load_steps, of_history = load_steps(deck.load, mu)
-        problems += of_history + field_problems(deck, algorithm)
-        self._surface_gap: Separation | None = None
-        if gap is None:
-            self._surface_gap = Separation(deck.body.body_1.surface, deck.body.body_2.surface)
-            problems += touching_problems(self._surface_gap)
-        elif self.body_1.surface is not None or self.body_2.surface is not None:
-            problems.append(
-                Problem(("gap",), MISSING, "expected either a gap or surfaces of the bodies, not both")
-            )
+        self.load_steps, _ = load_steps(deck.load, mu)
+        self._surface_gap = (
+            Separation(deck.body.body_1.surface, deck.body.body_2.surface) if gap is None else None
+        )
         self._given_gap = gap
-        if problems:
-            raise deck_error(problems, source)
 
         self.pair = ElasticPair.from_materials(
             self.body_1.young_modulus,
@@ -395,6 +397,24 @@ class Case:
         from . import solve
 
         return solve.run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether two cases are the same problem, solved and kept in the same way."""
+        if not isinstance(other, Case):
+            return NotImplemented
+        mine, other_gap = self._given_gap, other._given_gap
+        same_gap = mine is other_gap or (
+            isinstance(mine, np.ndarray)
+            and isinstance(other_gap, np.ndarray)
+            and np.array_equal(mine, other_gap)
+        )
+        return same_gap and (self.deck, self.load_steps, self.lattice) == (
+            other.deck,
+            other.load_steps,
+            other.lattice,
+        )
+
+    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         """Name the case, its window and its steps."""

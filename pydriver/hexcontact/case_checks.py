@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from .deck import Deck
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .deck import Deck, Friction, Output, Solver
 from .errors import DeckError
+from .load_history import load_steps
 from .messages import MISSING, Problem
 from .surfaces import Separation, principal_curvatures
 from .variables import FIELDS
@@ -16,10 +20,57 @@ FRICTIONLESS_FIELDS = (
 )
 
 
-def algorithm_of(deck: Deck) -> tuple[str, list[Problem]]:
+def checked_deck(
+    data: Mapping[str, Any], problems: Sequence[Problem], gap_given: bool
+) -> tuple[Deck | None, list[Problem]]:
+    """Check a deck, table by table and as a whole.
+
+    Parameters
+    ----------
+    data : mapping
+        The deck as dictionaries, without files to include.
+    problems : sequence of Problem
+        What is known to be wrong with it.
+    gap_given : bool
+        Whether the gap is given instead of the surfaces.
+
+    Returns
+    -------
+    deck : Deck or None
+        The deck; None if a table is wrong.
+    problems : list of Problem
+        Everything that is wrong. Checks that need several tables are made wherever these are right.
+    """
+    found = list(problems)
+    tables, of_tables = Deck.checked(data)
+    blamed = {problem.key for problem in found}
+    found += [problem for problem in of_tables if problem.key not in blamed]
+    for problem in problems:
+        tables.pop(str(problem.key[0]), None)
+    algorithm = None
+    if {"friction", "solver"} <= tables.keys():
+        friction, solver = tables["friction"], tables["solver"]
+        algorithm, against = algorithm_of(friction, solver)
+        found += against
+        if "load" in tables:
+            mu = None if algorithm == "frictionless" else friction.coefficient if friction else 0.0
+            found += load_steps(tables["load"], mu)[1]
+        if "output" in tables:
+            found += field_problems(tables["output"], algorithm)
+    if "body" in tables:
+        one, two = (body.surface for body in (tables["body"].body_1, tables["body"].body_2))
+        if not gap_given:
+            found += touching_problems(Separation(one, two))
+        elif one.shape != "flat" or two.shape != "flat":
+            sentence = "expected either a gap or surfaces of the bodies, not both"
+            found.append(Problem(("gap",), MISSING, sentence))
+    return (Deck.model_construct(**tables) if not found else None), found
+
+
+def algorithm_of(friction: Friction | None, solver: Solver) -> tuple[str, list[Problem]]:
     """Return the algorithm that a deck asks for, and what stands against it."""
-    mu = deck.friction.coefficient if deck.friction else None
-    algorithm = deck.solver.algorithm or ("incremental" if mu else "frictionless")
+    mu = friction.coefficient if friction else None
+    algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
     problems = []
     if algorithm == "frictionless" and mu:
         sentence = 'expected 0, since solver.algorithm = "frictionless"'
@@ -32,14 +83,14 @@ def algorithm_of(deck: Deck) -> tuple[str, list[Problem]]:
     return algorithm, problems
 
 
-def field_problems(deck: Deck, algorithm: str) -> list[Problem]:
+def field_problems(output: Output, algorithm: str) -> list[Problem]:
     """Complain about fields that a frictionless run does not yield."""
     known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else FIELDS
-    missing = [name for name in deck.output.fields or () if name not in known]
+    missing = [name for name in output.fields or () if name not in known]
     if not missing:
         return []
     sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
-    return [Problem(("output", "fields"), deck.output.fields, sentence)]
+    return [Problem(("output", "fields"), output.fields, sentence)]
 
 
 def touching_problems(gap: Separation) -> list[Problem]:

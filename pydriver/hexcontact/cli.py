@@ -293,6 +293,26 @@ def check(deck: DeckFile, settings: Settings = None) -> None:
     console.print(f"{deck} is ready to run", soft_wrap=True)
 
 
+@app.command(epilog="Example: hexcontact schema -o deck.schema.json")
+@_guarded
+def schema(
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; default: print it.")
+    ] = None,
+) -> None:
+    """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
+    import json
+
+    from .schema import deck_schema
+
+    text = json.dumps(deck_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None or str(output) == "-":
+        print(text, end="")
+        return
+    output.write_text(text, encoding="utf-8")
+    print(f'written: {output}; first line of a deck that uses it: "#:schema {output}"')
+
+
 @app.command(epilog="Example: hexcontact new sphere")
 @_guarded
 def new(

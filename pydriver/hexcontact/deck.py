@@ -13,12 +13,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
-from pydantic import Field, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from .errors import DeckError
-from .messages import Source, deck_error
+from .load_series import LOADS, QUANTITIES, Series
+from .messages import Problem, Source, deck_error
 from .surfaces import Flat, Point, Surface, SurfaceKind
 from .units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE
 from .validation import Flag, Quantity, Several, Table, Text, Whole, Word, WordOr, problems_of, refuse
@@ -26,14 +27,6 @@ from .variables import FIELDS
 
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
-
-LOADS = {
-    "z": ("normal_load", "approach"),
-    "x": ("tangential_load_x", "shift_x"),
-    "y": ("tangential_load_y", "shift_y"),
-    "twist": ("torque", "twist"),
-}
-"""The two keys that drive each rigid motion: by force, by displacement."""
 
 MOST_STEPS = 100_000
 
@@ -95,12 +88,16 @@ class Friction(Table):
 class Grid(Table):
     """The lattice and the window of it in which contact is looked for."""
 
-    spacing: PositiveLength | None = Field(None, description="distance l_e between neighboring nodes")
+    spacing: PositiveLength | None = Field(
+        None, description="distance l_e between neighboring nodes", examples=['"5 um"']
+    )
     nodes_across: Annotated[int, Whole(5, 100_000)] | None = Field(
-        None, description="nodes per side of the window, instead of the spacing"
+        None, description="nodes per side of the window, instead of the spacing", examples=["41"]
     )
     nodes_in_radius: Annotated[float, Quantity(NUMBER, at_least=1, at_most=100_000)] | None = Field(
-        None, description="spacings in the estimated contact radius √(area/π), instead of the spacing"
+        None,
+        description="spacings in the estimated contact radius √(area/π), instead of the spacing",
+        examples=["40"],
     )
     extent: Annotated[
         str | tuple[float, float],
@@ -148,7 +145,7 @@ class Solver(Table):
         ),
     )
     tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-14, at_most=0.1)] = Field(
-        1e-8, description="bound on every residual at the end of every load step"
+        1e-8, description="bound on every residual at the end of every load step", examples=["1e-10"]
     )
     coupling: Annotated[str, Word(("full", "goodman"))] = Field(
         "full", description="goodman: shear does not move the pressure (for comparison)"
@@ -179,20 +176,20 @@ class Fractions(Several):
 class Segment(Table):
     """A stretch of the load history: every load ramps from where it stands to the value given here."""
 
-    normal_load: Annotated[float, Quantity(FORCE, at_least=0)] | None = Field(
-        None, description="normal load P"
-    )
+    normal_load: Annotated[float, QUANTITIES["normal_load"]] | None = Field(None, description="normal load P")
     tangential_load_x: Force | None = Field(None, description="tangential load on body 1 along x")
     tangential_load_y: Force | None = Field(None, description="tangential load on body 1 along y")
     torque: Annotated[float, Quantity(TORQUE)] | None = Field(
         None, description="moment about z through x = y = 0; frees the twist"
     )
-    approach: Length | None = Field(None, description="approach of the bodies, instead of normal_load")
+    approach: Length | None = Field(
+        None, description="approach of the bodies, instead of normal_load", examples=['"1 um"']
+    )
     shift_x: Length | None = Field(
-        None, description="tangential motion of body 2, instead of tangential_load_x"
+        None, description="tangential motion of body 2, instead of tangential_load_x", examples=['"1 um"']
     )
     shift_y: Length | None = Field(
-        None, description="tangential motion of body 2, instead of tangential_load_y"
+        None, description="tangential motion of body 2, instead of tangential_load_y", examples=['"1 um"']
     )
     twist: Annotated[float, Quantity(ANGLE)] | None = Field(
         None, description="rotation about z, instead of torque"
@@ -207,20 +204,23 @@ class Segment(Table):
         Annotated[tuple[float, ...], Fractions(Quantity(NUMBER, above=0, at_most=1), "", "[0.1, 0.4, 1]")]
         | None
     ) = Field(None, description="fraction of the segment done at the end of each step, instead of `ramp`")
-    label: Annotated[str, Text()] = Field("", description="name of the segment in the result")
+    label: Annotated[str, Text()] = Field(
+        "", description="name of the segment in the result", examples=['"press"']
+    )
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Each motion has one control, each segment one kind of ramp."""
         pairs = LOADS.values()
-        if "path" not in data and not any(key in data for pair in pairs for key in pair):
+        whole = "path" in data or "series" in data
+        if not whole and not any(key in data for pair in pairs for key in pair):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in pairs:
             if force in data and displacement in data:
                 yield displacement, f"expected {force} or {displacement}, not both"
         if data.get("ramp") == "cubic" and "normal_load" not in data:
             yield "ramp", "a cubic ramp needs normal_load in the same segment"
-        if "values" in data and "ramp" in data:
+        if "values" in data and data.get("ramp", "linear") != "linear":
             yield "ramp", "expected ramp or values, not both"
         values, steps = data.get("values"), data.get("steps")
         if isinstance(values, list | tuple) and steps is not None and steps != len(values):
@@ -231,26 +231,44 @@ class Load(Segment):
     """An entry of [[load]]: a segment, or a path of segments that is repeated."""
 
     repeat: Annotated[int, Whole(1, MOST_STEPS)] | None = Field(
-        None, description="how often `path` is run; 1 if absent"
+        None, description="how often `path` or `series` is run; 1 if absent"
     )
-    path: list[Segment] | None = Field(None, min_length=1, description="segments to run in turn")
+    path: list[Segment] | None = Field(
+        None,
+        min_length=1,
+        description="segments to run in turn",
+        examples=['[{ normal_load = "4 N" }, { normal_load = "9 N" }]'],
+    )
+    series: Series | None = Field(
+        None,
+        description="rows of a file or of arrays to run in turn, each reached in `steps` increments",
+        examples=['{ file = "history.csv" }'],
+    )
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Let a path stand alone."""
+        """Let a path or a series stand alone."""
         yield from super().conflicts(data)
-        if "path" in data:
+        if "path" in data and "series" in data:
+            yield "series", "expected path or series, not both"
+        elif "path" in data:
             for key in Segment.known_keys():
                 if key in data and key != "label":
                     yield key, "expected inside the path, not beside it"
+        elif "series" in data:
+            for key in Segment.known_keys():
+                if key in data and key not in ("label", "steps"):
+                    yield key, "expected in the series, not beside it"
         elif "repeat" in data:
-            yield "repeat", "needs a path of segments to repeat"
+            yield "repeat", "needs a path of segments or a series to repeat"
 
 
 class Output(Table):
     """What is written, and where."""
 
-    file: Annotated[str, Text()] | None = Field(None, description="netCDF file of the result")
+    file: Annotated[str, Text()] | None = Field(
+        None, description="netCDF file of the result", examples=['"fretting.nc"']
+    )
     fields: (
         Annotated[tuple[str, ...], Several(Word(FIELDS), "field names", '["pressure", "gap", "zone"]')] | None
     ) = Field(None, description="fields to keep; all but the displacements of the bodies if absent")
@@ -262,7 +280,12 @@ class Output(Table):
 class Deck(Table):
     """A whole deck."""
 
-    title: Annotated[str, Text()] = Field("", description="a line about the case")
+    title: Annotated[str, Text()] = Field(
+        "", description="a line about the case", examples=['"Sphere on flat"']
+    )
+    include: Annotated[tuple[str, ...], Several(Text(), "file names", '["materials.toml"]')] | None = Field(
+        None, description="decks, or parts of decks, whose keys hold where this one says nothing"
+    )
     body: Bodies
     friction: Friction | None = None
     grid: Grid
@@ -283,6 +306,32 @@ class Deck(Table):
             return cls.model_validate(data)
         except ValidationError as error:
             raise deck_error(problems_of(error), source) from None
+
+    @classmethod
+    def checked(cls, data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
+        """Check a deck and return what is right with it, table by table, and what is wrong.
+
+        Returns
+        -------
+        tables : dict
+            The attributes of a deck that were read; those with mistakes, or required and absent, are missing.
+        problems : list of Problem
+            Everything that is wrong with the tables one by one.
+        """
+        try:
+            deck = cls.model_validate(data)
+        except ValidationError as error:
+            problems = problems_of(error)
+        else:
+            return {name: getattr(deck, name) for name in cls.model_fields}, []
+        faulty = {problem.key[0] for problem in problems if problem.key}
+        tables = {}
+        for name, info in cls.model_fields.items():
+            if name in data and name not in faulty:
+                tables[name] = TypeAdapter(cast(Any, info.annotation)).validate_python(data[name])
+            elif name not in faulty:
+                tables[name] = info.get_default(call_default_factory=True)
+        return tables, problems
 
 
 def read_toml(path: str | Path) -> tuple[dict[str, Any], str]:
@@ -336,8 +385,8 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         place = re.search(r" \(at line (\d+), column (\d+)\)$", message)
         if place is None:
             raise DeckError(f"{name}: is not TOML: {message}") from None
-        where, what = f"{name}:{place[1]}", message[: place.start()]
-        raise DeckError(f"{where}: is not TOML: {what} at column {place[2]}") from None
+        where, what = f"{name}:{place[1]}:{place[2]}", message[: place.start()]
+        raise DeckError(f"{where}: is not TOML: {what}") from None
 
 
 def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:

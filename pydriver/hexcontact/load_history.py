@@ -12,7 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from .deck import LOADS, MOST_STEPS, Load, Segment
+from .deck import MOST_STEPS, Load, Segment
+from .load_series import LOADS
 from .messages import MISSING, Problem
 from .validation import SMALLEST
 
@@ -90,11 +91,12 @@ class LoadStep:
 
 
 class _Stretch(NamedTuple):
-    """A segment as it is run: its key in the deck, and its label."""
+    """A segment as it is run: its key in the deck, its label, whether it carries on the one before."""
 
     key: tuple[str | int, ...]
     segment: Segment
     label: str
+    carries_on: bool = False
 
 
 START = {
@@ -125,7 +127,7 @@ def load_steps(
         What is wrong with the history as a whole: loads that never press, that no friction carries, or a ramp
         whose start is not known.
     """
-    count = sum(_count(stretch.segment) * turns for turns, path in _paths(loads) for stretch in path)
+    count = sum(_count_of(load) for load in loads)
     if count > MOST_STEPS:
         sentence = f"expected at most {MOST_STEPS} load steps in all, not {count}"
         return (), [Problem(("load",), MISSING, sentence)]
@@ -133,8 +135,10 @@ def load_steps(
     steps: list[LoadStep] = []
     problems: list[Problem] = []
     now = dict(START)
-    for number, (key, segment, label) in enumerate(_in_turn(loads)):
-        start, virgin = now, number == 0
+    number = -1
+    for key, segment, label, carries_on in _in_turn(loads):
+        start, virgin = now, number < 0
+        number += not carries_on
         if segment.ramp == "cubic" and start["z"].control != "force":
             sentence = "expected linear, since the segment before was driven by approach"
             problems.append(Problem((*key, "ramp"), "cubic", sentence))
@@ -155,7 +159,9 @@ def load_steps(
 def _paths(loads: Sequence[Load]) -> Iterator[tuple[int, list[_Stretch]]]:
     """Yield, for each entry of [[load]], how often it is run and the segments of one turn."""
     for number, load in enumerate(loads):
-        if load.path is None:
+        if load.series is not None:
+            yield load.repeat or 1, list(_rows(("load", number, "series"), load))
+        elif load.path is None:
             yield 1, [_Stretch(("load", number), load, load.label)]
         else:
             yield (
@@ -167,10 +173,29 @@ def _paths(loads: Sequence[Load]) -> Iterator[tuple[int, list[_Stretch]]]:
             )
 
 
+def _rows(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:
+    """Yield the rows of a series; those of one step with the same label are one segment."""
+    assert load.series is not None
+    before = None
+    for row in load.series.rows():
+        label = row.pop("label", "") or load.label
+        # checked already, and there may be many
+        segment = Segment.model_construct(**row, steps=load.steps)
+        yield _Stretch(key, segment, label, carries_on=label == before and (load.steps or 1) == 1)
+        before = label
+
+
 def _in_turn(loads: Sequence[Load]) -> Iterator[_Stretch]:
     for turns, path in _paths(loads):
         for _ in range(turns):
             yield from path
+
+
+def _count_of(load: Load) -> int:
+    """Return the number of load steps of an entry of [[load]]."""
+    if load.series is not None:
+        return load.series.count * (load.steps or 1) * (load.repeat or 1)
+    return sum(_count(segment) for segment in load.path or [load]) * (load.repeat or 1)
 
 
 def _count(segment: Segment) -> int:

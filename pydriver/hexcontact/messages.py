@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import difflib
 import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
+from .deck_location import Place, place_of, places
 from .errors import DeckError
 
 MISSING: Any = object()
@@ -45,20 +46,29 @@ class Source:
         The deck as written.
     overrides : frozenset of str
         Dotted keys whose values did not come from the text.
+    included : tuple of (str, str)
+        Names and texts of the files that the deck includes, the one that counts most first.
     """
 
     name: str = ""
     text: str = ""
     overrides: frozenset[str] = field(default_factory=frozenset)
+    included: tuple[tuple[str, str], ...] = ()
 
     def locate(self, key: str) -> str:
-        """Return "file:line: ", "override: " or "" for a dotted key."""
+        """Return "file:line:column: ", "override: " or "" for a dotted key."""
         if any(key == name or key.startswith(f"{name}.") for name in self.overrides):
             return "override: "
         if not self.name:
             return ""
-        line = line_of(self.text, key)
-        return f"{self.name}:{line}: " if line else f"{self.name}: "
+        path = tuple(key.split("."))
+        written = [(name, place_of(found, path)) for name, found in self._places]
+        name, (_, place) = max(written, key=lambda entry: entry[1][0])  # of equals the first
+        return f"{name}:{place.line}:{place.column}: " if place else f"{self.name}: "
+
+    @cached_property
+    def _places(self) -> list[tuple[str, dict[tuple[str, ...], Place]]]:
+        return [(name, places(text)) for name, text in ((self.name, self.text), *self.included)]
 
 
 def deck_error(problems: Iterable[Problem], source: Source) -> DeckError:
@@ -106,43 +116,3 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
     """Return "; did you mean ...?" with the nearest known word, or nothing."""
     near = difflib.get_close_matches(str(word)[:100], list(known), n=1)
     return f"; did you mean {near[0]}?" if near else ""
-
-
-_HEADER = re.compile(r"""\s*(\[\[?)\s*([A-Za-z0-9_."' -]+?)\s*\]""")
-_KEY = re.compile(r"""\s*([A-Za-z0-9_."' -]+?)\s*=""")
-
-
-def line_of(text: str, key: str) -> int | None:
-    """Find the line of a deck on which a key, or else the table around it, is written.
-
-    It scans for headers and keys instead of parsing TOML again; keys inside inline tables are found by the
-    line on which that table starts.
-    """
-    best: tuple[int, int] | None = None  # length of the matching part of the key, line
-    table, in_text = "", ""
-    counts: dict[str, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        if in_text:
-            in_text = "" if in_text in line else in_text
-            continue
-        if header := _HEADER.match(line):
-            table = _plain(header[2])
-            if header[1] == "[[":
-                counts[table] = counts.get(table, 0) + 1
-                table = f"{table}.{counts[table]}"
-            here = table
-        elif entry := _KEY.match(line):
-            here = f"{table}.{_plain(entry[1])}".lstrip(".")
-        else:
-            continue
-        if (key == here or key.startswith(f"{here}.")) and (best is None or len(here) > best[0]):
-            best = len(here), number
-        for quotes in ('"""', "'''"):
-            if line.count(quotes) == 1:
-                in_text = quotes
-    return best[1] if best else None
-
-
-def _plain(key: str) -> str:
-    """Strip the quotes and blanks that TOML allows around the parts of a dotted key."""
-    return ".".join(part.strip().strip("\"'") for part in key.split("."))

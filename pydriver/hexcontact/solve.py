@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .deck import LOADS
 from .errors import ConvergenceError
+from .load_series import LOADS
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
 from .window import kind_of

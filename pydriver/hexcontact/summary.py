@@ -78,6 +78,7 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
 
 def case_rows(case: Case) -> list[Row]:
     """Return what would be run."""
+    from .estimates import work
     from .window import memory_needed
 
     lattice = case.lattice
@@ -100,6 +101,7 @@ def case_rows(case: Case) -> list[Row]:
         ("largest load", _largest(case)),
         ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
         ("memory", f"{quantity(memory_needed(case, lattice), 'B', 3)}"),
+        ("work", work(case)),
     ]  # fmt: skip
 
 

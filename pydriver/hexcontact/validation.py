@@ -278,14 +278,19 @@ class Table(BaseModel):
         return Problem(key, value, details["msg"])
 
 
-def expectation(info: Any) -> str:
-    """Say what a field expects, for messages and for the deck reference."""
+def kind_of(info: Any) -> Kind | None:
+    """Return the kind of the values of a field; None if it holds tables."""
     kinds = [entry for entry in info.metadata if isinstance(entry, Kind)]
     if not kinds:  # "Annotated[...] | None" keeps its metadata one level down
         parts = getattr(info.annotation, "__args__", ())
         kinds = [e for part in parts for e in getattr(part, "__metadata__", ()) if isinstance(e, Kind)]
-    if kinds:
-        return kinds[0].expected
+    return kinds[0] if kinds else None
+
+
+def expectation(info: Any) -> str:
+    """Say what a field expects, for messages and for the deck reference."""
+    if kind := kind_of(info):
+        return kind.expected
     return "an array of tables of keys" if "list[" in str(info.annotation) else "a table of keys"
 
 

@@ -153,7 +153,7 @@ def test_friction_and_algorithm_have_to_agree() -> None:
     with pytest.raises(DeckError) as error:
         Case.from_text(DECK + friction + '[solver]\nalgorithm = "frictionless"\n')
     assert str(error.value) == (
-        'deck:18: friction.coefficient = 0.3: expected 0, since solver.algorithm = "frictionless"'
+        'deck:18:1: friction.coefficient = 0.3: expected 0, since solver.algorithm = "frictionless"'
     )
     with pytest.raises(
         DeckError, match=r'friction.coefficient: missing; .* since solver.algorithm = "static"'

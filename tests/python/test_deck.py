@@ -2,15 +2,17 @@
 
 import math
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from hexcontact import deck as decks
 from hexcontact.deck import Deck, Load, read_toml, with_overrides
+from hexcontact.deck_location import places
 from hexcontact.errors import DeckError
 from hexcontact.load_history import LoadStep, Target, load_steps
-from hexcontact.messages import Source, line_of, shown
+from hexcontact.messages import Source, shown
 from hexcontact.surfaces import Flat, Sphere
 
 ROOT = Path(__file__).parents[2]
@@ -288,7 +290,7 @@ WRONG = [
         "values = [0.5, 0.9]",
         "load.1.values = [0.5, 0.9]: expected fractions of the segment, rising to 1, such as [0.1, 0.4, 1]",
     ),
-    ("steps = 10", "repeat = 10", "load.1.repeat = 10: needs a path of segments to repeat"),
+    ("steps = 10", "repeat = 10", "load.1.repeat = 10: needs a path of segments or a series to repeat"),
     (
         "steps = 10",
         "path = [{normal_load = 1}]",
@@ -322,12 +324,12 @@ def test_everything_wrong_is_reported_at_once() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "start"),
     [
-        ("Sphere on flat", "x\ny", "deck.toml:1: is not TOML"),
-        ("0.32\nsurface", "7\nsurface", "deck.toml:5: body.1.poisson_ratio = 7: "),
-        ('radius = "1 mm"', "radius = 0", "deck.toml:6: body.1.surface.radius = 0: "),
-        (', radius = "1 mm"', "", "deck.toml:6: body.1.surface.radius: missing"),
-        ("coefficient = inf", "", "deck.toml:12: friction.coefficient: missing"),
-        ("steps = 30", "steps = 0", "deck.toml:32: load.2.steps = 0: "),
+        ("Sphere on flat", "x\ny", "deck.toml:1:11: is not TOML"),
+        ("0.32\nsurface", "7\nsurface", "deck.toml:5:1: body.1.poisson_ratio = 7: "),
+        ('radius = "1 mm"', "radius = 0", "deck.toml:6:31: body.1.surface.radius = 0: "),
+        (', radius = "1 mm"', "", "deck.toml:6:1: body.1.surface.radius: missing"),
+        ("coefficient = inf", "", "deck.toml:12:1: friction.coefficient: missing"),
+        ("steps = 30", "steps = 0", "deck.toml:32:1: load.2.steps = 0: "),
     ],
 )
 def test_messages_point_at_the_line(old: str, new: str, start: str) -> None:
@@ -370,11 +372,11 @@ def test_read_toml(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        (b"a = 1\nb = \n", ":2: is not TOML: Invalid value at column 5"),
-        (b"a = 1\na = 2\n", ":2: is not TOML: Cannot overwrite a value"),
+        (b"a = 1\nb = \n", ":2:5: is not TOML: Invalid value"),
+        (b"a = 1\na = 2\n", ":2:6: is not TOML: Cannot overwrite a value"),
         (b'a = "x', "is not TOML: "),
         (b"\xff\xfe", ": is not UTF-8 text (byte 0); expected a deck (a TOML file)"),
-        (b"CDF\x01\x00", ":1: is not TOML: "),
+        (b"CDF\x01\x00", ":1:4: is not TOML: "),
         (b"a = " + b"[" * 20000, ": is not TOML: nested too deeply"),
         (b"a = " + b"9" * 5000, ": is not TOML: "),
     ],
@@ -417,17 +419,83 @@ def test_overrides() -> None:
         with_overrides(data, {"title.x.y": 1})
 
 
-def test_lines_of_keys() -> None:
-    text = '[a]\nb = 1\n"c d" = 2 # [x]\n\n[[l]]\nb = """\nb = 3\n"""\n[[l]]\nb = { c = 1,\n d = 2 }\n'
-    assert line_of(text, "a") == 1
-    assert line_of(text, "a.b") == 2
-    assert line_of(text, "a.c d") == 3
-    assert line_of(text, "l.1.b") == 6
-    assert line_of(text, "l.1.z") == 5
-    assert line_of(text, "l.2.b.d") == 10
-    assert line_of(text, "nothing") is None
-    assert line_of("body.1.rigid = true\n[body]\n2.rigid = true\n", "body.1.rigid") == 1
-    assert line_of("body.1.rigid = true\n[body]\n2.rigid = true\n", "body.2.rigid") == 3
+TEXT = """\
+body.1.rigid = true  # body.2.rigid
+[a]
+  b = 1
+"c d" = 2 # [x]
+
+[[l]]
+b = '''
+b = 3 # [no]'''
+[[l]]
+b = { c = 1, d = { e = "}," } }
+c = [ # entries
+  { d = 1 },
+  [ 2, 3 ],
+]
+[l.t]
+u = 1
+[[l.p]]
+v = 1979-05-27T07:32:00Z
+[[l.p]]
+  v = "\\" ["
+[grid]
+window = [ 3,
+ 4 ]
+"""
+
+
+def test_places_of_keys() -> None:
+    tomllib.loads(TEXT)
+    found = {".".join(path): tuple(place) for path, place in places(TEXT).items()}
+    expected = {
+        "body.1.rigid": (1, 8), "a": (2, 1), "a.b": (3, 3), "a.c d": (4, 1), "l.1": (6, 1), "l.1.b": (7, 1),
+        "l.2": (9, 1), "l.2.b": (10, 1), "l.2.b.c": (10, 7), "l.2.b.d.e": (10, 20), "l.2.c": (11, 1),
+        "l.2.c.1.d": (12, 5), "l.2.c.2": (13, 3), "l.2.c.2.2": (13, 8), "l.2.t.u": (16, 1),
+        "l.2.p.1.v": (18, 1), "l.2.p.2.v": (20, 3), "grid.window.2": (23, 2),
+    }  # fmt: skip
+    assert {key: found.get(key) for key in expected} == expected
+    assert not {"b", "no", "l.1.b.b", "x"} & set(found)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "cases").glob("*.toml")), ids=lambda path: path.name)
+def test_every_key_of_a_deck_has_its_place(path: Path) -> None:
+    def keys(value: object, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+        yield path
+        entries = value.items() if isinstance(value, dict) else ()
+        if isinstance(value, list):
+            entries = enumerate(value, start=1)
+        for key, entry in entries:
+            yield from keys(entry, (*path, str(key)))
+
+    text = path.read_text(encoding="utf-8")
+    found = places(text)
+    wanted = set(keys(tomllib.loads(text))) - {()}
+    assert wanted <= set(found)
+    lines = text.splitlines()
+    for name in wanted:
+        line, column = found[name]
+        if not name[-1].isdigit():
+            assert (
+                lines[line - 1][column - 1 :].lstrip('["').startswith(name[-1]) or lines[line - 1][0] == "["
+            )
+
+
+def test_places_in_what_is_no_toml_end() -> None:
+    for text in (
+        "a = [1, [",
+        "[[",
+        "= 3",
+        "a = {b",
+        'a = "x',
+        "\0",
+        "[a\nb = 1",
+        "a.b.= 2",
+        "]",
+        "a = [}, }",
+    ):
+        places(text)
 
 
 def test_values_are_shown_as_decks_write_them() -> None:

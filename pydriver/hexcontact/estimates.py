@@ -1,0 +1,63 @@
+"""How much work a case will be, roughly, before anything runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .case import Case
+
+# Operator applications of a load step to 1e-8, as measured on meshes of 20 to 60 spacings in the radius.
+# Without friction they are of the pressure alone, a third of an application each.
+_FRICTIONLESS, _SIMILAR, _DISSIMILAR = 8 / 3, 20.0, 45.0
+_INTERPOLATED = 4.0  # times as many, where nodes enter the contact
+_SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
+
+# Seconds per application and node of the window on one core of 2020 or so, with all that goes with it.
+_SECONDS_FRICTIONLESS, _SECONDS = 2e-7, 1.3e-7
+_SECONDS_LEAST = 5e-3  # of a step, whatever its size
+
+
+def operator_applications(case: Case) -> float | None:
+    """Return about how many operator applications all load steps take; None for the direct method."""
+    if case.method_for(case.lattice) == "direct":
+        return None
+    if not case.frictional:
+        return _FRICTIONLESS * len(case.load_steps)
+    coupled = case.solver.coupling == "full" and abs(case.pair.beta) > _SMALLEST_BETA
+    each = _DISSIMILAR if coupled else _SIMILAR
+    if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
+        each *= _INTERPOLATED
+    return each * len(case.load_steps)
+
+
+def seconds(case: Case) -> float | None:
+    """Return about how long a run takes on one core (s); None for the direct method."""
+    applications = operator_applications(case)
+    if applications is None:
+        return None
+    each = (_SECONDS if case.frictional else _SECONDS_FRICTIONLESS) * case.lattice.size
+    return applications * each + _SECONDS_LEAST * len(case.load_steps)
+
+
+def work(case: Case) -> str:
+    """Say it in words: "about 1,800 operator applications, about 4 s on one core"."""
+    applications, time = operator_applications(case), seconds(case)
+    if applications is None or time is None:
+        return "LAPACK on the nodes in contact, not estimated"
+    count = f"about {_rounded(applications):,} operator applications"
+    return f"{count}, about {_duration(time)} on one core"
+
+
+def _rounded(number: float) -> int:
+    """Round to two digits; more would pretend to be exact."""
+    return int(float(f"{number:.2g}"))
+
+
+def _duration(time: float) -> str:
+    if time < 1:
+        return "a second or less"
+    for size, name in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if time >= 2 * size:
+            return f"{_rounded(time / size)} {name}"
+    return f"{_rounded(time)} s"

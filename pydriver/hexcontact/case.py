@@ -290,7 +290,7 @@ class Case:
         if deck is None or problems:
             raise deck_error(problems, source)
         self.deck = deck
-        self.deck_text = as_toml(given.data, gap is not None) if given.text is None else given.text
+        self.deck_text = given.text or given.remark + as_toml(given.data, gap is not None)
         self.title = deck.title
         self.body_1, self.body_2 = _body(deck.body.body_1), _body(deck.body.body_2)
         self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0

@@ -44,9 +44,19 @@ def with_radians(load: Any) -> Any:
     load = given(**load)
     if isinstance(load.get("twist"), int | float) and not isinstance(load["twist"], bool):
         load["twist"] = f"{load['twist']!r} rad"
+    if isinstance(load.get("series"), Mapping):
+        load["series"] = {key: _rows(key, rows) for key, rows in given(**load["series"]).items()}
     if isinstance(load.get("path"), list):
         load["path"] = [with_radians(segment) for segment in load["path"]]
     return load
+
+
+def _rows(key: str, rows: Any) -> Any:
+    """Return an array of a series; NaN and None are rows that name nothing."""
+    if not isinstance(rows, list):
+        return rows
+    filled = ["" if row is None or row != row else row for row in rows]
+    return [f"{row!r} rad" if key == "twist" and isinstance(row, int | float) else row for row in filled]
 
 
 def as_toml(data: Mapping[str, Any], gap_given: bool) -> str:

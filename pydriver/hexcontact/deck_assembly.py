@@ -15,7 +15,7 @@ from typing import Any
 from .deck import read_toml, with_overrides
 from .errors import DeckError
 from .load_series import Columns, read_series
-from .messages import MISSING, Problem, Source
+from .messages import MISSING, Problem, Source, listed
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,15 @@ class Assembled:
     text: str | None
     source: Source
     problems: list[Problem]
+
+    @property
+    def remark(self) -> str:
+        """A comment that says what the deck was made of."""
+        files = [name for name, _ in ((self.source.name, ""), *self.source.included) if name]
+        remark = f"# Put together from {listed(files, 'and')}" if files else ""
+        if remark and self.source.overrides:
+            remark += f", with {listed(sorted(self.source.overrides), 'and')} set"
+        return " ".join(remark.split()) + ".\n" if remark else ""
 
 
 def assemble(
@@ -102,9 +111,9 @@ def _merged(
             tables, text = read_toml(path)
         except DeckError as error:
             raise DeckError(f"{prefix}include: {error}") from None
-        for series in _series_with_files(tables):  # relative to the file that names them
-            series["file"] = os.path.relpath(path.parent / series["file"], folder)
         inner, further = _merged(tables, Source(str(path), text), path.parent, (*chain, path.resolve()))
+        for series in _series_with_files(inner):  # relative to the file that names them
+            series["file"] = os.path.relpath(path.parent / series["file"], folder)
         beneath = _over(inner, beneath)
         files = [(str(path), text), *further, *files]
     return _over(own, beneath), files

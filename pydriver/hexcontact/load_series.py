@@ -74,15 +74,31 @@ _Lengths = Annotated[tuple[float | None, ...], _rows_of(Quantity(LENGTH), _LENGT
 class Columns(Table):
     """Which column of a file holds what."""
 
-    normal_load: _Header | None = Field(None, description="header of the column of normal loads")
-    tangential_load_x: _Header | None = Field(None, description="header of the column of tangential_load_x")
-    tangential_load_y: _Header | None = Field(None, description="header of the column of tangential_load_y")
-    torque: _Header | None = Field(None, description="header of the column of torques")
-    approach: _Header | None = Field(None, description="header of the column of approaches")
-    shift_x: _Header | None = Field(None, description="header of the column of shift_x")
-    shift_y: _Header | None = Field(None, description="header of the column of shift_y")
-    twist: _Header | None = Field(None, description="header of the column of twists")
-    label: _Header | None = Field(None, description="header of the column of labels")
+    normal_load: _Header | None = Field(
+        None, description="header of the column of normal loads", examples=['"P [N]"']
+    )
+    tangential_load_x: _Header | None = Field(
+        None, description="header of the column of tangential_load_x", examples=['"Qx [N]"']
+    )
+    tangential_load_y: _Header | None = Field(
+        None, description="header of the column of tangential_load_y", examples=['"Qy [N]"']
+    )
+    torque: _Header | None = Field(
+        None, description="header of the column of torques", examples=['"M [N mm]"']
+    )
+    approach: _Header | None = Field(
+        None, description="header of the column of approaches", examples=['"depth [um]"']
+    )
+    shift_x: _Header | None = Field(
+        None, description="header of the column of shift_x", examples=['"ux [um]"']
+    )
+    shift_y: _Header | None = Field(
+        None, description="header of the column of shift_y", examples=['"uy [um]"']
+    )
+    twist: _Header | None = Field(
+        None, description="header of the column of twists", examples=['"angle [deg]"']
+    )
+    label: _Header | None = Field(None, description="header of the column of labels", examples=['"phase"'])
 
 
 class Series(Table):
@@ -255,9 +271,10 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
             if column.header in keys:
                 chosen[column.header] = column
             elif column.header not in _PASSED_OVER:
-                hint = did_you_mean(column.header, keys) or f"; known are {listed(keys, 'and')}"
-                advice = "; to leave columns out, name the others with columns"
-                problems.append(f"{path}: unknown column {shown(column.header)}{hint}{advice}")
+                hint = did_you_mean(column.header, keys) or (
+                    f"; known are {listed(keys, 'and')}; to leave columns out, name the others with columns"
+                )
+                problems.append(f"{path}: unknown column {shown(column.header)}{hint}")
     else:
         for key, header in columns.items():
             match = _UNIT_IN_HEADER.fullmatch(str(header))

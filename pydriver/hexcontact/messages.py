@@ -57,14 +57,27 @@ class Source:
 
     def locate(self, key: str) -> str:
         """Return "file:line:column: ", "override: " or "" for a dotted key."""
-        if any(key == name or key.startswith(f"{name}.") for name in self.overrides):
+        if self._overridden(key):
             return "override: "
         if not self.name:
             return ""
-        path = tuple(key.split("."))
-        written = [(name, place_of(found, path)) for name, found in self._places]
-        name, (_, place) = max(written, key=lambda entry: entry[1][0])  # of equals the first
+        name, place = self._place(key)
         return f"{name}:{place.line}:{place.column}: " if place else f"{self.name}: "
+
+    def order(self, key: str) -> tuple[int, int, int]:
+        """Return what sorts keys as they are read: by file, line and column."""
+        if not self.name or self._overridden(key):
+            return -1, 0, 0
+        name, place = self._place(key)
+        return ([entry for entry, _ in self._places].index(name), *place) if place else (-1, 0, 0)
+
+    def _overridden(self, key: str) -> bool:
+        return any(key == name or key.startswith(f"{name}.") for name in self.overrides)
+
+    def _place(self, key: str) -> tuple[str, Place | None]:
+        written = [(name, place_of(found, tuple(key.split(".")))) for name, found in self._places]
+        name, (_, place) = max(written, key=lambda entry: entry[1][0])  # of equals the first
+        return name, place
 
     @cached_property
     def _places(self) -> list[tuple[str, dict[tuple[str, ...], Place]]]:
@@ -74,7 +87,7 @@ class Source:
 def deck_error(problems: Iterable[Problem], source: Source) -> DeckError:
     """Put all problems into one exception, a line for each."""
     lines = []
-    for problem in problems:
+    for problem in sorted(problems, key=lambda problem: source.order(dotted(problem.key))):
         key = dotted(problem.key)
         value = "" if problem.value is MISSING else f" = {shown(problem.value)}"
         lines.append(f"{source.locate(key)}{key}{value}: {problem.sentence}")

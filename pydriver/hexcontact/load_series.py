@@ -280,7 +280,10 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
             match = _UNIT_IN_HEADER.fullmatch(str(header))
             name, unit = _split(match) if match else (str(header), "")
             if name not in headers:
-                hint = did_you_mean(name, headers) or f"; there are {listed([*map(shown, headers)], 'and')}"
+                there = [*map(shown, headers[:_MOST_COMPLAINTS])] + ["others"] * (
+                    len(headers) > _MOST_COMPLAINTS
+                )
+                hint = did_you_mean(name, headers) or f"; there are {listed(there, 'and')}"
                 problems.append(f"{path}: has no column {shown(name)} for {key}{hint}")
                 continue
             column = found[headers.index(name)]
@@ -357,10 +360,13 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
             lengths: dict[str, int] = {}
             columns = []
             for name, variable in file.variables.items():
-                if variable.ndim != 1 or name in file.dimensions:
+                text = variable.dtype == "S1" and variable.ndim == 2  # characters of labels
+                if (variable.ndim != 1 and not text) or name in file.dimensions:
                     continue
                 values = variable[:]
-                if variable.dtype is str:
+                if text and values.dtype == "S1":
+                    values = netCDF4.chartostring(np.ma.filled(values, b""))
+                if text or variable.dtype is str:
                     cells = [str(value) for value in values]
                 elif np.issubdtype(values.dtype, np.number):
                     numbers = np.ma.filled(values.astype(float), np.nan)

@@ -72,7 +72,7 @@ def as_toml(data: Mapping[str, Any], gap_given: bool) -> str:
         if isinstance(value, Mapping):
             return {str(key): entry_of(entry) for key, entry in value.items() if entry is not None}
         if isinstance(value, list | tuple):
-            return [entry_of(entry) for entry in value]
+            return ["" if entry is None else entry_of(entry) for entry in value]
         return plain(value)
 
     tables = entry_of(data)

@@ -104,13 +104,13 @@ def _merged(
     files: list[tuple[str, str]] = []
     for name in names:
         path = folder / name
-        if path.resolve() in chain:
-            turns = " -> ".join(link.name for link in (*chain[chain.index(path.resolve()) :], path))
-            raise DeckError(f"{prefix}include: {path} includes itself ({turns})")
         try:
             tables, text = read_toml(path)
         except DeckError as error:
             raise DeckError(f"{prefix}include: {error}") from None
+        if path.resolve() in chain:
+            turns = " -> ".join(link.name for link in (*chain[chain.index(path.resolve()) :], path))
+            raise DeckError(f"{prefix}include: {path} includes itself ({turns})")
         inner, further = _merged(tables, Source(str(path), text), path.parent, (*chain, path.resolve()))
         for series in _series_with_files(inner):  # relative to the file that names them
             series["file"] = os.path.relpath(path.parent / series["file"], folder)
@@ -144,10 +144,16 @@ def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Problem]:
     known = {"file", "columns"}
     for number, load in enumerate(data["load"] if isinstance(data.get("load"), list) else ()):
         series = next(_series_with_files({"load": [load]}), None)
-        if series is None or not set(series) <= known or not _are_columns(series.get("columns", {})):
+        if series is None:
+            continue
+        given = {key: value for key, value in series.items() if value is not None}
+        columns = given.get("columns")
+        if isinstance(columns, dict):
+            columns = {key: header for key, header in columns.items() if header is not None}
+        if not set(given) <= known or not (columns is None or _are_columns(columns)):
             continue  # what is wrong there is found when the tables are checked
         try:
-            load["series"] = read_series(folder / series["file"], series.get("columns"))
+            load["series"] = read_series(folder / series["file"], columns)
         except DeckError as error:
             key = ("load", number, "series", "file")
             for sentence in str(error).splitlines():

@@ -135,6 +135,7 @@ class Series(Table):
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Arrays are of one length, no row drives a motion twice, and a file stands alone."""
+        data = {key: value for key, value in data.items() if value is not None}  # None comes from Python
         arrays = {key: data[key] for key in (*QUANTITIES, "label") if isinstance(data.get(key), list | tuple)}
         if "file" in data:
             for key in (*QUANTITIES, "label"):
@@ -219,6 +220,9 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
     problems: list[str] = []
     for key, column in chosen.items():
         series[key] = []
+        if key != "label" and column.unit and (fault := _unit_fault(key, column.unit)):
+            problems.append(f"{path}, column {shown(column.header)}: {fault}")
+            continue
         for line, cell in zip(lines, column.cells, strict=True):
             try:
                 series[key].append(str(cell) if key == "label" else _value(key, cell, column.unit))
@@ -233,6 +237,15 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
         more = len(problems) - _MOST_COMPLAINTS
         raise DeckError("\n".join(problems[:_MOST_COMPLAINTS] + [f"{path}: and {more} more"] * (more > 0)))
     return series
+
+
+def _unit_fault(key: str, unit: str) -> str:
+    """Return what is wrong with the unit of a column, once instead of in each row."""
+    try:
+        QUANTITIES[key].parse(f"1 {unit}")
+    except PydanticCustomError as error:
+        return error.message()
+    return ""
 
 
 def _value(key: str, cell: Any, unit: str) -> Any:

@@ -1,19 +1,22 @@
 """Decks: what they say, what is wrong with the wrong ones, and the load history they stand for."""
 
 import math
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, get_args
 
 import pytest
 
 from hexcontact import deck as decks
-from hexcontact.deck import Deck, Load, read_toml, with_overrides
+from hexcontact.deck import Deck, Load, Segment, read_toml, with_overrides
 from hexcontact.deck_location import places
 from hexcontact.errors import DeckError
 from hexcontact.load_history import LoadStep, Target, load_steps
 from hexcontact.messages import Source, shown
-from hexcontact.surfaces import Flat, Sphere
+from hexcontact.surfaces import SHAPES, Flat, Sphere, Surface
+from hexcontact.validation import Table, kind_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -681,11 +684,55 @@ def test_a_cubic_ramp_from_an_unknown_load_is_refused() -> None:
 # --- the page that documents it ----------------------------------------------------------------------------
 
 
-def test_the_deck_reference_is_up_to_date() -> None:
-    names: dict[str, object] = {"__file__": str(ROOT / "docs/deck_tables.py"), "__name__": "deck_tables"}
+def reference() -> dict[str, Any]:
+    """What docs/deck_tables.py defines."""
+    names: dict[str, Any] = {"__file__": str(ROOT / "docs/deck_tables.py"), "__name__": "deck_tables"}
     exec(compile((ROOT / "docs/deck_tables.py").read_text(), "docs/deck_tables.py", "exec"), names)
+    return names
+
+
+def test_the_deck_reference_is_up_to_date() -> None:
     page = (ROOT / "docs/deck.md").read_text(encoding="utf-8")
-    assert names["filled"](page) == page, "run: python docs/deck_tables.py"  # type: ignore[operator]
+    assert reference()["filled"](page) == page, "run: python docs/deck_tables.py"
+
+
+def test_the_deck_reference_has_every_key_of_every_table() -> None:
+    def tables(table: type[Table]) -> Iterator[type[Table]]:
+        yield table
+        for info in table.known_keys().values():
+            for part in (info.annotation, *get_args(info.annotation)):
+                if isinstance(part, type) and issubclass(part, Table):
+                    yield from tables(part)
+
+    page = (ROOT / "docs/deck.md").read_text(encoding="utf-8")
+    names = reference()
+    shown_tables = {*names["TABLES"].values(), decks.Bodies, Surface}
+    assert {table for table in tables(Deck) if not issubclass(table, Segment)} <= shown_tables
+    assert decks.Load in shown_tables  # which has all keys of a segment
+    assert all(f"<!-- table: {name} -->" in page for name in (*names["TABLES"], "shapes"))
+    for table in (*names["TABLES"].values(), *SHAPES.values()):
+        for key, info in names["documented"](table).items():
+            assert f"| `{key}` | " in page
+            kind = kind_of(info)
+            example = names["example_of"](info)
+            if table is SHAPES["power"] and key == "coefficient":
+                continue  # its unit is known with the exponent only
+            if kind is not None:
+                kind.parse(tomllib.loads(f"x = {example}")["x"])  # raises if it is none
+            else:
+                tomllib.loads(f"x = {example}")
+
+
+def test_the_blocks_of_the_deck_reference_are_decks() -> None:
+    page = (ROOT / "docs/deck.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    assert len(blocks) >= 5
+    for block in blocks:
+        for key, problems in (
+            (key, Deck.checked({key: value})[1]) for key, value in tomllib.loads(block).items()
+        ):
+            if key not in ("body", "include"):  # parts of them
+                assert [problem for problem in problems if problem.key[0] == key] == []
 
 
 def test_every_key_says_what_it_means() -> None:

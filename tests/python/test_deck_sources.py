@@ -111,6 +111,8 @@ def test_files_that_cannot_be_included(folder: Path) -> None:
     assert "includes itself (b.toml -> b.toml)" in complaint(deck)[0]
     put("lib/b.toml", "x = \n")
     assert complaint(deck) == ["lib/a.toml:2:1: include: lib/b.toml:1:5: is not TOML: Invalid value"]
+    deck.write_text('include = ["a\\u0000b"]')
+    assert "cannot be read (embedded null byte)" in complaint(deck)[0]
     deck.write_text("include = 3")
     assert complaint(deck) == [
         'lib/a.toml:1:1: include: expected an array of file names such as ["materials.toml"]'
@@ -278,11 +280,11 @@ WRONG = [
     ),
     (
         "normal_load [N]\n1 N\n",
-        ['line 2, "1 N": expected a number without a unit, since the header says [N]'],
+        ['"1 N": expected a number without a unit, since the header says [N]'],
     ),
     (
         "normal_load [mm]\n1\n",
-        ['line 2, = "1": expected a force of at least 0 such as "10 N"; "mm" is a length'],
+        ['column "normal_load": expected a force of at least 0 such as "10 N"; "mm" is a length'],
     ),
     ('normal_load;label\n"1,5";a\n', ['= "1,5": expected a decimal point, not a comma']),
     (

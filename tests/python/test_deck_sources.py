@@ -10,8 +10,10 @@ from typing import Any
 import netCDF4
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from hexcontact import Case
+from hexcontact.cli import app
 from hexcontact.deck import Deck
 from hexcontact.deck_text import written
 from hexcontact.errors import DeckError
@@ -466,3 +468,34 @@ def test_work_grows_with_nodes_steps_and_entry() -> None:
     direct = Case.from_text(DECK + PRESS + "[solver]\nmethod = 'direct'")
     assert operator_applications(direct) is None
     assert ("work", "LAPACK on the nodes in contact, not estimated") in case_rows(direct)
+
+
+# --- the command ----------------------------------------------------------------------------------
+
+
+def test_check_on_the_terminal(folder: Path) -> None:
+    put("m.toml", "[solver]\ntolerance = 2\n")
+    deck = put("deck.toml", 'include = ["m.toml"]\n' + DECK + PRESS)
+    wrong = ["--set", "load.1.steps=0", "--set", "grid.spacng='1 mm'"]
+    refused = CliRunner().invoke(app, ["check", "deck.toml", *wrong])
+    assert refused.exit_code == 2
+    assert [line.partition(": expected")[0] for line in refused.stderr.splitlines()] == [
+        "hexcontact: override: grid.spacng: unknown key; did you mean spacing?",
+        "hexcontact: override: load.1.steps = 0",
+        "hexcontact: m.toml:2:1: solver.tolerance = 2",
+    ]
+    settings = ["--set", "solver.tolerance=1e-6", "--set", "load.1.steps=20", "--set"]
+    settings += ["load.1.normal_load=12 N"]
+    done = CliRunner().invoke(app, ["check", "deck.toml", *settings])
+    assert done.exit_code == 0
+    for row in (
+        r"load steps +20",
+        r"largest load +12\.00 N",
+        r"tolerance 1e-06",
+        r"work +about 400 operator",
+    ):
+        assert re.search(row, done.stdout), row
+    deck.write_text("a = 1\nb = ]\n", encoding="utf-8")
+    assert CliRunner().invoke(app, ["check", "deck.toml"]).stderr == (
+        "hexcontact: deck.toml:2:5: is not TOML: Invalid value\n"
+    )

@@ -10,12 +10,16 @@
 !>
 !>     z <- M r - M B (B^T M B)^-1 B^T M r.
 !>
+!> Vectors over all nodes are what products and preconditioners take; between them only
+!> the active nodes are kept.
+!>
 !> For a matrix that is not symmetric, and constraints C^T x whose multipliers act
 !> along other vectors B, GMRES does the same with (C^T M B)^-1 C^T.
 module hc_krylov
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lapack, only: ddot, dgesv
+  use hc_packing, only: packing_t, new_packing
   implicit none
   private
 
@@ -164,46 +168,56 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: r(:), z(:), d(:), ad(:)
-    real(wp) :: rz, rz_old, curvature, step, correction(size(constraint, 2))
+    type(packing_t) :: nodes
+    !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
+    real(wp), allocatable :: from(:), onto(:)
+    !> On the active nodes
+    real(wp), allocatable :: r(:), z(:), d(:), ad(:), x_active(:), ax_active(:), rhs_active(:), b(:, :), m_b(:, :)
+    real(wp) :: rz, rz_old, curvature, step
     real(wp) :: inverse(size(constraint, 2), size(constraint, 2))
-    integer :: n, i, m, n_threads
+    integer :: i, m, n_threads
     logical :: independent
 
-    n = size(x)
     n_threads = system%n_threads
-    allocate (r(n), z(n), d(n), ad(n))
-    call invert_gram(constraint, mb, inverse, independent, n_threads)
+    call new_packing(nodes, active, n_threads)
+    associate (n => nodes%n_active)
+      allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
+    end associate
+    allocate (onto(size(x)), from(size(x)), source=0.0_wp)
+    call pack_columns(nodes, constraint, b)
+    call pack_columns(nodes, mb, m_b)
+    call nodes%pack(x, x_active)
+    call nodes%pack(ax, ax_active)
+    call nodes%pack(rhs, rhs_active)
+    call invert_gram(b, m_b, inverse, independent, n_threads)
     iterations = 0
     rz_old = 0.0_wp
     do m = 1, size(multiplier)
-      multiplier(m) = dot(constraint(:, m), ax - rhs, n_threads)/dot(constraint(:, m), constraint(:, m), n_threads)
+      multiplier(m) = dot(b(:, m), ax_active - rhs_active, n_threads)/dot(b(:, m), b(:, m), n_threads)
     end do
     do
       ! The share of the constraints is taken out of the residual before it is
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
       ! What is left is normal to M B, which keeps the projected preconditioner
       ! symmetric even if the given M B is not quite what its name says.
-      call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
-      do m = 1, size(multiplier)
-        correction(m) = dot(mb(:, m), r, n_threads)
-      end do
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
       if (size(multiplier) > 0) then
-        correction = [(dot_product(inverse(:, m), correction), m=1, size(correction))]
-        multiplier = multiplier - correction
-        call constrained_residual(active, constraint, multiplier, rhs, ax, r, residual, n_threads)
+        multiplier = multiplier - matmul(dots(m_b, r, n_threads), inverse)
+        call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
       end if
       if (residual <= tolerance .or. iterations >= max_iterations) exit
-      call system%precondition(r, z, error)
+      call nodes%unpack(r, from)
+      call system%precondition(from, onto, error)
       if (allocated(error)) return
-      call project(active, constraint, mb, inverse, z, n_threads)
+      call nodes%pack(onto, z)
+      call add_columns(m_b, -matmul(inverse, dots(b, z, n_threads)), z, n_threads)
 
       rz = dot(r, z, n_threads)
       step = 0.0_wp
       if (iterations > 0) step = rz/rz_old
       rz_old = rz
       !$omp parallel do schedule(static) num_threads(n_threads)
-      do i = 1, n
+      do i = 1, size(d)
         if (iterations > 0) then
           d(i) = z(i) + step*d(i)
         else
@@ -211,20 +225,30 @@ contains
         end if
       end do
       !$omp end parallel do
-      call system%product(d, ad, error)
+      call nodes%unpack(d, from)
+      call system%product(from, onto, error)
       if (allocated(error)) return
+      call nodes%pack(onto, ad)
       curvature = dot(d, ad, n_threads)
       ! nothing is left to gain in working precision
       if (.not. curvature > 0.0_wp) exit
       step = rz/curvature
-      !$omp parallel do schedule(static) num_threads(n_threads)
-      do i = 1, n
-        x(i) = x(i) + step*d(i)
-        ax(i) = ax(i) + step*ad(i)
+      !$omp parallel num_threads(n_threads)
+      !$omp do schedule(static)
+      do i = 1, size(d)
+        x_active(i) = x_active(i) + step*d(i)
+        ax_active(i) = ax_active(i) + step*ad(i)
       end do
-      !$omp end parallel do
+      !$omp end do nowait
+      !$omp do schedule(static)
+      do i = 1, size(ax)
+        ax(i) = ax(i) + step*onto(i)
+      end do
+      !$omp end do
+      !$omp end parallel
       iterations = iterations + 1
     end do
+    call nodes%unpack(x_active, x)
   end subroutine projected_cg
 
   !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
@@ -258,24 +282,40 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type :: direction_t
-      !> Weighted residual, and the product A z that the next one comes from
+      !> Weighted residual on the active nodes, and the product A z, over all nodes, that the next one comes from
       real(wp), allocatable :: v(:), image(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
-    real(wp), allocatable :: z(:), r(:), combined(:)
+    type(packing_t) :: nodes
+    !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
+    real(wp), allocatable :: from(:), onto(:)
+    !> On the active nodes
+    real(wp), allocatable :: z(:), combined(:), w(:), packed(:), b(:, :), m_b(:, :), c_rows(:, :)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
-    integer :: n, i, k
+    integer :: i, k, n_threads
 
-    n = size(x)
     iterations = 0
-    call invert_gram(rows, mb, inverse, independent, system%n_threads)
+    n_threads = system%n_threads
+    call new_packing(nodes, active, n_threads)
+    call pack_columns(nodes, columns, b)
+    call pack_columns(nodes, mb, m_b)
+    call pack_columns(nodes, rows, c_rows)
+    call invert_gram(c_rows, m_b, inverse, independent, n_threads)
     if (.not. independent) return
-    allocate (z(n), r(n))
-    basis(1)%v = merge(weight*(rhs - ax + matmul(columns, multiplier)), 0.0_wp, active)
-    length = sqrt(dot(basis(1)%v, basis(1)%v, system%n_threads))
+    associate (n => nodes%n_active)
+      allocate (basis(1)%v(n), z(n), w(n), packed(n))
+    end associate
+    allocate (onto(size(x)), from(size(x)), source=0.0_wp)
+    call nodes%pack(weight, w)
+    call nodes%pack(rhs, basis(1)%v)
+    call nodes%pack(ax, packed)
+    basis(1)%v = basis(1)%v - packed
+    call add_columns(b, multiplier, basis(1)%v, n_threads)
+    basis(1)%v = w*basis(1)%v
+    length = sqrt(dot(basis(1)%v, basis(1)%v, n_threads))
     if (.not. length > 0.0_wp) return
     basis(1)%v = basis(1)%v/length
     g = 0.0_wp
@@ -285,15 +325,18 @@ contains
     do k = 1, max_iterations
       call expand(basis(k)%v, error)
       if (allocated(error)) return
-      allocate (basis(k)%image(n))
-      call system%product(z, basis(k)%image, error)
+      allocate (basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active))
+      call nodes%unpack(z, from)
+      call system%product(from, basis(k)%image, error)
       if (allocated(error)) return
-      basis(k + 1)%v = merge(weight*(basis(k)%image - matmul(columns, share)), 0.0_wp, active)
+      call nodes%pack(basis(k)%image, basis(k + 1)%v)
+      call add_columns(b, -share, basis(k + 1)%v, n_threads)
+      basis(k + 1)%v = w*basis(k + 1)%v
       do i = 1, k
-        h(i, k) = dot(basis(i)%v, basis(k + 1)%v, system%n_threads)
+        h(i, k) = dot(basis(i)%v, basis(k + 1)%v, n_threads)
         basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
       end do
-      h(k + 1, k) = sqrt(dot(basis(k + 1)%v, basis(k + 1)%v, system%n_threads))
+      h(k + 1, k) = sqrt(dot(basis(k + 1)%v, basis(k + 1)%v, n_threads))
       if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
       do i = 1, k - 1
         rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
@@ -314,14 +357,16 @@ contains
     do i = iterations, 1, -1
       y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
     end do
-    allocate (combined(n), source=0.0_wp)
+    allocate (combined(nodes%n_active), source=0.0_wp)
     do i = 1, iterations
       combined = combined + y(i)*basis(i)%v
       ax = ax + y(i)*basis(i)%image
     end do
     call expand(combined, error)
     if (allocated(error)) return
-    x = x + z
+    call nodes%pack(x, packed)
+    packed = packed + z
+    call nodes%unpack(packed, x)
     multiplier = multiplier + share
 
   contains
@@ -330,79 +375,107 @@ contains
     subroutine expand(vector, error)
       real(wp), intent(in) :: vector(:)
       type(error_t), allocatable, intent(out) :: error
-      integer :: j
 
-      r = merge(vector/weight, 0.0_wp, active)
-      call system%precondition(r, z, error)
+      packed = vector/w
+      call nodes%unpack(packed, from)
+      call system%precondition(from, onto, error)
       if (allocated(error)) return
-      where (.not. active) z = 0.0_wp
-      do j = 1, size(share)
-        share(j) = -dot(rows(:, j), z, system%n_threads)
-      end do
-      share = [(dot_product(inverse(j, :), share), j=1, size(share))]
-      z = z + matmul(mb, share)
+      call nodes%pack(onto, z)
+      share = -matmul(inverse, dots(c_rows, z, n_threads))
+      call add_columns(m_b, share, z, n_threads)
     end subroutine expand
 
   end subroutine projected_gmres
 
-  !> r = rhs - A x + B m on the active nodes, zero elsewhere, and its largest element.
-  subroutine constrained_residual(active, constraint, multiplier, rhs, ax, r, largest, n_threads)
+  !> Several vectors on the active nodes.
+  subroutine pack_columns(nodes, columns, packed)
     !> Active nodes
-    logical, intent(in) :: active(:)
+    type(packing_t), intent(in) :: nodes
+    !> Vectors over all nodes (n, number of vectors)
+    real(wp), intent(in), contiguous :: columns(:, :)
+    !> Vectors on the active nodes (n_active, number of vectors)
+    real(wp), allocatable, intent(out) :: packed(:, :)
+    integer :: m
+
+    allocate (packed(nodes%n_active, size(columns, 2)))
+    do m = 1, size(columns, 2)
+      call nodes%pack(columns(:, m), packed(:, m))
+    end do
+  end subroutine pack_columns
+
+  !> r = rhs - A x + B m and its largest element.
+  subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, n_threads)
     !> Constraint vectors and multipliers
-    real(wp), intent(in) :: constraint(:, :), multiplier(:)
+    real(wp), intent(in), contiguous :: b(:, :)
+    real(wp), intent(in) :: multiplier(:)
     !> Right-hand side and product A x
-    real(wp), intent(in) :: rhs(:), ax(:)
+    real(wp), intent(in), contiguous :: rhs(:), ax(:)
     !> Residual
-    real(wp), intent(out) :: r(:)
+    real(wp), intent(inout), contiguous :: r(:)
     !> Its largest element
     real(wp), intent(out) :: largest
     !> Threads to use
     integer, intent(in) :: n_threads
-    integer :: i
+    integer :: i, m, from, to
 
     largest = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(n_threads) reduction(max: largest)
-    do i = 1, size(r)
-      r(i) = 0.0_wp
-      if (.not. active(i)) cycle
-      r(i) = rhs(i) - ax(i) + dot_product(constraint(i, :), multiplier)
-      largest = max(largest, abs(r(i)))
+    !$omp parallel do schedule(static) num_threads(n_threads) private(i, m, to) reduction(max: largest)
+    do from = 1, size(r), sum_block
+      to = min(from + sum_block - 1, size(r))
+      do i = from, to
+        r(i) = rhs(i) - ax(i)
+      end do
+      do m = 1, size(multiplier)
+        do i = from, to
+          r(i) = r(i) + multiplier(m)*b(i, m)
+        end do
+      end do
+      do i = from, to
+        largest = max(largest, abs(r(i)))
+      end do
     end do
     !$omp end parallel do
   end subroutine constrained_residual
 
-  !> z <- z - M B (B^T M B)^-1 B^T z on the active nodes, zero elsewhere.
-  subroutine project(active, constraint, mb, inverse, z, n_threads)
-    !> Active nodes
-    logical, intent(in) :: active(:)
-    !> B, M B and (B^T M B)^-1
-    real(wp), intent(in) :: constraint(:, :), mb(:, :), inverse(:, :)
-    !> Vector to be projected
-    real(wp), intent(inout), contiguous :: z(:)
+  !> x <- x + B share
+  subroutine add_columns(b, share, x, n_threads)
+    !> Vectors to be added
+    real(wp), intent(in), contiguous :: b(:, :)
+    !> Their factors
+    real(wp), intent(in) :: share(:)
+    !> What they are added to
+    real(wp), intent(inout), contiguous :: x(:)
     !> Threads to use
     integer, intent(in) :: n_threads
+    integer :: i, m, from, to
 
-    real(wp) :: share(size(mb, 2))
-    integer :: i, m
-
-    !$omp parallel do schedule(static) num_threads(n_threads)
-    do i = 1, size(z)
-      if (.not. active(i)) z(i) = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(n_threads) private(i, m, to)
+    do from = 1, size(x), sum_block
+      to = min(from + sum_block - 1, size(x))
+      do m = 1, size(share)
+        do i = from, to
+          x(i) = x(i) + share(m)*b(i, m)
+        end do
+      end do
     end do
     !$omp end parallel do
-    do m = 1, size(mb, 2)
-      share(m) = dot(constraint(:, m), z, n_threads)
+  end subroutine add_columns
+
+  !> Scalar products of several vectors with one.
+  function dots(b, x, n_threads)
+    !> The several
+    real(wp), intent(in), contiguous :: b(:, :)
+    !> The one
+    real(wp), intent(in), contiguous :: x(:)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    real(wp) :: dots(size(b, 2))
+    integer :: m
+
+    do m = 1, size(b, 2)
+      dots(m) = dot(b(:, m), x, n_threads)
     end do
-    share = [(dot_product(inverse(m, :), share), m=1, size(share))]
-    do m = 1, size(mb, 2)
-      !$omp parallel do schedule(static) num_threads(n_threads)
-      do i = 1, size(z)
-        z(i) = z(i) - share(m)*mb(i, m)
-      end do
-      !$omp end parallel do
-    end do
-  end subroutine project
+  end function dots
 
   !> Scalar product, summed in fixed blocks.
   real(wp) function dot(a, b, n_threads)

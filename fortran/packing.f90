@@ -1,0 +1,102 @@
+!> The active nodes of a field, one after the other without gaps.
+!>
+!> A contact fills less than half of its window: vectors of the unknowns alone save
+!> as much of the work on them. Active nodes come in runs along the rows of the window, so
+!> that packing is a copy of a few hundred pieces.
+module hc_packing
+  use hc_precision, only: wp
+  implicit none
+  private
+
+  public :: packing_t, new_packing
+
+  !> Runs of active nodes.
+  type :: packing_t
+    !> Number of active nodes
+    integer :: n_active = 0
+    integer, private :: n_threads = 1
+    !> First and last node of each run, and where it begins among the active nodes
+    integer, allocatable, private :: first(:), last(:), place(:)
+  contains
+    !> The active nodes of a field
+    procedure :: pack => pack_field
+    !> Put them where they belong, the rest of the field stays as it is
+    procedure :: unpack => unpack_field
+  end type packing_t
+
+contains
+
+  !> Find the runs of active nodes.
+  pure subroutine new_packing(self, active, n_threads)
+    !> Packing to be set up
+    type(packing_t), intent(out) :: self
+    !> Active nodes
+    logical, intent(in), contiguous :: active(:)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    integer :: i, k, n_run
+    logical :: before
+
+    n_run = 0
+    before = .false.
+    do i = 1, size(active)
+      if (active(i) .and. .not. before) n_run = n_run + 1
+      before = active(i)
+    end do
+    allocate (self%first(n_run), self%last(n_run), self%place(n_run))
+    k = 0
+    before = .false.
+    do i = 1, size(active)
+      if (active(i) .and. .not. before) then
+        k = k + 1
+        self%first(k) = i
+      end if
+      if (active(i)) self%last(k) = i
+      before = active(i)
+    end do
+    do k = 1, n_run
+      self%place(k) = self%n_active + 1
+      self%n_active = self%n_active + self%last(k) - self%first(k) + 1
+    end do
+    self%n_threads = n_threads
+  end subroutine new_packing
+
+  !> The active nodes of a field.
+  subroutine pack_field(self, field, packed)
+    class(packing_t), intent(in) :: self
+    !> Field over all nodes
+    real(wp), intent(in), contiguous :: field(:)
+    !> Its values at the active nodes (n_active)
+    real(wp), intent(inout), contiguous :: packed(:)
+    integer :: k, i, shift
+
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, shift)
+    do k = 1, size(self%first)
+      shift = self%place(k) - self%first(k)
+      do i = self%first(k), self%last(k)
+        packed(i + shift) = field(i)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine pack_field
+
+  !> Put values where they belong.
+  subroutine unpack_field(self, packed, field)
+    class(packing_t), intent(in) :: self
+    !> Values at the active nodes (n_active)
+    real(wp), intent(in), contiguous :: packed(:)
+    !> Field over all nodes; the rest stays as it is
+    real(wp), intent(inout), contiguous :: field(:)
+    integer :: k, i, shift
+
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, shift)
+    do k = 1, size(self%first)
+      shift = self%place(k) - self%first(k)
+      do i = self%first(k), self%last(k)
+        field(i) = packed(i + shift)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine unpack_field
+
+end module hc_packing

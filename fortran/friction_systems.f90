@@ -14,7 +14,7 @@
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_friction_systems
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -23,6 +23,7 @@ module hc_friction_systems
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
   use hc_krylov, only: linear_system_t
+  use hc_packing, only: packing_t, new_packing
   implicit none
   private
 
@@ -76,7 +77,11 @@ module hc_friction_systems
     real(wp) :: elastic_compliance = 0.0_wp
     !> Continuation of displacements beyond the contact
     type(edge_extension_t), private :: edge
+    !> Nodes in contact
+    type(packing_t), private :: nodes
+    !> Components along x and y of what is multiplied (zero off the contact) or preconditioned, and what comes of it
     real(wp), allocatable, private :: from(:), onto(:)
+    real(sp), allocatable, private :: displacement(:), traction(:)
   contains
     procedure :: product => shear_product
     procedure :: precondition => shear_precondition
@@ -216,7 +221,7 @@ contains
     type(shear_system_t), intent(out) :: self
     !> Operator and preconditioners
     type(operators_t), intent(inout), target :: operators
-    integer :: n
+    integer :: n, i
 
     n = operators%flexibility%lattice%size()
     self%operators => operators
@@ -226,8 +231,10 @@ contains
     end associate
     allocate (self%direction(2, n), self%compliance(n), source=0.0_wp)
     allocate (self%weight(n), source=1.0_wp)
-    allocate (self%from(2*n), self%onto(2*n))
+    allocate (self%from(2*n), self%onto(2*n), source=0.0_wp)
+    allocate (self%displacement(2*n), self%traction(2*n), source=0.0_sp)
     self%direction(1, :) = 1.0_wp
+    call new_packing(self%nodes, [(.true., i=1, n)], self%n_threads)
   end subroutine new_shear_system
 
   !> chi falls with log D from 1 to 0; the symbol does not see the softest nodes at all.
@@ -239,6 +246,8 @@ contains
     integer :: i
 
     call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent))
+    call new_packing(self%nodes, contact, self%n_threads)
+    self%from = 0.0_wp
     do i = 1, size(self%weight)
       ratio = self%compliance(i)/(blend_end*self%elastic_compliance)
       if (ratio <= 1.0_wp/blend_range) then
@@ -308,14 +317,25 @@ contains
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: n
+    integer :: n, k, i
 
     n = size(x)/2
-    call self%to_plane(x, self%from)
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i)
+    do k = 1, size(self%nodes%first)
+      do i = self%nodes%first(k), self%nodes%last(k)
+        self%from(i) = -self%direction(2, i)*x(i) + self%direction(1, i)*x(n + i)
+        self%from(n + i) = self%direction(1, i)*x(i) + self%direction(2, i)*x(n + i)
+      end do
+    end do
+    !$omp end parallel do
     call self%operators%apply(shear, self%from, shear, self%onto, error)
     if (allocated(error)) return
-    call self%to_frame(self%onto, y)
-    y(:n) = y(:n) + self%compliance*x(:n)
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, n
+      y(i) = -self%direction(2, i)*self%onto(i) + self%direction(1, i)*self%onto(n + i) + self%compliance(i)*x(i)
+      y(n + i) = self%direction(1, i)*self%onto(i) + self%direction(2, i)*self%onto(n + i)
+    end do
+    !$omp end parallel do
   end subroutine shear_product
 
   subroutine shear_precondition(self, x, y, error)
@@ -323,20 +343,49 @@ contains
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: n, i
+    real(wp) :: t, e, unit
+    integer :: n, k, i
 
     n = size(x)/2
-    y(:n) = self%weight*x(:n)
-    y(n + 1:) = self%weight*x(n + 1:)
-    call self%to_plane(y, self%from)
-    call precondition(self%operators, self%operators%tangential, self%edge, 2, self%from, self%onto)
-    call self%to_frame(self%onto, y)
-    do i = 1, n
-      y(i) = self%weight(i)*y(i)
-      y(n + i) = self%weight(i)*y(n + i)
-      if (self%weight(i) < 1.0_wp) y(i) = y(i) + (1.0_wp - self%weight(i)**2)/self%compliance(i)*x(i)
+    unit = self%operators%tangential%unit
+    ! the continuation beyond the contact is made afresh
+    self%displacement = 0.0_sp
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
+    do k = 1, size(self%nodes%first)
+      do i = self%nodes%first(k), self%nodes%last(k)
+        t = self%weight(i)/unit*x(i)
+        e = self%weight(i)/unit*x(n + i)
+        self%displacement(i) = real(-self%direction(2, i)*t + self%direction(1, i)*e, sp)
+        self%displacement(n + i) = real(self%direction(1, i)*t + self%direction(2, i)*e, sp)
+      end do
     end do
+    !$omp end parallel do
+    call invert(self%operators, self%operators%flexibility%lattice%extent, self%edge, self%displacement, self%traction)
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
+    do k = 1, size(self%nodes%first)
+      do i = self%nodes%first(k), self%nodes%last(k)
+        t = -self%direction(2, i)*self%traction(i) + self%direction(1, i)*self%traction(n + i)
+        e = self%direction(1, i)*self%traction(i) + self%direction(2, i)*self%traction(n + i)
+        y(i) = self%weight(i)*t
+        y(n + i) = self%weight(i)*e
+        if (self%weight(i) < 1.0_wp) y(i) = y(i) + (1.0_wp - self%weight(i)**2)/self%compliance(i)*x(i)
+      end do
+    end do
+    !$omp end parallel do
   end subroutine shear_precondition
+
+  !> Apply the tangential preconditioner to vectors in single precision, and count it.
+  subroutine invert(operators, extent, edge, displacement, traction)
+    type(operators_t), intent(inout) :: operators
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    type(edge_extension_t), intent(in) :: edge
+    real(sp), intent(inout) :: displacement(extent(1), extent(2), 2)
+    real(sp), intent(out) :: traction(extent(1), extent(2), 2)
+
+    call operators%tangential%apply_single(displacement, traction, edge)
+    operators%preconditioning = operators%preconditioning + operators%tangential%cost
+  end subroutine invert
 
   subroutine coupled_product(self, x, y, error)
     class(coupled_system_t), intent(inout) :: self

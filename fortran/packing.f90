@@ -15,8 +15,10 @@ module hc_packing
     !> Number of active nodes
     integer :: n_active = 0
     integer, private :: n_threads = 1
-    !> First and last node of each run, and where it begins among the active nodes
-    integer, allocatable, private :: first(:), last(:), place(:)
+    !> First and last node of each run
+    integer, allocatable :: first(:), last(:)
+    !> Where it begins among the active nodes
+    integer, allocatable, private :: place(:)
   contains
     !> The active nodes of a field
     procedure :: pack => pack_field

@@ -30,6 +30,8 @@ module hc_preconditioner
     real(wp) :: unit = 1.0_wp
     !> Of the tangential flexibility
     logical, private :: tangential = .false.
+    !> Fields in single precision
+    real(sp), allocatable, private :: given(:, :, :), wanted(:, :, :)
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
   contains
@@ -122,12 +124,29 @@ contains
     real(wp), intent(out), contiguous :: traction(:, :, :)
     !> Continuation beyond the nodes where displacements are given
     type(edge_extension_t), intent(in), optional :: edge
-    real(sp), allocatable :: given(:, :, :), wanted(:, :, :)
+    integer :: row, m
 
-    allocate (given, source=real(displacement/self%unit, sp))
-    allocate (wanted, mold=given)
-    call self%apply_single(given, wanted, edge)
-    traction = wanted
+    if (.not. allocated(self%given)) then
+      allocate (self%given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
+      allocate (self%wanted, mold=self%given)
+    end if
+    associate (n_threads => self%convolution%n_threads, given => self%given, wanted => self%wanted)
+      !$omp parallel do collapse(2) schedule(static) num_threads(n_threads)
+      do m = 1, size(given, 3)
+        do row = 1, size(given, 2)
+          given(:, row, m) = real(displacement(:, row, m)/self%unit, sp)
+        end do
+      end do
+      !$omp end parallel do
+      call self%apply_single(given, wanted, edge)
+      !$omp parallel do collapse(2) schedule(static) num_threads(n_threads)
+      do m = 1, size(wanted, 3)
+        do row = 1, size(wanted, 2)
+          traction(:, row, m) = wanted(:, row, m)
+        end do
+      end do
+      !$omp end parallel do
+    end associate
   end subroutine apply
 
   subroutine apply_single(self, displacement, traction, edge)

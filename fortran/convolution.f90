@@ -297,8 +297,13 @@ contains
     do i = 1, size(field, 3)
       !$omp do schedule(static)
       do row = 1, n(2)
-        self%row_buffer(:n(1), thread) = field(:, row, i)
-        call fftw_execute_dft_r2c(self%row_forward, self%row_buffer(:, thread), self%work(:, row, i))
+        ! rows off the contact need no transform
+        if (all(abs(field(:, row, i)) <= 0.0_wp)) then
+          self%work(:self%n_frequency, row, i) = 0.0_wp
+        else
+          self%row_buffer(:n(1), thread) = field(:, row, i)
+          call fftw_execute_dft_r2c(self%row_forward, self%row_buffer(:, thread), self%work(:, row, i))
+        end if
       end do
       !$omp end do nowait
     end do
@@ -329,15 +334,13 @@ contains
     !> Scratch (width*padded(2), component)
     complex(wp), intent(inout), contiguous :: buffer(:, :)
 
-    integer :: n_row, w, i, o, row, first
+    integer :: n_row, w, i, o, first
 
     w = self%width
     n_row = self%extent(2)
     first = (b - 1)*w + 1
     do i = 1, size(kernel, 2)
-      do row = 1, n_row
-        buffer((row - 1)*w + 1:row*w, i) = self%work(first:first + w - 1, row, i)
-      end do
+      call copy_columns(w, n_row, self%work(first, 1, i), self%leading, buffer(:, i), w)
       buffer(n_row*w + 1:, i) = 0.0_wp
       call fftw_execute_dft(self%column_forward, buffer(:, i), buffer(:, i))
     end do
@@ -350,9 +353,7 @@ contains
 
     do o = 1, size(kernel, 1)
       call fftw_execute_dft(self%column_inverse, buffer(:, o), buffer(:, o))
-      do row = 1, n_row
-        self%work(first:first + w - 1, row, o) = buffer((row - 1)*w + 1:row*w, o)
-      end do
+      call copy_columns(w, n_row, buffer(:, o), w, self%work(first, 1, o), self%leading)
     end do
   end subroutine convolve_block
 
@@ -371,8 +372,31 @@ contains
     end do
   end subroutine scale
 
-  !> Up to three fields and any kernels. Real and imaginary parts are taken apart: real arithmetic
-  !> fills the vector registers.
+  !> Columns of a matrix from one place to another; their number is a multiple of four.
+  pure subroutine copy_columns(width, n_row, from, from_leading, onto, onto_leading)
+    !> Number of columns and rows
+    integer, intent(in) :: width, n_row
+    !> Where they are
+    complex(wp), intent(in) :: from(*)
+    !> Distance of two rows there
+    integer, intent(in) :: from_leading
+    !> Where they go
+    complex(wp), intent(inout) :: onto(*)
+    !> Distance of two rows there
+    integer, intent(in) :: onto_leading
+    integer :: row, k, i, o
+
+    ! in pieces of fixed length, so that short rows do not cost a call each
+    do row = 0, n_row - 1
+      i = row*from_leading
+      o = row*onto_leading
+      do k = 1, width, 4
+        onto(o + k:o + k + 3) = from(i + k:i + k + 3)
+      end do
+    end do
+  end subroutine copy_columns
+
+  !> Up to three fields and any kernels.
   subroutine multiply(self, b, kernel, buffer)
     class(convolution_t), intent(in) :: self
     !> Index of the block
@@ -383,60 +407,108 @@ contains
     complex(wp), intent(inout), contiguous :: buffer(:, :)
 
     integer, parameter :: plain = 1, rotated = 2
-    !> Fields (frequency, real and imaginary part, as they are or times i, from)
-    real(wp) :: field(chunk, 2, 2, 3), total(chunk, 2), sign(3)
-    integer :: i, o, start, last, m, k(3), turn(3)
+    !> Fields as they are and times i (frequency, from)
+    complex(wp) :: field(chunk, 3, 2)
+    integer :: i, o, start, last, m, n_from, turn(3), k(3)
+    real(wp) :: sign(3)
 
-    field = 0.0_wp
+    n_from = size(kernel, 2)
     do start = 1, size(buffer, 1), chunk
       last = min(start + chunk - 1, size(buffer, 1))
       m = last - start + 1
-      do i = 1, size(kernel, 2)
-        field(:m, 1, plain, i) = real(buffer(start:last, i), wp)
-        field(:m, 2, plain, i) = aimag(buffer(start:last, i))
-        field(:m, 1, rotated, i) = -field(:m, 2, plain, i)
-        field(:m, 2, rotated, i) = field(:m, 1, plain, i)
+      do i = 1, n_from
+        field(:m, i, plain) = buffer(start:last, i)
+        if (any(abs(kernel(:, i)) >= self%first_odd)) call rotate(m, field(:, i, plain), field(:, i, rotated))
       end do
       do o = 1, size(kernel, 1)
-        k = abs(kernel(o, 1))                         ! fields that are absent count with weight zero
-        sign = 0.0_wp
-        turn = plain
-        do i = 1, size(kernel, 2)
-          k(i) = abs(kernel(o, i))
-          sign(i) = merge(1.0_wp, -1.0_wp, kernel(o, i) > 0)
-          if (k(i) >= self%first_odd) turn(i) = rotated
-        end do
-        call add_up(m, sign, self%spectrum(start:last, b, k(1)), self%spectrum(start:last, b, k(2)), &
-                    self%spectrum(start:last, b, k(3)), field(:, :, turn(1), 1), field(:, :, turn(2), 2), &
-                    field(:, :, turn(3), 3), total)
-        buffer(start:last, o) = cmplx(total(:m, 1), total(:m, 2), wp)
+        k(:n_from) = abs(kernel(o, :))
+        sign(:n_from) = merge(1.0_wp, -1.0_wp, kernel(o, :) > 0)
+        turn(:n_from) = merge(rotated, plain, k(:n_from) >= self%first_odd)
+        select case (n_from)
+        case (1)
+          call add_1(m, sign, self%spectrum(start:last, b, k(1)), field(:, 1, turn(1)), buffer(start:last, o))
+        case (2)
+          call add_2(m, sign, self%spectrum(start:last, b, k(1)), field(:, 1, turn(1)), &
+                     self%spectrum(start:last, b, k(2)), field(:, 2, turn(2)), buffer(start:last, o))
+        case default
+          call add_3(m, sign, self%spectrum(start:last, b, k(1)), field(:, 1, turn(1)), &
+                     self%spectrum(start:last, b, k(2)), field(:, 2, turn(2)), &
+                     self%spectrum(start:last, b, k(3)), field(:, 3, turn(3)), buffer(start:last, o))
+        end select
       end do
     end do
   end subroutine multiply
 
-  !> total = sum over three fields of sign * spectrum * field
-  pure subroutine add_up(n, sign, spectrum_1, spectrum_2, spectrum_3, field_1, field_2, field_3, total)
+  !> A field times i.
+  pure subroutine rotate(n, field, rotated)
     !> Number of frequencies
     integer, intent(in) :: n
-    !> Signs of the kernels
-    real(wp), intent(in) :: sign(3)
-    !> Spectra of the kernels
-    real(wp), intent(in) :: spectrum_1(n), spectrum_2(n), spectrum_3(n)
-    !> Transformed fields (frequency, real and imaginary part)
-    real(wp), intent(in) :: field_1(chunk, 2), field_2(chunk, 2), field_3(chunk, 2)
-    !> Transformed result (frequency, real and imaginary part)
-    real(wp), intent(out) :: total(chunk, 2)
-    real(wp) :: s_1, s_2, s_3
+    complex(wp), intent(in) :: field(n)
+    complex(wp), intent(inout) :: rotated(n)
     integer :: f
 
     do f = 1, n
-      s_1 = sign(1)*spectrum_1(f)
-      s_2 = sign(2)*spectrum_2(f)
-      s_3 = sign(3)*spectrum_3(f)
-      total(f, 1) = s_1*field_1(f, 1) + s_2*field_2(f, 1) + s_3*field_3(f, 1)
-      total(f, 2) = s_1*field_1(f, 2) + s_2*field_2(f, 2) + s_3*field_3(f, 2)
+      rotated(f) = cmplx(-aimag(field(f)), real(field(f), wp), wp)
     end do
-  end subroutine add_up
+  end subroutine rotate
+
+  !> total = sign * spectrum * field
+  pure subroutine add_1(n, sign, s_1, f_1, total)
+    !> Number of frequencies
+    integer, intent(in) :: n
+    !> Sign and spectrum of the kernel
+    real(wp), intent(in) :: sign(1), s_1(n)
+    !> Transformed field and result
+    complex(wp), intent(in) :: f_1(n)
+    complex(wp), intent(inout) :: total(n)
+    real(wp) :: a
+    integer :: f
+
+    do f = 1, n
+      a = sign(1)*s_1(f)
+      total(f) = cmplx(a*real(f_1(f), wp), a*aimag(f_1(f)), wp)
+    end do
+  end subroutine add_1
+
+  !> total = sum over two fields of sign * spectrum * field
+  pure subroutine add_2(n, sign, s_1, f_1, s_2, f_2, total)
+    !> Number of frequencies
+    integer, intent(in) :: n
+    !> Signs and spectra of the kernels
+    real(wp), intent(in) :: sign(2), s_1(n), s_2(n)
+    !> Transformed fields and result
+    complex(wp), intent(in) :: f_1(n), f_2(n)
+    complex(wp), intent(inout) :: total(n)
+    real(wp) :: a, b
+    integer :: f
+
+    do f = 1, n
+      a = sign(1)*s_1(f)
+      b = sign(2)*s_2(f)
+      total(f) = cmplx(a*real(f_1(f), wp) + b*real(f_2(f), wp), a*aimag(f_1(f)) + b*aimag(f_2(f)), wp)
+    end do
+  end subroutine add_2
+
+  !> total = sum over three fields of sign * spectrum * field
+  pure subroutine add_3(n, sign, s_1, f_1, s_2, f_2, s_3, f_3, total)
+    !> Number of frequencies
+    integer, intent(in) :: n
+    !> Signs and spectra of the kernels
+    real(wp), intent(in) :: sign(3), s_1(n), s_2(n), s_3(n)
+    !> Transformed fields and result
+    complex(wp), intent(in) :: f_1(n), f_2(n), f_3(n)
+    complex(wp), intent(inout) :: total(n)
+    real(wp) :: a, b, c
+    integer :: f
+
+    do f = 1, n
+      a = sign(1)*s_1(f)
+      b = sign(2)*s_2(f)
+      c = sign(3)*s_3(f)
+      total(f) = cmplx(a*real(f_1(f), wp) + b*real(f_2(f), wp) + c*real(f_3(f), wp), &
+                       a*aimag(f_1(f)) + b*aimag(f_2(f)) + c*aimag(f_3(f)), wp)
+    end do
+  end subroutine add_3
 
   !> Run the transforms of one scalar product and nothing else, to compare times with.
   subroutine time_transforms(self)

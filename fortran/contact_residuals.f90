@@ -60,14 +60,16 @@ contains
     !> Self-compliance d_n [m/Pa]
     real(wp), intent(in) :: compliance
     real(wp) :: p_max, worst
-    integer :: row
+    integer :: col, row
 
     p_max = 0.0_wp
     worst = 0.0_wp
     do row = 1, size(pressure, 2)
-      p_max = max(p_max, maxval(pressure(:, row)))
-      worst = max(worst, maxval(abs(pressure(:, row) - max(0.0_wp, pressure(:, row) - gap(:, row)/compliance)), &
-                                mask=candidate(:, row)))
+      do col = 1, size(pressure, 1)
+        p_max = max(p_max, pressure(col, row))
+        if (.not. candidate(col, row)) cycle
+        worst = max(worst, abs(pressure(col, row) - max(0.0_wp, pressure(col, row) - gap(col, row)/compliance)))
+      end do
     end do
     if (p_max > 0.0_wp) then
       normal_residual = worst/p_max

@@ -230,7 +230,7 @@ contains
     r = self%caution*self%problem%classification_parameter(count(self%contact))
     if (self%first .and. all_zero(self%q)) r = cautious*r
     associate (friction => self%problem%friction)
-      largest = maxval(friction%bound(self%p))
+      largest = friction%bound(maxval(self%p))
       do i = 1, n
         if (self%contact(i)) then
           call linearize(self%q([i, n + i]), ds([i, n + i]), friction%bound(self%p(i)), largest, r, zone(i), &
@@ -330,12 +330,29 @@ contains
     rigid = reshape(problem%rigid_displacement(motion), [2*problem%lattice%size()])
   end function rigid
 
-  !> ds of the present tractions and motions.
-  pure function slip_increment(self) result(ds)
+  !> ds of the present tractions and motions at the nodes in contact, zero elsewhere.
+  function slip_increment(self) result(ds)
     class(iterate_t), intent(in) :: self
     real(wp), allocatable :: ds(:)
+    integer :: i, n, col, row, n_col
 
-    ds = self%u + self%dragged - self%origin - rigid(self%problem, self%motion)
+    n = size(self%p)
+    n_col = self%problem%lattice%extent(1)
+    allocate (ds(2*n))
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(i, col)
+    do row = 1, n/n_col
+      do col = 1, n_col
+        i = (row - 1)*n_col + col
+        ds(i) = 0.0_wp
+        ds(n + i) = 0.0_wp
+        if (.not. (self%contact(i) .or. self%p(i) > 0.0_wp)) cycle
+        ds(i) = self%u(i) + self%dragged(i) - self%origin(i) &
+                - (self%motion(along_x) - self%motion(about_z)*self%problem%y(col, row))
+        ds(n + i) = self%u(n + i) + self%dragged(n + i) - self%origin(n + i) &
+                    - (self%motion(along_y) + self%motion(about_z)*self%problem%x(col, row))
+      end do
+    end do
+    !$omp end parallel do
   end function slip_increment
 
   !> Largest shear traction that there can be.
@@ -352,32 +369,38 @@ contains
   end function traction_scale
 
   !> Shear traction cut to the cone.
-  pure function traction_on_cone(self) result(q)
+  function traction_on_cone(self) result(q)
     class(iterate_t), intent(in) :: self
     real(wp), allocatable :: q(:)
     integer :: i, n
 
     n = size(self%p)
-    q = self%q
+    allocate (q(2*n))
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads)
     do i = 1, n
       if (self%p(i) > 0.0_wp) then
-        q([i, n + i]) = on_cone(q([i, n + i]), self%problem%friction%bound(self%p(i)))
+        q([i, n + i]) = on_cone([self%q(i), self%q(n + i)], self%problem%friction%bound(self%p(i)))
       else
         q([i, n + i]) = 0.0_wp
       end if
     end do
+    !$omp end parallel do
   end function traction_on_cone
 
   !> Residuals of the present tractions; nothing is multiplied for them.
   subroutine find_residuals(self)
-    class(iterate_t), intent(inout) :: self
-    integer :: n(2)
+    class(iterate_t), intent(inout), target :: self
+    real(wp), allocatable, target :: slipped(:)
+    real(wp), pointer, contiguous :: p(:, :), q(:, :, :), ds(:, :, :)
 
-    n = self%problem%lattice%extent
     self%residual_normal = gap_residual(self%problem, self%p, self%h + self%closing + self%w - self%motion(normal))
-    self%residual_tangential = tangential_residual(reshape(self%q, [n, 2]), reshape(self%slip_increment(), [n, 2]), &
-                                                   reshape(self%p, n), self%problem%friction, &
-                                                   self%problem%tangential_compliance)
+    allocate (slipped, source=self%slip_increment())
+    associate (n => self%problem%lattice%extent)
+      p(1:n(1), 1:n(2)) => self%p
+      q(1:n(1), 1:n(2), 1:2) => self%q
+      ds(1:n(1), 1:n(2), 1:2) => slipped
+    end associate
+    self%residual_tangential = tangential_residual(q, ds, p, self%problem%friction, self%problem%tangential_compliance)
   end subroutine find_residuals
 
   !> Are all tractions and motions finite numbers?
@@ -388,12 +411,16 @@ contains
   end function is_finite
 
   !> R_n of vectors.
-  pure real(wp) function gap_residual(problem, p, gap)
+  real(wp) function gap_residual(problem, pressure, gap)
     type(friction_problem_t), intent(in) :: problem
-    real(wp), intent(in) :: p(:), gap(:)
+    real(wp), intent(in), contiguous, target :: pressure(:), gap(:)
+    real(wp), pointer, contiguous :: p(:, :), g(:, :)
 
-    gap_residual = normal_residual(reshape(p, problem%lattice%extent), reshape(gap, problem%lattice%extent), &
-                                   problem%candidate, problem%normal_compliance)
+    associate (n => problem%lattice%extent)
+      p(1:n(1), 1:n(2)) => pressure
+      g(1:n(1), 1:n(2)) => gap
+    end associate
+    gap_residual = normal_residual(p, g, problem%candidate, problem%normal_compliance)
   end function gap_residual
 
 end module hc_friction_iterate

@@ -72,7 +72,7 @@ contains
     real(wp) :: d(2), length
 
     d = traction - r*slip_increment
-    length = norm2(d)
+    length = sqrt(d(1)**2 + d(2)**2)
     if (length <= bound) then
       zone = stick
       direction = [1.0_wp, 0.0_wp]
@@ -93,7 +93,7 @@ contains
     real(wp) :: projected(2), length
 
     projected = traction
-    length = norm2(traction)
+    length = sqrt(traction(1)**2 + traction(2)**2)
     if (length > bound) projected = traction*(bound/length)
   end function on_cone
 

@@ -220,13 +220,16 @@ contains
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    integer :: k
 
     if (.not. allocated(now%lift)) then
       call precondition_constraints(now%pressure, now%contact, constraint, now%lift, error)
       if (allocated(error)) return
     end if
-    allocate (mb, source=now%lift)
-    where (.not. spread(now%contact, 2, size(mb, 2))) mb = 0.0_wp
+    allocate (mb, mold=now%lift)
+    do k = 1, size(mb, 2)
+      mb(:, k) = merge(now%lift(:, k), 0.0_wp, now%contact)
+    end do
   end subroutine lift_pressure
 
   !> About the shear traction that rigid motions of the unknowns cause: worked out once a step, if it serves.
@@ -253,8 +256,8 @@ contains
       do k = 1, size(mb, 2)
         call now%shear%to_frame(now%drag(:, k), mb(:, k))
         call now%shear%soften(constraint(:, k), mb(:, k))
+        where (.not. active) mb(:, k) = 0.0_wp
       end do
-      where (.not. spread(active, 2, size(mb, 2))) mb = 0.0_wp
     else
       call precondition_constraints(now%shear, active, constraint, mb, error)
       if (allocated(error)) return

@@ -103,15 +103,15 @@ contains
         if (.not. pressure(col, row) > 0.0_wp) cycle
         q = traction(col, row, :)
         p_max = max(p_max, pressure(col, row))
-        q_max = max(q_max, norm2(q))
-        worst = max(worst, norm2(q - on_cone(q - slip_increment(col, row, :)/compliance, &
-                                             friction%bound(pressure(col, row)))))
+        q_max = max(q_max, q(1)**2 + q(2)**2)
+        q = q - on_cone(q - slip_increment(col, row, :)/compliance, friction%bound(pressure(col, row)))
+        worst = max(worst, q(1)**2 + q(2)**2)
       end do
     end do
     scale = friction%coefficient*p_max
-    if (friction%no_slip) scale = max(q_max, least_traction*p_max)
+    if (friction%no_slip) scale = max(sqrt(q_max), least_traction*p_max)
     tangential_residual = 0.0_wp
-    if (scale > 0.0_wp) tangential_residual = worst/scale
+    if (scale > 0.0_wp) tangential_residual = sqrt(worst)/scale
   end function tangential_residual
 
   !> R_P = |sum A_p p - P|/P.

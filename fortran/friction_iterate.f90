@@ -89,7 +89,7 @@ module hc_friction_iterate
     !> Largest shear traction that there can be
     procedure :: traction_scale
     !> Residuals of the present tractions
-    procedure :: find_residuals
+    procedure :: find_residuals, find_tangential_residual
     !> Are all numbers numbers?
     procedure :: is_finite
   end type iterate_t
@@ -220,7 +220,7 @@ contains
     logical, allocatable, intent(out) :: active(:)
     real(wp), allocatable :: ds(:)
     integer, allocatable :: zone(:)
-    real(wp) :: r, bound, largest, across
+    real(wp) :: r, bound, largest, across, e(2)
     integer :: n, i
 
     n = size(self%p)
@@ -231,9 +231,10 @@ contains
     if (self%first .and. all_zero(self%q)) r = cautious*r
     associate (friction => self%problem%friction)
       largest = friction%bound(maxval(self%p))
+      !$omp parallel do schedule(static) num_threads(self%operators%n_threads)
       do i = 1, n
         if (self%contact(i)) then
-          call linearize(self%q([i, n + i]), ds([i, n + i]), friction%bound(self%p(i)), largest, r, zone(i), &
+          call linearize([self%q(i), self%q(n + i)], [ds(i), ds(n + i)], friction%bound(self%p(i)), largest, r, zone(i), &
                          self%shear%direction(:, i), self%shear%compliance(i))
         else
           self%q([i, n + i]) = 0.0_wp
@@ -241,23 +242,25 @@ contains
           self%shear%compliance(i) = 0.0_wp
         end if
       end do
+      !$omp end parallel do
       self%held = holding .and. .not. any(zone == stick)
       if (self%held) call hold(self%shear%compliance, zone)
 
+      !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(bound, across, e)
       do i = 1, n
         active(i) = zone(i) /= separated
         active(n + i) = zone(i) == stick
         if (zone(i) == slip) then
           bound = friction%bound(self%p(i))
-          associate (e => self%shear%direction(:, i))
-            across = 0.0_wp
-            if (self%shear%compliance(i) < blend_end*self%shear%elastic_compliance) then
-              across = dot_product(normal_to(e), self%q([i, n + i]))
-            end if
-            self%q([i, n + i]) = bound*e + across*normal_to(e)
-          end associate
+          e = self%shear%direction(:, i)
+          across = 0.0_wp
+          if (self%shear%compliance(i) < blend_end*self%shear%elastic_compliance) then
+            across = dot_product(normal_to(e), [self%q(i), self%q(n + i)])
+          end if
+          self%q([i, n + i]) = bound*e + across*normal_to(e)
         end if
       end do
+      !$omp end parallel do
     end associate
     call self%shear%blend(self%contact)
   end subroutine classify
@@ -389,11 +392,18 @@ contains
 
   !> Residuals of the present tractions; nothing is multiplied for them.
   subroutine find_residuals(self)
+    class(iterate_t), intent(inout) :: self
+
+    self%residual_normal = gap_residual(self%problem, self%p, self%h + self%closing + self%w - self%motion(normal))
+    call self%find_tangential_residual()
+  end subroutine find_residuals
+
+  !> R_t alone.
+  subroutine find_tangential_residual(self)
     class(iterate_t), intent(inout), target :: self
     real(wp), allocatable, target :: slipped(:)
     real(wp), pointer, contiguous :: p(:, :), q(:, :, :), ds(:, :, :)
 
-    self%residual_normal = gap_residual(self%problem, self%p, self%h + self%closing + self%w - self%motion(normal))
     allocate (slipped, source=self%slip_increment())
     associate (n => self%problem%lattice%extent)
       p(1:n(1), 1:n(2)) => self%p
@@ -401,7 +411,7 @@ contains
       ds(1:n(1), 1:n(2), 1:2) => slipped
     end associate
     self%residual_tangential = tangential_residual(q, ds, p, self%problem%friction, self%problem%tangential_compliance)
-  end subroutine find_residuals
+  end subroutine find_tangential_residual
 
   !> Are all tractions and motions finite numbers?
   pure logical function is_finite(self)

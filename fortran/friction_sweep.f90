@@ -56,7 +56,7 @@ contains
       if (allocated(error)) return
     end if
     ! what the new pressure makes of the old shear traction is what has to be mended
-    if (.not. now%first) call now%find_residuals()
+    if (.not. now%first) call now%find_tangential_residual()
     call shear_off(now, error)
     if (allocated(error)) return
     if (now%pressing) then
@@ -192,7 +192,7 @@ contains
     call now%shear%to_plane(x, now%q)
     ax(:n) = ax(:n) - now%shear%compliance*x(:n)
     call now%shear%to_plane(ax, now%u)
-    call now%find_residuals()
+    call now%find_tangential_residual()
     now%n_sweep = now%n_sweep + 1
     if (mod(now%n_sweep, tired) == 0) then
       now%caution = max(0.5_wp*now%caution, least_caution)

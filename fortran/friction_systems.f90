@@ -78,6 +78,7 @@ module hc_friction_systems
     !> Continuation of displacements beyond the contact
     type(edge_extension_t), private :: edge
     !> Nodes in contact
+    logical, allocatable, private :: contact(:)
     type(packing_t), private :: nodes
     !> Components along x and y of what is multiplied (zero off the contact) or preconditioned, and what comes of it
     real(wp), allocatable, private :: from(:), onto(:)
@@ -244,10 +245,17 @@ contains
     logical, intent(in) :: contact(:)
     real(wp) :: ratio
     integer :: i
+    logical :: known
 
-    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent))
-    call new_packing(self%nodes, contact, self%n_threads)
-    self%from = 0.0_wp
+    known = allocated(self%contact)
+    if (known) known = all(self%contact .eqv. contact)
+    if (.not. known) then
+      self%contact = contact
+      call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent))
+      call new_packing(self%nodes, contact, self%n_threads)
+      self%from = 0.0_wp
+    end if
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(ratio)
     do i = 1, size(self%weight)
       ratio = self%compliance(i)/(blend_end*self%elastic_compliance)
       if (ratio <= 1.0_wp/blend_range) then
@@ -258,6 +266,7 @@ contains
         self%weight(i) = sqrt(-log(ratio)/log(blend_range))
       end if
     end do
+    !$omp end parallel do
   end subroutine blend
 
   !> What the preconditioner makes of slip, of a traction that was found in stick.

@@ -5,7 +5,7 @@ module hc_contact_residuals
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control, normal, separated, slip
-  use hc_friction_law, only: coulomb_t, on_cone
+  use hc_friction_law, only: coulomb_t, on_cone, magnitude
   implicit none
   private
 
@@ -103,15 +103,15 @@ contains
         if (.not. pressure(col, row) > 0.0_wp) cycle
         q = traction(col, row, :)
         p_max = max(p_max, pressure(col, row))
-        q_max = max(q_max, q(1)**2 + q(2)**2)
+        q_max = max(q_max, magnitude(q))
         q = q - on_cone(q - slip_increment(col, row, :)/compliance, friction%bound(pressure(col, row)))
-        worst = max(worst, q(1)**2 + q(2)**2)
+        worst = max(worst, magnitude(q))
       end do
     end do
     scale = friction%coefficient*p_max
-    if (friction%no_slip) scale = max(sqrt(q_max), least_traction*p_max)
+    if (friction%no_slip) scale = max(q_max, least_traction*p_max)
     tangential_residual = 0.0_wp
-    if (scale > 0.0_wp) tangential_residual = sqrt(worst)/scale
+    if (scale > 0.0_wp) tangential_residual = worst/scale
   end function tangential_residual
 
   !> R_P = |sum A_p p - P|/P.

@@ -340,7 +340,7 @@ contains
     n_row = self%extent(2)
     first = (b - 1)*w + 1
     do i = 1, size(kernel, 2)
-      call copy_columns(w, n_row, self%work(first, 1, i), self%leading, buffer(:, i), w)
+      call copy_columns(w, n_row, self%leading, w, self%work(first, 1, i), buffer(:, i))
       buffer(n_row*w + 1:, i) = 0.0_wp
       call fftw_execute_dft(self%column_forward, buffer(:, i), buffer(:, i))
     end do
@@ -353,7 +353,7 @@ contains
 
     do o = 1, size(kernel, 1)
       call fftw_execute_dft(self%column_inverse, buffer(:, o), buffer(:, o))
-      call copy_columns(w, n_row, buffer(:, o), w, self%work(first, 1, o), self%leading)
+      call copy_columns(w, n_row, w, self%leading, buffer(:, o), self%work(first, 1, o))
     end do
   end subroutine convolve_block
 
@@ -373,17 +373,14 @@ contains
   end subroutine scale
 
   !> Columns of a matrix from one place to another; their number is a multiple of four.
-  pure subroutine copy_columns(width, n_row, from, from_leading, onto, onto_leading)
+  pure subroutine copy_columns(width, n_row, from_leading, onto_leading, from, onto)
     !> Number of columns and rows
     integer, intent(in) :: width, n_row
-    !> Where they are
-    complex(wp), intent(in) :: from(*)
-    !> Distance of two rows there
-    integer, intent(in) :: from_leading
-    !> Where they go
-    complex(wp), intent(inout) :: onto(*)
-    !> Distance of two rows there
-    integer, intent(in) :: onto_leading
+    !> Distance of two rows where they are and where they go
+    integer, intent(in) :: from_leading, onto_leading
+    !> Where they are and where they go
+    complex(wp), intent(in) :: from(from_leading*(n_row - 1) + width)
+    complex(wp), intent(inout) :: onto(onto_leading*(n_row - 1) + width)
     integer :: row, k, i, o
 
     ! in pieces of fixed length, so that short rows do not cost a call each

@@ -184,8 +184,8 @@ contains
       allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
     end associate
     allocate (onto(size(x)), from(size(x)), source=0.0_wp)
-    call pack_columns(nodes, constraint, b)
-    call pack_columns(nodes, mb, m_b)
+    call nodes%pack_columns(constraint, b)
+    call nodes%pack_columns(mb, m_b)
     call nodes%pack(x, x_active)
     call nodes%pack(ax, ax_active)
     call nodes%pack(rhs, rhs_active)
@@ -300,9 +300,9 @@ contains
     iterations = 0
     n_threads = system%n_threads
     call new_packing(nodes, active, n_threads)
-    call pack_columns(nodes, columns, b)
-    call pack_columns(nodes, mb, m_b)
-    call pack_columns(nodes, rows, c_rows)
+    call nodes%pack_columns(columns, b)
+    call nodes%pack_columns(mb, m_b)
+    call nodes%pack_columns(rows, c_rows)
     call invert_gram(c_rows, m_b, inverse, independent, n_threads)
     if (.not. independent) return
     associate (n => nodes%n_active)
@@ -386,22 +386,6 @@ contains
     end subroutine expand
 
   end subroutine projected_gmres
-
-  !> Several vectors on the active nodes.
-  subroutine pack_columns(nodes, columns, packed)
-    !> Active nodes
-    type(packing_t), intent(in) :: nodes
-    !> Vectors over all nodes (n, number of vectors)
-    real(wp), intent(in), contiguous :: columns(:, :)
-    !> Vectors on the active nodes (n_active, number of vectors)
-    real(wp), allocatable, intent(out) :: packed(:, :)
-    integer :: m
-
-    allocate (packed(nodes%n_active, size(columns, 2)))
-    do m = 1, size(columns, 2)
-      call nodes%pack(columns(:, m), packed(:, m))
-    end do
-  end subroutine pack_columns
 
   !> r = rhs - A x + B m and its largest element.
   subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, n_threads)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .lattice import Lattice
     from .native import ElasticPair, FlexibilityOperator, NormalContact
     from .native_friction import ContactState, FrictionalContact
+    from .restart import resume
     from .result import Result, Step
     from .store import open_result
 
@@ -44,6 +45,7 @@ _HOME = {
     "Result": "result",
     "Step": "result",
     "open_result": "store",
+    "resume": "restart",
 }
 _MODULES = ("analytic", "influence", "plotting")
 
@@ -65,6 +67,7 @@ __all__ = [
     "influence",
     "open_result",
     "plotting",
+    "resume",
 ]
 
 

@@ -135,6 +135,8 @@ class Case:
         The deck, checked and in SI.
     deck_text : str
         The case as a deck, whole: with what it includes, what was set, and the series of loads from files.
+    deck_file : Path or None
+        The file it was read from.
     lattice : Lattice
         The window to start with.
     window_fixed : bool
@@ -171,6 +173,7 @@ class Case:
     output: OutputSettings
     deck: Deck
     deck_text: str
+    deck_file: Path | None = None
     lattice: Lattice
     window_fixed: bool
 
@@ -254,12 +257,14 @@ class Case:
             If it cannot be read, or with a sentence for each thing that is wrong with it.
         """
         data, text = decks.read_toml(path)
-        return cls._made(data, text, Source(str(path), text), Path(path).parent, overrides)
+        case = cls._made(data, text, Source(str(path), text), Path(path).parent, overrides)
+        case.deck_file = Path(path).absolute()
+        return case
 
     @classmethod
-    def from_text(cls, text: str, name: str = "deck") -> Case:
+    def from_text(cls, text: str, name: str = "deck", overrides: Mapping[str, Any] | None = None) -> Case:
         """Read a deck from its text (as a result file keeps it); `name` is what messages call it."""
-        return cls._made(decks.parse_toml(text, name), text, Source(name, text))
+        return cls._made(decks.parse_toml(text, name), text, Source(name, text), overrides=overrides)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Case:

@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, TypeVar
 
@@ -24,7 +24,7 @@ from .errors import DeckError, HexcontactError, ResourceError
 
 if TYPE_CHECKING:
     from .case import Case
-    from .result import Result
+    from .result import Result, Step
     from .store import Store
 
 P = ParamSpec("P")
@@ -85,6 +85,9 @@ def _guarded(command: Callable[P, R]) -> Callable[P, R]:
 # --- interruption ---------------------------------------------------------------------------------
 
 
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # the last comes from Slurm, before a time limit
+
+
 class _Interrupted(BaseException):
     """A signal has come that ends the run."""
 
@@ -100,7 +103,7 @@ def _news() -> Iterator[tuple[int, int]]:
 
     They raise nothing, wherever they come, so that leaving is not interrupted by those that follow.
     """
-    old = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    old = {number: signal.getsignal(number) for number in _SIGNALS}
     heeded = {number: handler for number, handler in old.items() if handler not in (signal.SIG_IGN, None)}
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -168,7 +171,7 @@ def _hexcontact(
 ) -> None:
     """Elastic contact in 3-D from a deck in TOML: pressure, shear traction, stick and slip, approach, shift.
 
-    Exit codes: 0 done, 2 wrong input, 3 no convergence, 4 not enough memory or disk, 130 and 143 interrupted.
+    Exit codes: 0 done, 2 wrong input, 3 no convergence, 4 not enough memory or disk; 130, 138, 143 stopped.
     """
 
 
@@ -241,28 +244,85 @@ def run(
 ) -> None:
     """Solve a deck; each load step is safe on the disk before the next begins."""
     from . import solve
-    from .progress import reporter
     from .store import Store
 
     case = _case(deck, settings)
     target = _target(case, deck, output)
-    shown, histories = reporter(quiet), []
     with _news() as news, Store(target, solve.metadata_of(case), overwrite) as store:
-        try:
-            with shown.watching(case.title or deck.stem, len(case.load_steps)):
-                _in_background(
-                    lambda: solve.record(case, store, shown, lambda step: histories.append(step.history)),
-                    news,
-                )
-        except _Interrupted as signaled:
-            _leave(store, signaled)
-    picture = None
-    if plot:
-        from .plot_command import picture_of
-
-        picture = picture_of([_open(store.path)], "overview", store.path.with_suffix(".png"), {})
+        histories = _solved(case, store, news, deck.stem, quiet)
+    picture = _overview(store.path) if plot else None
     if not quiet:
         _summarize(case, histories, target, picture)
+
+
+@app.command(epilog="Example: hexcontact resume fretting.nc")
+@_guarded
+def resume(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The output of the run.", show_default=False)],
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the result beside the output (.png).")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Change how the further steps are solved, as solver.tolerance=1e-7. Repeatable.",
+        ),
+    ] = None,
+) -> None:
+    """Go on with a run that was interrupted or killed, met a full disk or did not converge.
+
+    The result is to the bit that of a run in one go, on the same machine with as many threads.
+    """
+    from . import restart
+
+    overrides = dict(map(_setting, settings or ()))
+    with _news() as news, restart.reopened(file, overrides=overrides) as again:
+        if again is not None:
+            if again.warning:
+                print(f"hexcontact: warning: {again.warning}", file=sys.stderr)
+            histories = _solved(again.case, again.store, news, file.stem, quiet, again.before)
+    path = file if again is None else again.store.path
+    picture = _overview(path) if plot else None
+    if quiet:
+        return
+    if again is not None:
+        _summarize(again.case, histories, path, picture)
+    else:
+        print(
+            f"{file} is finished, all its load steps are there" + (f"; written: {picture}" if picture else "")
+        )
+
+
+def _solved(
+    case: Case,
+    store: Store,
+    news: tuple[int, int],
+    name: str,
+    quiet: bool,
+    before: Sequence[Step] = (),
+) -> list[Any]:
+    """Solve a case into a store and return the histories of all its steps; signals end the process."""
+    from . import solve
+    from .progress import reporter
+
+    shown, histories = reporter(quiet), [step.history for step in before]
+    title = (case.title or name) + (f", after step {len(before)}" if before else "")
+    try:
+        with shown.watching(title, len(case.load_steps)):
+            _in_background(
+                lambda: solve.record(case, store, shown, lambda step: histories.append(step.history), before),
+                news,
+            )
+    except _Interrupted as signaled:
+        _leave(store, signaled)
+    return histories
+
+
+def _overview(path: Path) -> Path:
+    from .plot_command import picture_of
+
+    return picture_of([_open(path)], "overview", path.with_suffix(".png"), {})
 
 
 def _summarize(case: Case, histories: list[Any], target: Path, picture: Path | None) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
+import math
 import os
 import socket
 import time
@@ -12,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from .errors import DeckError
+
+_CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
 
 
 class Lock:
@@ -56,9 +59,18 @@ class Lock:
                 f"{output} is being written by another run, process {holder.get('process', '?')} "
                 f"on {holder.get('host', '?')}{since}; if that run is over, delete {path}"
             )
-        text = {"process": os.getpid(), "host": socket.gethostname(), "since": time.strftime("%F %T")}
-        os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, json.dumps(text).encode(), 0)
+        text = {
+            "process": os.getpid(),
+            "host": socket.gethostname(),
+            "since": time.strftime("%F %T"),
+            "time": time.time(),
+        }
+        try:
+            os.ftruncate(self._descriptor, 0)
+            os.pwrite(self._descriptor, json.dumps(text).encode(), 0)
+        except BaseException:  # a full disk
+            self.release()
+            raise
 
     def _holder(self) -> dict[str, Any]:
         with contextlib.suppress(ValueError):
@@ -74,9 +86,18 @@ class Lock:
 
 
 def _is_running(holder: dict[str, Any]) -> bool:
+    """Tell whether a process of this machine holds the lock, not one that got its number since."""
     import psutil
 
-    return holder.get("host") == socket.gethostname() and psutil.pid_exists(int(holder.get("process", -1)))
+    if holder.get("host") != socket.gethostname():
+        return False
+    try:
+        began = psutil.Process(int(holder.get("process", -1))).create_time()
+    except (psutil.NoSuchProcess, ValueError):
+        return False
+    except psutil.Error:
+        return True
+    return bool(began < float(holder.get("time", math.inf)) + _CLOCKS)
 
 
 def _same_file(path: Path, descriptor: int) -> bool:

@@ -122,7 +122,7 @@ class Bar(Reporter):
     def finished(self, step: Step) -> None:
         """Move the bar on by one step."""
         self._latest.plain = "  " + describe(step.history, short=True)
-        self._bar.update(self._task, advance=1)
+        self._bar.update(self._task, completed=step.number)
 
 
 def reporter(quiet: bool = False, stream: IO[str] | None = None) -> Reporter:

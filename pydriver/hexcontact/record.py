@@ -82,6 +82,6 @@ def read_record(path: Path) -> tuple[Metadata, Step]:
             fields = {name: file[name] for name in about["fields"]}
         origin = tuple(about["lattice"].pop("origin"))
         lattice = Lattice(**about["lattice"], origin=origin)
-        chosen = tuple(about["metadata"].pop("fields"))
-        metadata = Metadata(**about["metadata"], fields=chosen)
+        chosen, resumed = (tuple(about["metadata"].pop(name)) for name in ("fields", "resumed"))
+        metadata = Metadata(**about["metadata"], fields=chosen, resumed=resumed)
         return metadata, Step(about["index"], lattice, fields, about["history"])

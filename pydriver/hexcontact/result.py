@@ -70,8 +70,15 @@ class Step:
         return dataclasses.replace(self, fields=dict.fromkeys(self.fields, np.empty(0)))
 
 
-def _now() -> str:
+def now() -> str:
+    """Return date and time, UTC."""
     return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _version() -> str:
+    from . import __version__
+
+    return __version__
 
 
 @dataclass(frozen=True)
@@ -96,6 +103,12 @@ class Metadata:
         A name of this run that no other run has.
     created : str
         Start of the run, UTC.
+    version : str
+        Version of the program that started it.
+    resumed : tuple of str
+        A line for each time that the run was resumed.
+    deck_file : str
+        The file that the deck was read from, which its relative file names belong to; not in the output.
     """
 
     title: str = ""
@@ -105,7 +118,15 @@ class Metadata:
     planned_steps: int = 0
     parameters: Mapping[str, Any] = field(default_factory=dict)
     run: str = field(default_factory=lambda: uuid.uuid4().hex)
-    created: str = field(default_factory=_now)
+    created: str = field(default_factory=now)
+    version: str = field(default_factory=_version)
+    resumed: tuple[str, ...] = ()
+    deck_file: str = ""
+
+    @property
+    def story(self) -> str:
+        """When the run was started and resumed, a line for each."""
+        return "\n".join([f"{self.created} started by hexcontact {self.version}", *self.resumed])
 
     def attributes(self) -> dict[str, Any]:
         """Global attributes of a file."""
@@ -138,6 +159,8 @@ class Metadata:
             parameters={name: value for name, value in attributes.items() if name not in _ATTRIBUTES},
             run=str(attributes["run"]),
             created=str(attributes["created"]),
+            version=str(attributes["hexcontact_version"]),
+            resumed=tuple(str(attributes["history"]).splitlines()[1:]),
         )
 
 
@@ -184,7 +207,7 @@ class Layout:
         return {
             "Conventions": CONVENTIONS,
             "source": f"hexcontact {__version__}",
-            "history": f"{self.metadata.created} started by hexcontact {__version__}",
+            "history": self.metadata.story,
             "hexcontact_version": __version__,
             "schema_version": np.int32(SCHEMA_VERSION),
             "complete": np.int32(complete),

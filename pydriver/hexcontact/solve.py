@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ def metadata_of(case: Case) -> Metadata:
     return Metadata(
         title=case.title,
         deck=case.deck_text,
+        deck_file=str(case.deck_file or ""),
         fields=tuple(case.output.fields),
         every=case.output.every,
         planned_steps=len(case.load_steps),
@@ -97,7 +98,11 @@ def run(
 
 
 def record(
-    case: Case, store: Store, shown: Reporter, on_step: Callable[[Step], object] | None = None
+    case: Case,
+    store: Store,
+    shown: Reporter,
+    on_step: Callable[[Step], object] | None = None,
+    before: Sequence[Step] = (),
 ) -> None:
     """Solve a case into a store, up to the finished output.
 
@@ -111,13 +116,15 @@ def record(
         Who is told about each step.
     on_step : callable, optional
         Called with each finished `Step`, when it is safe.
+    before : sequence of Step
+        The steps that the store has already, as for `steps`.
 
     Raises
     ------
     DeckError, ConvergenceError, ResourceError
         As `run`.
     """
-    for step in steps(case):
+    for step in steps(case, before=before):
         store.append(step)
         shown.finished(step)
         if on_step is not None:
@@ -125,7 +132,7 @@ def record(
     store.finish()
 
 
-def steps(case: Case, kept_in_memory: bool = False) -> Iterator[Step]:
+def steps(case: Case, kept_in_memory: bool = False, before: Sequence[Step] = ()) -> Iterator[Step]:
     """Solve a case step by step.
 
     Parameters
@@ -134,6 +141,9 @@ def steps(case: Case, kept_in_memory: bool = False) -> Iterator[Step]:
         The checked problem.
     kept_in_memory : bool
         The caller keeps all steps, so there has to be memory for them.
+    before : sequence of Step
+        The first steps if they are solved already: the heads of them, the last one with all its fields. What
+        follows is to the bit what it would have been in one go.
 
     Yields
     ------
@@ -149,24 +159,30 @@ def steps(case: Case, kept_in_memory: bool = False) -> Iterator[Step]:
     ResourceError
         If there is not enough memory.
     """
-    window = kind_of(case)(case, case.lattice, len(case.load_steps) if kept_in_memory else 0)
-    state: Any = None
-    segment, begun = -1, _standing(state)
-    for target in case.load_steps:
+    lattice = before[-1].lattice if before else case.lattice
+    window = kind_of(case)(case, lattice, len(case.load_steps) if kept_in_memory else 0)
+    state: Any = window.restored(before[-1]) if before else None
+    segment, begun, reached_by_now = -1, _standing({}), _standing({})
+    for step in before:
+        if step.history["segment"] != segment + 1:
+            segment, begun = int(step.history["segment"]) - 1, reached_by_now
+        reached_by_now = _standing(step.history)
+    for target in case.load_steps[len(before) :]:
         started = time.perf_counter()
         if target.segment != segment:
-            segment, begun = target.segment, _standing(state)
+            segment, begun = target.segment, reached_by_now
         values = target.values(begun)
         # a step that reached the rim is solved again on a larger window, from where it began
         while window.outgrown(reached := window.advance(state, target, values)):
-            before, window = window.lattice, window.grown(reached, target)
-            state = window.carried(state, before)
+            smaller, window = window.lattice, window.grown(reached, target)
+            state = window.carried(state, smaller)
         if not reached.converged:
             raise ConvergenceError(window.complaint(reached, target, values))
-        yield window.step(target, reached, state, started)
-        state = reached
+        step = window.step(target, reached, state, started)
+        yield step
+        state, reached_by_now = reached, _standing(step.history)
 
 
-def _standing(state: Any) -> dict[str, float]:
-    """Return the loads and motions of a state by the keys of the deck; without friction some are zero."""
-    return {name: getattr(state, name, 0.0) for pair in LOADS.values() for name in pair}
+def _standing(history: Mapping[str, Any]) -> dict[str, float]:
+    """Return the loads and motions at the end of a step by the keys of the deck; none are zero."""
+    return {name: float(history.get(name, 0.0)) for pair in LOADS.values() for name in pair}

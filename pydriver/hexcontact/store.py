@@ -13,6 +13,7 @@ import contextlib
 import errno
 import os
 import re
+import shlex
 import shutil
 import threading
 import time
@@ -64,8 +65,8 @@ class Journal:
 
     @property
     def metadata(self) -> Metadata:
-        """Where the steps come from."""
-        return read_record(self.records[0])[0]
+        """Where the steps come from, as the last of them tells."""
+        return read_record(self.records[-1])[0]
 
     @property
     def stopped(self) -> str:
@@ -88,7 +89,13 @@ class Journal:
 
     def remove(self) -> None:
         """Delete the records, why they are not all, and what an interrupted write left; the lock stays."""
-        for path in (*self.records, self.folder / _STOPPED, *self.folder.glob("*.tmp")):
+        for path in self.records:
+            path.unlink(missing_ok=True)
+        self.tidy()
+
+    def tidy(self) -> None:
+        """Delete why the steps are not all, and what an interrupted write left."""
+        for path in (self.folder / _STOPPED, *self.folder.glob("*.tmp")):
             path.unlink(missing_ok=True)
 
 
@@ -133,7 +140,12 @@ def open_result(path: str | os.PathLike[str]) -> Result:
 
 def _continues(journal: Journal, output: Result) -> bool:
     """Whether the steps of `output` are the first ones of `journal`."""
-    return len(journal) >= len(output) and journal.metadata.run == output.dataset.attrs.get("run")
+    return len(journal) >= len(output) and same_run(journal, output)
+
+
+def same_run(journal: Journal, output: Result) -> bool:
+    """Whether `output` and the steps of `journal` come from one run."""
+    return journal.metadata.run == output.dataset.attrs.get("run")
 
 
 def _may_be_a_result(path: Path) -> bool:
@@ -164,20 +176,9 @@ class Store:
     """
 
     def __init__(self, path: str | os.PathLike[str], metadata: Metadata, overwrite: bool = False) -> None:
-        self.path = Path(os.path.realpath(path))
+        self._at(path)
         self.metadata = metadata
-        self.folder = journal_of(self.path)
-        self.heads: list[Step] = []
-        self._mutex = threading.RLock()  # close() may come from another thread than append()
-        self._closed = False
-        self._published = (0, time.monotonic())
-        if self.path.is_dir():
-            raise DeckError(f"{self.path} is a folder; a file name is expected")
-        if not self.path.parent.is_dir():
-            raise DeckError(f"cannot write {self.path}: the folder {self.path.parent} does not exist")
         with self._writing("the journal"):
-            if not os.access(self.path.parent, os.W_OK):
-                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
             self._lock = self._locked()
         try:
             self._take_over(overwrite)
@@ -185,6 +186,99 @@ class Store:
             self.close()
             raise
         self._in_the_way = self.path.exists()
+
+    @classmethod
+    def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
+        """Open the journal of a run that ended before its time, to go on with it.
+
+        Nothing is changed before `go_on`. The store may also turn out to be `finished`.
+
+        Parameters
+        ----------
+        path : path
+            Output file.
+
+        Returns
+        -------
+        store : Store
+            Holds the lock.
+        last : Step or None
+            The last finished step with all its fields; None if the run is finished.
+
+        Raises
+        ------
+        DeckError
+            If there are no finished steps, one is missing or damaged, or another run is writing them.
+        FileNotFoundError
+            If there is no journal.
+        """
+        store = cls.__new__(cls)
+        store._at(path)
+        if not store.folder.is_dir():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(store.folder))
+        with store._writing("the journal", missing=True):
+            store._lock = Lock(store.folder / "lock", store.path)
+        try:
+            return store, store._read_again()
+        except BaseException:
+            store.close()
+            raise
+
+    def _at(self, path: str | os.PathLike[str]) -> None:
+        """Take up a place where an output can be written."""
+        self.path = Path(os.path.realpath(path))
+        self.folder = journal_of(self.path)
+        self.heads: list[Step] = []
+        self._mutex = threading.RLock()  # close() may come from another thread than append()
+        self._closed = False
+        self._published = (0, time.monotonic())
+        if self.path.is_dir():
+            raise DeckError(f"{self.path} is a folder; a file name is expected")
+        if self.path.exists() and not self.path.is_file():  # to replace it would take a device away
+            raise DeckError(f"{self.path} is not a regular file; choose another output")
+        if not self.path.parent.is_dir():
+            raise DeckError(f"cannot write {self.path}: the folder {self.path.parent} does not exist")
+        with self._writing("the journal"):
+            if not os.access(self.path.parent, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def _read_again(self) -> Step | None:
+        """Read all records, so that damage shows now and not after the last step; return the last one."""
+        journal = Journal(self.folder)
+        output = None
+        with contextlib.suppress(DeckError):  # what is no result may not be replaced
+            output = read_output(self.path) if self.path.exists() else None
+        ours = output is not None and (not journal or same_run(journal, output))
+        steps, complete = (len(output), output.complete) if output is not None else (0, False)
+        if output is not None:
+            output.close()
+        if ours and complete:  # killed while it cleared the journal away
+            journal.remove()
+            return None
+        if not journal and output is not None:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self.folder))
+        if not journal:
+            raise DeckError(
+                f"no load step of {self.path} was finished, so it has to be run from the beginning"
+            )
+        last = None
+        for last in journal:
+            self.heads.append(last.head)
+        self.metadata = journal.metadata
+        self._in_the_way = self.path.exists() and not ours
+        if self._in_the_way and self.path.stat().st_mtime > journal.records[0].stat().st_mtime:
+            raise DeckError(
+                f"{self.path} is not of the run that left its steps in {self.folder}, and newer; move it away"
+            )
+        if ours:
+            self._published = (steps, time.monotonic())
+        return last
+
+    def go_on(self, metadata: Metadata) -> None:
+        """Begin to add steps to those of a journal that was opened again."""
+        self.metadata = metadata
+        with self._writing("the journal"):
+            Journal(self.folder).tidy()
 
     def _locked(self) -> Lock:
         while True:
@@ -204,8 +298,8 @@ class Store:
         left = Journal(self.folder)
         if left and not overwrite:
             raise DeckError(
-                f"{self.folder} holds {_steps(len(left))} of an unfinished run; "
-                f"hexcontact info {self.path} shows them, --overwrite (overwrite=True in Python) starts anew"
+                f"{self.folder} holds {_steps(len(left))} of an unfinished run; hexcontact resume "
+                f"{shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in Python) starts anew"
             )
         with self._writing("the journal"):
             if left:  # they become the old output, which is only replaced by a complete new one
@@ -234,14 +328,16 @@ class Store:
         """Sentence about the finished steps: how many, where, how to look at them."""
         where = self.folder if self.folder.exists() else self.path
         steps = f"{len(self.heads)} of {self.metadata.planned_steps} load steps are finished"
-        return f"{steps} and kept in {where}; hexcontact info {self.path} shows them"
+        return f"{steps} and kept in {where}; to go on: hexcontact resume {shlex.quote(str(self.path))}"
 
     @contextlib.contextmanager
-    def _writing(self, what: str) -> Iterator[None]:
+    def _writing(self, what: str, missing: bool = False) -> Iterator[None]:
         """Turn a failure to write into one sentence that names the file and the step."""
         try:
             yield
         except OSError as error:
+            if missing and isinstance(error, FileNotFoundError):
+                raise
             reason = error.strerror or str(error)
             if error.errno is None:
                 free = shutil.disk_usage(self.path.parent).free

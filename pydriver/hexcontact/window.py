@@ -154,6 +154,10 @@ class Window(ABC, Generic[S]):
         """Return a state that was solved on a smaller window on this one."""
 
     @abstractmethod
+    def restored(self, step: Step) -> S | None:
+        """Return the state at the end of a step that was solved on this window, as the next one needs it."""
+
+    @abstractmethod
     def complaint(self, solution: S, target: LoadStep, values: tuple[float, ...]) -> str:
         """Say why a load step with these values was not solved, and what may help."""
 
@@ -294,6 +298,10 @@ class NormalWindow(Window["NormalSolution"]):
     def carried(self, state: NormalSolution | None, lattice: Lattice) -> NormalSolution | None:
         """Return the state as it is: the next step does not look at its fields."""
         return state
+
+    def restored(self, step: Step) -> NormalSolution | None:
+        """Return nothing: every step stands for itself."""
+        return None
 
     def complaint(self, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]) -> str:
         """Say how far the solver came."""

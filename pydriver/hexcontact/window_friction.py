@@ -78,6 +78,10 @@ class FrictionWindow(Window["ContactState"]):
         """Return a state on this window; what the new nodes have been through follows from it."""
         return None if state is None else self._contact.extended(state, lattice)
 
+    def restored(self, step: Step) -> ContactState | None:
+        """Return the whole state."""
+        return state_of(step)
+
     # --- what a step leaves -------------------------------------------------------------------------------
 
     def _more_fields(self, solution: ContactState) -> dict[str, NDArray[Any]]:

@@ -262,8 +262,14 @@ class Store:
                 f"no load step of {self.path} was finished, so it has to be run from the beginning"
             )
         last = None
-        for last in journal:
-            self.heads.append(last.head)
+        try:
+            for last in journal:
+                self.heads.append(last.head)
+        except DeckError as error:
+            error.add_note(
+                f"without it and those after it, hexcontact resume goes on after step {len(self.heads)}"
+            )
+            raise
         self.metadata = journal.metadata
         self._in_the_way = self.path.exists() and not ours
         if self._in_the_way and self.path.stat().st_mtime > journal.records[0].stat().st_mtime:

@@ -234,7 +234,7 @@ def test_an_unfinished_run_is_not_overwritten_by_accident(out: Path) -> None:
     written(out, count=2, planned=5)
     before = content(out.parent)
     with pytest.raises(
-        DeckError, match=r"out\.nc\.d holds 2 finished steps of an unfinished run; hexcontact info "
+        DeckError, match=r"out\.nc\.d holds 2 finished steps of an unfinished run; hexcontact resume "
     ):
         Store(out, Metadata())
     assert content(out.parent) == before
@@ -320,7 +320,9 @@ def test_a_step_that_cannot_be_committed_leaves_those_before(
         store.append(made_step(2))
     monkeypatch.undo()
     [note] = caught.value.__notes__
-    assert note.startswith(f"2 of 9 load steps are finished and kept in {journal_of(out)}; hexcontact info ")
+    assert note.startswith(
+        f"2 of 9 load steps are finished and kept in {journal_of(out)}; to go on: hexcontact "
+    )
     assert sorted(p.name for p in journal_of(out).iterdir()) == ["000001.npz", "000002.npz", "stopped.txt"]
     assert_array_equal(open_result(out).pressure.sel(step=2), made_step(1).fields["pressure"])
 

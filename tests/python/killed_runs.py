@@ -1,0 +1,164 @@
+"""Kill runs at random moments and resume them; started by test_resume.py with one thread.
+
+Each run is a fork of this process, which has loaded everything but solved nothing; that takes milliseconds
+where a new process takes a second. ``python killed_runs.py FOLDER COUNT SEED`` prints a line for each run: when it
+was killed each time, and how many finished steps there were.
+"""
+
+import builtins
+import os
+import random
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import netCDF4  # noqa: F401
+import numpy as np
+import psutil  # noqa: F401
+import xarray  # noqa: F401
+
+import hexcontact
+from hexcontact import restart, store  # noqa: F401
+from hexcontact.case import Case
+from hexcontact.result import Step
+
+CALLS = (  # what a run does to the disk
+    *((os, name) for name in ("fsync", "replace", "unlink", "rmdir", "ftruncate", "pwrite", "mkdir", "open")),
+    (np, "savez"),
+    (store, "write"),
+    (builtins, "open"),
+)
+MOST_KILLS = 3  # of one run
+PRESS_AND_SHEAR = [{"normal_load": 20.0, "steps": 3}, {"tangential_load_x": 1.0, "steps": 3}]
+
+
+def made() -> Case:
+    """Return a case of six steps, some milliseconds each."""
+    sphere = {"young_modulus": 432e9, "poisson_ratio": 0.32, "surface": {"shape": "sphere", "radius": 1e-3}}
+    return Case(
+        body_1=sphere,
+        body_2={"young_modulus": 72e9, "poisson_ratio": 0.32},
+        nodes_in_radius=3,
+        friction_coefficient=0.2,
+        loads=PRESS_AND_SHEAR,
+    )
+
+
+def in_fork(work: Callable[[], object], delay: float | None = None) -> int:
+    """Do `work` in a process of its own, killed after `delay` seconds; return its status, 0 if it is done."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            work()
+            code = 0
+        except BaseException:
+            traceback.print_exc()
+        os._exit(code)
+    if delay is not None:
+        time.sleep(delay)
+        os.kill(child, signal.SIGKILL)
+    return os.waitpid(child, 0)[1]
+
+
+def dying(work: Callable[[], object], calls: int, before: bool) -> Callable[[], object]:
+    """Have `work` end itself at the given one of its calls to the system, before or after it."""
+    left = calls
+
+    def replaced(original: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            nonlocal left
+            left -= 1
+            if left == 0 and before:
+                os.kill(os.getpid(), signal.SIGKILL)
+            try:
+                return original(*arguments, **options)
+            finally:
+                if left == 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        return call
+
+    def work_with_calls_counted() -> None:
+        store.PUBLISH_INTERVAL = 0.0  # interim outputs, too
+        for module, name in CALLS:
+            setattr(module, name, replaced(getattr(module, name)))
+        work()
+
+    return work_with_calls_counted
+
+
+def steps_of(out: Path) -> int:
+    """Return how many steps can be opened, as a process of its own finds."""
+    reader, writer = os.pipe()
+
+    def look() -> None:
+        try:
+            result = hexcontact.open_result(out)
+        except hexcontact.DeckError as error:
+            assert "there is no file" in str(error), error
+            number = 0
+        else:
+            number = len(result)
+            assert np.isfinite(result.dataset["pressure"].values).all()
+        os.write(writer, bytes([number]))
+
+    assert in_fork(look) == 0
+    number = os.read(reader, 1)[0]
+    os.close(reader)
+    os.close(writer)
+    return number
+
+
+def main(folder: Path, count: int, seed: int) -> None:
+    """Kill and resume `count` runs."""
+    rng = random.Random(seed)
+    assert in_fork(lambda: made().run(folder / "whole.nc")) == 0
+    began = time.monotonic()
+    assert in_fork(lambda: made().run(folder / "timed.nc")) == 0
+    duration = time.monotonic() - began
+    kills = 0
+    for number in range(count):
+        out = folder / f"{number}.nc"
+        committed = folder / f"{number}.txt"
+        story: list[str] = []
+        kept = 0
+        for attempt in range(MOST_KILLS + 1):
+
+            def note(step: Step, path: Path = committed) -> None:
+                path.write_bytes(bytes([step.number]))
+
+            def work(out: Path = out, note: Callable[[Step], None] = note) -> None:
+                if not out.exists() and not store.Journal(store.journal_of(out)):
+                    made().run(out, on_step=note)
+                else:
+                    hexcontact.resume(out, on_step=note)
+
+            if attempt == MOST_KILLS:
+                status = in_fork(work)
+            elif rng.random() < 0.5:
+                calls, before = rng.randint(1, 100), rng.random() < 0.5
+                status = in_fork(dying(work, calls, before))
+                story.append(f"call {calls} {'before' if before else 'after'}")
+            else:
+                delay = rng.uniform(0.0, duration)
+                status = in_fork(work, delay)
+                story.append(f"{delay:.4f} s")
+            if status == 0:
+                break
+            assert os.WIFSIGNALED(status), f"{out}: {story}: failed with {status}"
+            kills += 1
+            told = committed.read_bytes() if committed.exists() else b""
+            known, kept = max(kept, *told, 0), steps_of(out)
+            assert kept >= known, f"{out}: {story}: {known} steps were finished, {kept} are there"
+            story.append(f"{kept} steps")
+        print(number, *story, "finished", sep=", ", flush=True)
+    print("kills", kills)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))

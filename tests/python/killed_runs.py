@@ -1,8 +1,8 @@
 """Kill runs at random moments and resume them; started by test_resume.py with one thread.
 
 Each run is a fork of this process, which has loaded everything but solved nothing; that takes milliseconds
-where a new process takes a second. ``python killed_runs.py FOLDER COUNT SEED`` prints a line for each run: when
-it was killed each time, and how many finished steps there were.
+where a new process takes a second. ``python killed_runs.py FOLDER COUNT SEED`` prints for each run
+when it was killed, and how many finished steps there were.
 """
 
 import builtins

@@ -117,7 +117,7 @@ def test_a_run_that_went_on_is_to_the_bit_one_in_one_go(tmp_path: Path, kind: st
         out = tmp_path / f"cut{after}.nc"
         stopped(case, out, after)
         seen: list[int] = []
-        result = hexcontact.resume(out, on_step=lambda step, seen=seen: seen.append(step.number))
+        result = hexcontact.resume(out, on_step=lambda step: seen.append(step.number))  # noqa: B023
         assert seen == list(range(after + 1, count + 1))
         assert result.complete
         same(out, tmp_path / "whole.nc")

@@ -373,6 +373,68 @@ def schema(
     print(f'written: {output}; first line of a deck that uses it: "#:schema {output}"')
 
 
+@app.command(epilog="Example: hexcontact study cases/study_friction.toml --jobs 4")
+@_guarded
+def study(
+    file: Annotated[
+        Path, typer.Argument(metavar="STUDY", help="The study, a TOML file.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="Result; default: the study's output, or STUDY.nc here. Cases go beside it.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786.")
+    ] = None,
+    slurm: Annotated[bool, typer.Option("--slurm", help="Print a job array for sbatch instead.")] = False,
+    case: Annotated[
+        int | None, typer.Option(metavar="N", help="Run only case N (what a job array does).")
+    ] = None,
+    collect: Annotated[
+        bool, typer.Option("--collect", help="Run nothing, put together what is there.")
+    ] = False,
+    retry: Annotated[bool, typer.Option("--retry", help="Run cases that failed again.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    from . import study_command as command
+    from .study import Study
+
+    if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:
+        raise DeckError("expected only one of --jobs, --dask, --slurm, --case and --collect")
+    planned = Study.from_toml(file, output)
+    if slurm:
+        print(command.slurm_script(planned, file, retry) or "# no case is missing")
+        return
+    if case is not None:
+        outcome = planned.run_case(case, retry)
+        if outcome.exit_code:
+            _fail(outcome.message, outcome.exit_code)
+        return
+    if collect:
+        planned.collect()
+    else:
+        cancel = threading.Event()
+        options = {"jobs": jobs, "dask": dask, "retry": retry, "watcher": command.watcher(quiet)}
+        work, over = command.run_in_background(planned, cancel, options)
+        with _news() as news:
+            try:
+                _in_background(work, news)
+            except _Interrupted as signaled:
+                cancel.set()
+                over.wait()
+                _fail(f"interrupted; {command.interrupted(planned)}", signaled.exit_code)
+    if code := command.report(planned, quiet):
+        raise typer.Exit(code)
+
+
 @app.command(epilog="Example: hexcontact new sphere")
 @_guarded
 def new(

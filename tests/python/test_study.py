@@ -1,0 +1,530 @@
+"""Studies: cases planned and checked, run in processes, on Dask, as a job array; failures, re-runs, interruptions."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+import xarray
+from numpy.testing import assert_allclose, assert_array_equal
+from typer.testing import CliRunner
+
+import hexcontact
+from hexcontact import Case, DeckError, overrides, study_run
+from hexcontact.cli import app
+from hexcontact.study import Study, run_study
+from hexcontact.study_run import Job, LocalPool, solve_case
+
+PACKAGE = Path(hexcontact.__file__).parents[1]
+CASES = Path(__file__).parents[2] / "cases"
+ENVIRONMENT = {
+    **{key: value for key, value in os.environ.items() if key not in ("HEXCONTACT_DEBUG", "COLUMNS")},
+    "PYTHONPATH": os.pathsep.join(filter(None, [str(PACKAGE), os.environ.get("PYTHONPATH", "")])),
+    "OMP_NUM_THREADS": "1",
+}
+
+DECK = """
+title = "A sphere"
+[body.1]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+surface = { shape = "sphere", radius = "10 mm" }
+[body.2]
+young_modulus = "70 GPa"
+poisson_ratio = 0.33
+[grid]
+nodes_in_radius = 8
+[[load]]
+normal_load = "100 N"
+steps = 2
+[output]
+file = "elsewhere.nc"
+"""
+SHEARED = DECK.replace("[grid]", "[friction]\ncoefficient = 0.3\n[grid]") + (
+    '[[load]]\ntangential_load_x = "10 N"\nsteps = 2\n'
+)
+# A long case: a step takes some milliseconds, so that there is time to end it in the middle.
+LONG = DECK.replace("nodes_in_radius = 8", "nodes_in_radius = 40").replace("steps = 2", "steps = 400")
+
+STUDY = """
+deck = "deck.toml"
+[[parameter]]
+key = "load.1.normal_load"
+values = ["50 N", "0.1 kN"]
+[[parameter]]
+key = "body.1.surface.radius"
+name = "radius"
+range = ["5 mm", "0.02"]
+count = 3
+scale = "log"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to work in, with a deck and a study in it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
+    (tmp_path / "deck.toml").write_text(DECK)
+    (tmp_path / "study.toml").write_text(STUDY.replace('"0.02"', "0.02"))
+    return tmp_path
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in this process; what it runs is in processes of its own."""
+    result = CliRunner().invoke(app, ["study", *arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return subprocess.CompletedProcess(arguments, result.exit_code, result.stdout, result.stderr)
+
+
+def at_once(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Solve cases in this process, which is quicker; return the list of those that were solved."""
+    solved: list[str] = []
+
+    def outcomes(self: Any, jobs: Any, cancel: Any) -> Any:
+        for job in jobs:
+            solved.append(job.hash)
+            yield solve_case(job)
+
+    monkeypatch.setattr(LocalPool, "outcomes", outcomes)
+    return solved
+
+
+# --- plans --------------------------------------------------------------------------------------------------
+
+
+def test_one_key_of_a_deck_is_replaced_in_a_copy() -> None:
+    deck = {"load": [{"steps": 1}, {"steps": 2}], "grid": {"spacing": 1.0}}
+    changed = overrides.apply(deck, "load.2.steps", 5)
+    assert changed == {"load": [{"steps": 1}, {"steps": 5}], "grid": {"spacing": 1.0}}
+    assert deck["load"][1] == {"steps": 2}  # type: ignore[index]
+    assert overrides.apply(deck, "friction.coefficient", 0.1)["friction"] == {"coefficient": 0.1}
+    for path in ("load.3.steps", "load.0.steps", "grid.spacing.x"):
+        with pytest.raises(DeckError, match=re.escape(path)):
+            overrides.apply(deck, path, 1)
+
+
+def test_grid_has_every_value_with_every_other_in_si(folder: Path) -> None:
+    study = Study.from_toml("study.toml")
+    force, radius = study.plan.axes
+    assert (force.name, force.units, radius.name, radius.units) == ("load_1_normal_load", "N", "radius", "m")
+    assert [force.coordinate(value) for value in force.values] == [50.0, 100.0]
+    assert_allclose([radius.coordinate(value) for value in radius.values], [5e-3, 10e-3, 20e-3], rtol=1e-15)
+    assert len(study) == 6
+    last = Case.from_text(study.cases[4].deck)
+    assert last.load_steps[-1].ends["normal_load"] == 100.0 if hasattr(last.load_steps[-1], "ends") else True
+    assert_allclose(last.body_1.surface.radius, 10e-3, rtol=1e-15)  # type: ignore[union-attr]
+    assert "elsewhere" not in study.cases[0].deck
+    assert len({case.hash for case in study.cases}) == 6
+
+
+def test_zip_takes_values_side_by_side(folder: Path) -> None:
+    values = {"load.1.normal_load": [10.0, 20.0], "solver.method": ["fft", "direct"]}
+    study = Study("deck.toml", values, combine="zip")
+    assert [dict(case.settings) for case in study.cases] == [
+        {"load.1.normal_load": 10.0, "solver.method": "fft"},
+        {"load.1.normal_load": 20.0, "solver.method": "direct"},
+    ]
+
+
+def test_latin_hypercube_is_one_and_the_same_for_a_seed(folder: Path) -> None:
+    parameters = {
+        "load.1.normal_load": {"range": ["1 N", "100 N"], "scale": "log"},
+        "load.1.steps": {"range": [1, 9]},
+        "body.2.poisson_ratio": {"values": [0.2, 0.3]},
+    }
+    first, again, other = (
+        Study("deck.toml", parameters, combine="lhs", samples=20, seed=seed).cases for seed in (7, 7, 8)
+    )
+    assert [case.hash for case in first] == [case.hash for case in again]
+    assert [case.hash for case in first] != [case.hash for case in other]
+    loads = np.array([case.settings["load.1.normal_load"] for case in first])
+    strata = np.floor(np.log10(loads) / 2 * 20).astype(int)  # one in each twentieth of the range
+    assert_array_equal(np.sort(strata), np.arange(20))
+    assert {type(case.settings["load.1.steps"]) for case in first} == {int}
+    assert sorted(case.settings["body.2.poisson_ratio"] for case in first) == [0.2] * 10 + [0.3] * 10
+
+
+WRONG = [
+    (
+        "values",
+        {"load.1.normal_load": ["50 N", "-1 N"]},
+        r'study: parameter load\.1\.normal_load = "-1 N": expected',
+    ),
+    ("unit", {"load.1.normal_load": ["50 mm"]}, r'parameter load\.1\.normal_load = "50 mm": .*a length'),
+    (
+        "key",
+        {"load.1.normal_lod": [1.0]},
+        r"parameter load\.1\.normal_lod: unknown key; did you mean normal_load",
+    ),
+    ("entry", {"load.3.steps": [1]}, r"parameter load\.3\.steps: expected an entry from 1 to 1"),
+    ("file", {"output.file": ["a.nc"]}, r"parameter output\.file: a study names the files"),
+    (
+        "range",
+        {"load.1.normal_load": {"range": ["1 N", "x"], "count": 2}},
+        r'load\.1\.normal_load = "x": expected',
+    ),
+    ("count", {"load.1.normal_load": {"range": [1, 2]}}, r"parameter\.1\.count: missing"),
+    ("log", {"load.1.approach": {"range": [-1, 1], "count": 2, "scale": "log"}}, "above 0|not both"),
+    ("word", {"solver.method": {"range": ["fft", "direct"], "count": 2}}, "needs a key that is a number"),
+    ("twice", {"load.1.normal_load": ["1 N", 1.0]}, "has the value 1.0 twice"),
+    ("both", {"load.1.shift_x": [1e-6]}, r"friction|\(in case 1: load\.1\.shift_x"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "pattern"), [row[1:] for row in WRONG], ids=[row[0] for row in WRONG])
+def test_wrong_parameters_are_named_before_anything_runs(folder: Path, parameters: Any, pattern: str) -> None:
+    with pytest.raises(DeckError, match=pattern):
+        Study("deck.toml", parameters)
+    assert sorted(path.name for path in folder.iterdir()) == ["deck.toml", "study.toml"]
+
+
+def test_one_invalid_case_stops_the_study_with_one_sentence(folder: Path) -> None:
+    (folder / "deck.toml").write_text(SHEARED)
+    (folder / "study.toml").write_text(
+        'deck = "deck.toml"\n'
+        '[[parameter]]\nkey = "friction.coefficient"\nvalues = [0.3, 0.05]\n'  # 0.05 does not hold 10 N
+        '[[parameter]]\nkey = "body.1.poisson_ratio"\nvalues = [0.2, 0.3, 0.7]\n'
+    )
+    done = command("study.toml")
+    assert done.returncode == 2
+    lines = done.stderr.splitlines()
+    assert len(lines) == 2
+    assert "study.toml: parameter body.1.poisson_ratio = 0.7: expected a number" in lines[0]
+    assert "load.2.tangential_load_x" in lines[1]
+    assert "(in case 4: friction.coefficient = 0.05, body.1.poisson_ratio = 0.2)" in lines[1]
+    assert not (folder / "study").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "pattern"),
+    [
+        ("[[parameter]]", "[[paramter]]", "unknown key; did you mean parameter"),
+        ("deck.toml", "dock.toml", "dock.toml: no such file"),
+        ("count = 3", "count = 1", r"parameter\.2\.count = 1: expected a whole number of at least 2"),
+        ("deck =", 'combine = "zip"\ndeck =', "zip needs as many values of each; they have 2, 3"),
+        ("deck =", 'combine = "lhs"\ndeck =', "samples: missing"),
+        ('name = "radius"', 'name = "approach"', "the name approach is taken"),
+    ],
+)
+def test_wrong_study_files_are_told_so(folder: Path, old: str, new: str, pattern: str) -> None:
+    (folder / "study.toml").write_text((folder / "study.toml").read_text().replace(old, new))
+    done = command("study.toml")
+    assert done.returncode == 2
+    assert re.search(pattern, done.stderr), done.stderr
+
+
+def test_a_file_or_folder_of_something_else_is_left_alone(folder: Path) -> None:
+    (folder / "study").mkdir()
+    (folder / "study/notes.txt").write_text("mine")
+    assert "holds other things" in command("study.toml").stderr
+    (folder / "other.nc").write_text("mine")
+    assert "not the result of a study" in command("study.toml", "--output", "other.nc").stderr
+    assert (folder / "other.nc").read_text() == "mine"
+
+
+# --- runs ---------------------------------------------------------------------------------------------------
+
+
+def test_study_in_processes_gives_what_single_runs_give(folder: Path) -> None:
+    done = command("study.toml", "--jobs", "2")
+    assert done.returncode == 0, done.stderr
+    assert "6/6" in done.stderr
+    with xarray.open_dataset("study.nc") as dataset:
+        assert dict(dataset.sizes) == {"load_1_normal_load": 2, "radius": 3}
+        assert dataset.load_1_normal_load.attrs["units"] == "N"
+        assert dataset.load_1_normal_load.attrs["deck_key"] == "load.1.normal_load"
+        assert (dataset.status == 0).all()
+        assert dataset.status.attrs["flag_meanings"] == "done failed missing"
+        alone = Case.from_toml("deck.toml", {"load.1.normal_load": 50.0, "body.1.surface.radius": 0.02}).run()
+        there = dataset.sel(load_1_normal_load=50.0, radius=0.02)
+        for name in ("approach", "max_pressure", "elastic_energy"):
+            assert_allclose(there[name], alone[name][-1], rtol=1e-14)
+        # Hertz: approach = (9 P^2/16 E*^2 R)^(1/3); the mesh moves with the contact radius
+        hertz = (dataset.load_1_normal_load**2 / dataset.radius) ** (1 / 3)
+        ratio = dataset.approach / hertz
+        assert_allclose(ratio, float(ratio[0, 0]), rtol=1e-3)
+
+
+def test_rerun_does_only_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    solved = at_once(monkeypatch)
+    first = run_study("study.toml")
+    assert first is not None
+    assert len(solved) == 6
+    solved.clear()
+    again = run_study("study.toml")
+    assert again is not None
+    assert solved == []
+    xarray.testing.assert_identical(first, again)
+    # one file lost, one damaged
+    lost, damaged = Study.from_toml("study.toml").cases[1:3]
+    (folder / "study/0002.nc").unlink()
+    (folder / "study/0003.nc").write_bytes(b"\x89HDF but no more")
+    run_study("study.toml")
+    assert solved == [lost.hash, damaged.hash]
+    # a value more: the others keep their files
+    solved.clear()
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(text.replace('["50 N"', '["20 N", "50 N"'))
+    more = run_study("study.toml")
+    assert more is not None
+    assert len(solved) == 3
+    assert_array_equal(more.case_number, [[7, 8, 9], [1, 2, 3], [4, 5, 6]])
+    assert_array_equal(more.approach[1:], first.approach)
+    # another deck: all of them again
+    solved.clear()
+    (folder / "deck.toml").write_text(DECK.replace("70 GPa", "71 GPa"))
+    changed = run_study("study.toml")
+    assert changed is not None
+    assert len(solved) == 9
+    assert (changed.approach < more.approach).all()
+    # a comment in the deck changes nothing
+    solved.clear()
+    (folder / "deck.toml").write_text("# stiffer\n" + DECK.replace("70 GPa", "71 GPa"))
+    run_study("study.toml")
+    assert solved == []
+
+
+FAILING = """
+deck = "deck.toml"
+combine = "zip"
+steps = "all"
+[[parameter]]
+key = "solver.tolerance"
+values = [1e-8, 1e-14, 1e-7]
+[[parameter]]
+key = "load.2.steps"
+values = [1, 2, 3]
+"""
+
+
+def test_a_case_that_fails_is_kept_and_does_not_stop_the_rest(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "deck.toml").write_text(SHEARED)  # no step gets to 1e-14
+    (folder / "study.toml").write_text(FAILING)
+    done = command("study.toml", "--jobs", "1")
+    assert done.returncode == 3
+    named = "case 2 (solver.tolerance = 1e-14, load.2.steps = 2) failed: "
+    assert named in done.stderr
+    with xarray.open_dataset("study.nc") as dataset:
+        assert_array_equal(dataset.status, [0, 1, 0])
+        assert_array_equal(dataset.exit_code, [0, 3, 0])
+        assert "tolerance" in str(dataset.message[1].item()) or "converge" in str(dataset.message[1].item())
+        assert dict(dataset.sizes) == {"case": 3, "step": 5}
+        loads = dataset.tangential_load_x
+        assert_allclose(loads[0], [0, 0, 10, np.nan, np.nan], atol=1e-6)
+        assert_allclose(loads[2], [0, 0, 10 / 3, 20 / 3, 10], atol=1e-5)
+        assert np.isnan(loads[1]).all()
+        assert_array_equal(dataset.solver_tolerance, [1e-8, 1e-14, 1e-7])
+    # it fails for good: it is not tried again unless told to
+    solved = at_once(monkeypatch)
+    assert command("study.toml").returncode == 3
+    assert solved == []
+    assert command("study.toml", "--retry").returncode == 3
+    assert len(solved) == 1
+
+
+def test_job_array_runs_case_by_case(folder: Path) -> None:
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(text + '[slurm]\ntime = "1:00:00"\ncpus_per_task = 4\n')
+    assert command("study.toml", "--case", "2").returncode == 0
+    script = command("study.toml", "--slurm").stdout
+    assert "#SBATCH --array=1,3-6\n" in script
+    assert "#SBATCH --cpus-per-task=4\n" in script
+    assert subprocess.run(["sh", "-n"], input=script, text=True).returncode == 0
+    last = script.splitlines()[-1]
+    assert last.startswith("exec hexcontact study ")
+    # the line that a task runs, from another folder
+    (folder / "elsewhere").mkdir()
+    words = last.replace("exec hexcontact", f"exec {sys.executable} -m hexcontact")
+    environment = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "3"}
+    assert subprocess.run(["sh", "-c", words], env=environment, cwd=folder / "elsewhere").returncode == 0
+    assert sorted(path.name for path in (folder / "study").glob("*.nc")) == ["0002.nc", "0003.nc"]
+    assert command("study.toml", "--case", "7").returncode == 2
+    collected = command("study.toml", "--collect")
+    assert collected.returncode == 3
+    assert "4 of 6 cases have not been run" in collected.stderr
+    with xarray.open_dataset("study.nc") as dataset:
+        assert_array_equal(dataset.status, [[2, 0, 0], [2, 2, 2]])
+
+
+def worker_of(process: int) -> psutil.Process:
+    """Wait for a worker that solves something: a process below that uses the core."""
+    for _ in range(300):
+        with contextlib.suppress(psutil.Error):
+            for child in psutil.Process(process).children(recursive=True):
+                if "spawn_main" in " ".join(child.cmdline()) and any(Path().glob("study/*.nc.d/*.npz")):
+                    return child
+        time.sleep(0.05)
+    raise AssertionError("no worker")
+
+
+def start() -> subprocess.Popen[str]:
+    (Path() / "deck.toml").write_text(LONG)
+    (Path() / "study.toml").write_text(
+        'deck = "deck.toml"\n[[parameter]]\nkey = "load.1.steps"\nvalues = [2, 400]\n'
+    )
+    words = [sys.executable, "-m", "hexcontact", "study", "study.toml", "--jobs", "1"]
+    return subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def wait_for_the_second(process: int) -> psutil.Process:
+    for _ in range(300):
+        if Path("study/0001.nc").exists() and any(Path().glob("study/0002.nc.d/*.npz")):
+            return worker_of(process)
+        time.sleep(0.05)
+    raise AssertionError("the second case has not begun")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_study_that_is_stopped_goes_on_where_it_was(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    process = start()
+    worker = wait_for_the_second(process.pid)
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)  # as a terminal does, to the workers too
+    else:
+        process.send_signal(number)
+    _, told = process.communicate(timeout=30)
+    assert "Traceback" not in told
+    assert "leaked" not in told
+    if number != signal.SIGKILL:
+        assert process.returncode == 128 + number
+        assert "interrupted; 1 of 2 cases are finished and kept in study/" in told
+    psutil.wait_procs([worker], timeout=10)
+    assert not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE
+    assert not Path("study/0002.json").exists()
+    assert not Path("study.nc").exists()
+    assert not list(Path().glob("*.tmp"))
+    # the rest, made short; the first case stays
+    first = Path("study/0001.nc").stat().st_mtime_ns
+    text = Path("study.toml").read_text()
+    Path("study.toml").write_text(text.replace("400", "4"))
+    solved = at_once(monkeypatch)
+    dataset = run_study("study.toml")
+    assert dataset is not None
+    assert len(solved) == 1
+    assert (dataset.status == 0).all()
+    assert Path("study/0001.nc").stat().st_mtime_ns == first
+
+
+def test_a_worker_that_is_killed_takes_only_its_own_case_with_it(folder: Path) -> None:
+    process = start()
+    text = 'deck = "deck.toml"\n[[parameter]]\nkey = "load.1.steps"\nvalues = [2, 400]\n'
+    assert Path("study.toml").read_text() == text
+    wait_for_the_second(process.pid).kill()
+    _, told = process.communicate(timeout=30)
+    assert process.returncode == 3
+    assert "case 2 (load.1.steps = 400) failed: its process died" in told
+    assert json.loads(Path("study/0002.json").read_text())["exit_code"] == 4
+    assert [case.position for case in Study.from_toml("study.toml").missing()] == [1]  # worth another try
+
+
+def test_two_runs_of_one_study_do_not_meet(folder: Path) -> None:
+    lock = Study.from_toml("study.toml").folder.lock()
+    try:
+        done = command("study.toml")
+    finally:
+        lock.release()
+    assert done.returncode == 2
+    assert "is being written by another run" in done.stderr
+
+
+def test_a_case_that_another_run_is_at_is_no_failure_of_the_case(folder: Path) -> None:
+    from hexcontact.solve import metadata_of
+    from hexcontact.store import Store
+
+    study = Study.from_toml("study.toml")
+    case = study.missing()[0]
+    with Store(study.folder.path(case), metadata_of(Case.from_text(case.deck))):
+        outcome = study.run_case(1)
+    assert outcome.exit_code == 2
+    assert not outcome.lasting
+    assert study.missing()[0] == case
+
+
+# --- Dask ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_on_dask_a_killed_worker_loses_nothing(folder: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    (folder / "deck.toml").write_text(LONG)
+    study = Study("deck.toml", {"load.1.steps": [2, 3, 120, 4]}, output="study.nc")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        pids = {worker.pid for worker in cluster.workers.values()}
+        killed: list[int] = []
+
+        class Killer(hexcontact.study.StudyWatcher):
+            def finished(self, case: Any, outcome: Any) -> None:
+                if killed:
+                    return
+                for _ in range(200):  # the worker at the long case, by the lock it holds on its journal
+                    for lock in Path().glob("study/0003.*.nc.d/lock"):
+                        with contextlib.suppress(OSError, ValueError):
+                            holder = json.loads(lock.read_text())["process"]
+                            if list(lock.parent.glob("*.npz")):
+                                os.kill(holder, signal.SIGKILL)
+                                killed.append(holder)
+                                return
+                    time.sleep(0.05)
+
+        dataset = study.run(dask=cluster.scheduler_address, watcher=Killer())
+    assert pids
+    assert len(killed) == 1
+    assert dataset is not None
+    assert (dataset.status == 0).all(), dataset.message.values
+    assert sorted(path.name for path in Path("study").iterdir()) == [
+        *("0001.nc", "0002.nc", "0003.nc", "0004.nc", "index.json")
+    ]
+    alone = Case.from_toml("deck.toml", {"load.1.steps": 2}).run()
+    assert_allclose(dataset.approach[0], alone.approach[-1], rtol=1e-14)
+
+
+def test_where_no_scheduler_answers_there_is_one_sentence(folder: Path) -> None:
+    pytest.importorskip("distributed")
+    done = command("study.toml", "--dask", "nonsense://")
+    assert done.returncode == 2
+    assert "no Dask scheduler answers at nonsense://" in done.stderr
+
+
+def test_without_dask_there_is_one_sentence(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    done = command("study.toml", "--dask", "tcp://127.0.0.1:1")
+    assert done.returncode == 2
+    assert "pip install distributed" in done.stderr
+
+
+# --- the example --------------------------------------------------------------------------------------------
+
+
+def test_example_is_a_good_study(folder: Path) -> None:
+    study = Study.from_toml(CASES / "study_friction.toml")
+    assert len(study) == 15
+    assert {axis.name for axis in study.plan.axes} == {"friction_coefficient", "young_modulus_2"}
+
+
+def test_outcome_of_whatever_goes_wrong_is_told_not_raised(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: Any, **__: Any) -> Any:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(Case, "from_text", broken)
+    outcome = study_run.solve_case(Job("x", DECK, str(folder / "a.nc")))
+    assert (outcome.exit_code, outcome.message) == (1, "ZeroDivisionError: by zero")

@@ -1,4 +1,4 @@
-"""Fill the tables of docs/deck.md from the models, so that they say what the program checks.
+"""Fill the tables of docs/deck.md and docs/studies.md from the models: they say what the program checks.
 
 Run it after a change of the deck format: ``python docs/deck_tables.py``.
 """
@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from hexcontact import deck, load_series, surfaces
+from hexcontact import deck, load_series, study_deck, surfaces
 from hexcontact.messages import shown
 from hexcontact.validation import (
     Flag,
@@ -27,6 +27,7 @@ from hexcontact.validation import (
 )
 
 PAGE = Path(__file__).with_name("deck.md")
+PAGES = (PAGE, PAGE.with_name("studies.md"))
 TABLES: dict[str, type[Table]] = {
     "deck": deck.Deck,
     "body": deck.Body,
@@ -37,6 +38,9 @@ TABLES: dict[str, type[Table]] = {
     "series": load_series.Series,
     "columns": load_series.Columns,
     "output": deck.Output,
+    "study": study_deck.StudyFile,
+    "parameter": study_deck.Parameter,
+    "dask": study_deck.Dask,
 }
 BLOCK = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -136,4 +140,5 @@ def filled(text: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for page in PAGES:
+        page.write_text(filled(page.read_text(encoding="utf-8")), encoding="utf-8")

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .restart import resume
     from .result import Result, Step
     from .store import open_result
+    from .study import Study, run_study
 
 __version__ = "0.2.0"
 
@@ -44,8 +45,10 @@ _HOME = {
     "NormalContact": "native",
     "Result": "result",
     "Step": "result",
+    "Study": "study",
     "open_result": "store",
     "resume": "restart",
+    "run_study": "study",
 }
 _MODULES = ("analytic", "influence", "plotting")
 
@@ -63,11 +66,13 @@ __all__ = [
     "ResourceError",
     "Result",
     "Step",
+    "Study",
     "analytic",
     "influence",
     "open_result",
     "plotting",
     "resume",
+    "run_study",
 ]
 
 

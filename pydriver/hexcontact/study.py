@@ -209,9 +209,10 @@ class Study:
             missing = self.missing(retry)
             by_hash = {case.hash: case for case in missing}
             work = [Job(case.hash, case.deck, os.path.realpath(self.folder.path(case))) for case in missing]
+            pool = self._pool(jobs, dask, len(work)) if work else None
             with watcher.watching(self, len(missing)):
-                if work:
-                    self._work(work, by_hash, self._pool(jobs, dask, len(work)), watcher, cancel)
+                if pool is not None:
+                    self._work(work, by_hash, pool, watcher, cancel)
             return None if cancel.is_set() else self.collect()
         finally:
             lock.release()

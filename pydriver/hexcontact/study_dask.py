@@ -86,16 +86,23 @@ class DaskPool:
 
 
 def _started(where: Dask) -> Any:
+    options = where.options
+    if where.cluster == "local":
+        kind = _package("distributed", "distributed").LocalCluster
+        options = {"n_workers": where.workers, "threads_per_worker": 1, "dashboard_address": None, **options}
+    else:
+        kind = getattr(_package("dask_jobqueue", "dask-jobqueue"), _CLASSES[where.cluster or ""])
     try:
-        if where.cluster == "local":
-            options = {"threads_per_worker": 1, "dashboard_address": None, **where.options}
-            return _package("distributed", "distributed").LocalCluster(n_workers=where.workers, **options)
-        jobqueue = _package("dask_jobqueue", "dask-jobqueue")
-        cluster = getattr(jobqueue, _CLASSES[where.cluster or ""])(**where.options)
-        cluster.scale(where.workers)
-        return cluster
-    except (TypeError, ValueError) as error:
-        raise DeckError(f"dask.options: the {where.cluster} cluster refuses them ({error})") from None
+        cluster = kind(**options)
+        if where.cluster != "local":
+            cluster.scale(where.workers)
+    except Exception as error:  # each kind of cluster has its own ways to refuse what it does not know
+        cause = error.__cause__ or error
+        words = f"{type(cause).__name__}: {cause}".splitlines()[0]
+        raise DeckError(
+            f"dask.cluster = {where.cluster}: cannot be started with these options ({words})"
+        ) from None
+    return cluster
 
 
 def _outcome(future: Any, job: Job) -> Outcome:

@@ -63,6 +63,8 @@ class Parameter(Table):
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Values or a range, never both."""
+        if data.get("key") == "":
+            yield "key", "expected a dotted key of the deck, such as load.1.normal_load"
         if "values" not in data and "range" not in data:
             yield "values", "missing; expected values or range"
         if "values" in data:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import ConvergenceError, DeckError
+from .errors import ConvergenceError, DeckError, ResourceError
 from .lock import Lock
 from .netcdf import flush
 from .study_plan import Plan, PlannedCase, hash_of
@@ -113,12 +113,17 @@ class StudyFolder:
 
     def _write(self, name: str, content: Any) -> None:
         temporary = self.folder / f"{name}.{os.getpid()}.tmp"
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump(content, file, indent=1, ensure_ascii=False, default=str)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, self.folder / name)
-        flush(self.folder)
+        try:
+            with temporary.open("w", encoding="utf-8") as file:
+                json.dump(content, file, indent=1, ensure_ascii=False, default=str)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, self.folder / name)
+            flush(self.folder)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise ResourceError(f"cannot write {self.folder / name}: {error.strerror or error}") from error
 
     def number(self, case: PlannedCase) -> int:
         """Return the number of a case, from 1."""

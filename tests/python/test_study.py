@@ -1,13 +1,16 @@
-"""Studies: cases planned and checked, run in processes, on Dask, as a job array; failures, re-runs, interruptions."""
+"""Studies: cases planned and checked, run in processes, on Dask, as a job array; failures, interruptions."""
 
 import contextlib
+import importlib
 import json
 import os
+import pty
 import re
 import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +126,6 @@ def test_grid_has_every_value_with_every_other_in_si(folder: Path) -> None:
     assert_allclose([radius.coordinate(value) for value in radius.values], [5e-3, 10e-3, 20e-3], rtol=1e-15)
     assert len(study) == 6
     last = Case.from_text(study.cases[4].deck)
-    assert last.load_steps[-1].ends["normal_load"] == 100.0 if hasattr(last.load_steps[-1], "ends") else True
     assert_allclose(last.body_1.surface.radius, 10e-3, rtol=1e-15)  # type: ignore[union-attr]
     assert "elsewhere" not in study.cases[0].deck
     assert len({case.hash for case in study.cases}) == 6
@@ -176,10 +178,19 @@ WRONG = [
         r'load\.1\.normal_load = "x": expected',
     ),
     ("count", {"load.1.normal_load": {"range": [1, 2]}}, r"parameter\.1\.count: missing"),
-    ("log", {"load.1.approach": {"range": [-1, 1], "count": 2, "scale": "log"}}, "above 0|not both"),
+    (
+        "log",
+        {"body.1.poisson_ratio": {"range": [0.1, -0.2], "count": 2, "scale": "log"}},
+        r"ratio = \[0.1, -0.2\]: a logarithmic scale needs bounds above 0",
+    ),
     ("word", {"solver.method": {"range": ["fft", "direct"], "count": 2}}, "needs a key that is a number"),
     ("twice", {"load.1.normal_load": ["1 N", 1.0]}, "has the value 1.0 twice"),
-    ("both", {"load.1.shift_x": [1e-6]}, r"friction|\(in case 1: load\.1\.shift_x"),
+    ("empty", {"": [1]}, "expected a dotted key of the deck"),
+    (
+        "needs friction",
+        {"load.1.shift_x": [1e-6]},
+        r"parameter load\.1\.shift_x = 1e-06: expected 0, or a \[friction\] table",
+    ),
 ]
 
 
@@ -301,8 +312,8 @@ deck = "deck.toml"
 combine = "zip"
 steps = "all"
 [[parameter]]
-key = "solver.tolerance"
-values = [1e-8, 1e-14, 1e-7]
+key = "load.1.approach"
+values = ["5 um", "1 um", "6 um"]
 [[parameter]]
 key = "load.2.steps"
 values = [1, 2, 3]
@@ -312,22 +323,23 @@ values = [1, 2, 3]
 def test_a_case_that_fails_is_kept_and_does_not_stop_the_rest(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (folder / "deck.toml").write_text(SHEARED)  # no step gets to 1e-14
+    # pressed by 1 um the spheres do not hold 10 N, which shows only when it is run
+    (folder / "deck.toml").write_text(SHEARED.replace('normal_load = "100 N"', 'approach = "5 um"'))
     (folder / "study.toml").write_text(FAILING)
     done = command("study.toml", "--jobs", "1")
     assert done.returncode == 3
-    named = "case 2 (solver.tolerance = 1e-14, load.2.steps = 2) failed: "
+    named = 'case 2 (load.1.approach = "1 um", load.2.steps = 2) failed: '
     assert named in done.stderr
     with xarray.open_dataset("study.nc") as dataset:
         assert_array_equal(dataset.status, [0, 1, 0])
         assert_array_equal(dataset.exit_code, [0, 3, 0])
-        assert "tolerance" in str(dataset.message[1].item()) or "converge" in str(dataset.message[1].item())
+        assert "slid" in dataset.message[1].item()
         assert dict(dataset.sizes) == {"case": 3, "step": 5}
         loads = dataset.tangential_load_x
         assert_allclose(loads[0], [0, 0, 10, np.nan, np.nan], atol=1e-6)
         assert_allclose(loads[2], [0, 0, 10 / 3, 20 / 3, 10], atol=1e-5)
         assert np.isnan(loads[1]).all()
-        assert_array_equal(dataset.solver_tolerance, [1e-8, 1e-14, 1e-7])
+        assert_allclose(dataset.load_1_approach, [5e-6, 1e-6, 6e-6], rtol=1e-15)
     # it fails for good: it is not tried again unless told to
     solved = at_once(monkeypatch)
     assert command("study.toml").returncode == 3
@@ -400,8 +412,8 @@ def test_a_study_that_is_stopped_goes_on_where_it_was(
         process.send_signal(number)
     _, told = process.communicate(timeout=30)
     assert "Traceback" not in told
-    assert "leaked" not in told
     if number != signal.SIGKILL:
+        assert "leaked" not in told
         assert process.returncode == 128 + number
         assert "interrupted; 1 of 2 cases are finished and kept in study/" in told
     psutil.wait_procs([worker], timeout=10)
@@ -433,6 +445,24 @@ def test_a_worker_that_is_killed_takes_only_its_own_case_with_it(folder: Path) -
     assert [case.position for case in Study.from_toml("study.toml").missing()] == [1]  # worth another try
 
 
+def test_a_terminal_gets_a_bar(folder: Path) -> None:
+    leader, follower = pty.openpty()
+    words = [sys.executable, "-m", "hexcontact", "study", "study.toml", "--jobs", "1"]
+    environment = ENVIRONMENT | {"TERM": "xterm", "COLUMNS": "120"}
+    process = subprocess.Popen(words, env=environment, stderr=follower, stdout=subprocess.PIPE, text=True)
+    os.close(follower)
+    seen = b""
+    with contextlib.suppress(OSError):  # how a terminal says that nobody writes any more
+        while piece := os.read(leader, 10000):
+            seen += piece
+    os.close(leader)
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert b"6/6" in seen
+    assert b"case 6 (load.1.normal_load" in seen
+    assert out == "written: study.nc, 6 of 6 cases (their files in study/)\n"
+
+
 def test_two_runs_of_one_study_do_not_meet(folder: Path) -> None:
     lock = Study.from_toml("study.toml").folder.lock()
     try:
@@ -459,9 +489,9 @@ def test_a_case_that_another_run_is_at_is_no_failure_of_the_case(folder: Path) -
 # --- Dask ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.filterwarnings("ignore")
 def test_on_dask_a_killed_worker_loses_nothing(folder: Path) -> None:
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     (folder / "deck.toml").write_text(LONG)
     study = Study("deck.toml", {"load.1.steps": [2, 3, 120, 4]}, output="study.nc")
     with distributed.LocalCluster(
@@ -496,8 +526,56 @@ def test_on_dask_a_killed_worker_loses_nothing(folder: Path) -> None:
     assert_allclose(dataset.approach[0], alone.approach[-1], rtol=1e-14)
 
 
+def test_a_study_file_may_start_a_cluster(folder: Path) -> None:
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(text + '[dask]\ncluster = "local"\noptions = { processes = false }\n')
+    done = command("study.toml", "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    with xarray.open_dataset("study.nc") as dataset:
+        assert (dataset.status == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("dask", "pattern"),
+    [
+        ('cluster = "slurm"', "pip install dask-jobqueue"),
+        ('cluster = "local"\noptions = { nonsense = 1, processes = false }', "cannot be started .*nonsense"),
+        ('cluster = "local"\naddress = "tcp://host:1"', "expected either address or cluster"),
+        ('cluster = "cray"', 'dask.cluster = "cray": expected'),
+    ],
+)
+def test_wrong_clusters_are_told_so(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, dask: str, pattern: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "dask_jobqueue", None)
+    (folder / "study.toml").write_text((folder / "study.toml").read_text() + f"[dask]\n{dask}\n")
+    done = command("study.toml")
+    assert done.returncode == 2
+    assert re.search(pattern, done.stderr), done.stderr
+
+
+def test_cluster_of_a_batch_system_gets_its_options(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The classes of dask-jobqueue take options and are scaled; here one of that shape stands for them."""
+    distributed = importlib.import_module("distributed")
+    seen: dict[str, Any] = {}
+
+    class SLURMCluster(distributed.LocalCluster):  # type: ignore[misc,name-defined]
+        def __init__(self, **options: Any) -> None:
+            seen.update(options)
+            super().__init__(n_workers=0, processes=False, dashboard_address=None)
+
+    jobqueue = types.ModuleType("dask_jobqueue")
+    jobqueue.SLURMCluster = SLURMCluster  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "dask_jobqueue", jobqueue)
+    dask = {"cluster": "slurm", "workers": 2, "options": {"cores": 4, "memory": "8GB", "walltime": "1:00:00"}}
+    dataset = Study("deck.toml", {"load.1.normal_load": [1.0, 2.0]}, dask=dask).run()
+    assert seen == dask["options"]
+    assert dataset is not None
+    assert (dataset.status == 0).all()
+
+
 def test_where_no_scheduler_answers_there_is_one_sentence(folder: Path) -> None:
-    pytest.importorskip("distributed")
     done = command("study.toml", "--dask", "nonsense://")
     assert done.returncode == 2
     assert "no Dask scheduler answers at nonsense://" in done.stderr

@@ -409,7 +409,7 @@ def study(
 
     if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case and --collect")
-    planned = Study.from_toml(file, output)
+    planned = Study.from_toml(file, output, check=case is None and not collect)
     if slurm:
         print(command.slurm_script(planned, file, retry) or "# no case is missing")
         return

@@ -97,10 +97,12 @@ class Study:
         data = {**keys, "parameter": list(parameters), "deck": "deck" if given else str(deck)}
         file = StudyFile.parse(data, Source())
         base, text = (dict(deck), "") if isinstance(deck, Mapping) else read_toml(deck)
-        self._set_up(file, base, Source("" if given else str(deck), text), name, output)
+        self._set_up(
+            file, base, Source("" if given else str(deck), text), name, output or file.output or "study.nc"
+        )
 
     @classmethod
-    def from_toml(cls, path: str | Path, output: str | Path | None = None) -> Self:
+    def from_toml(cls, path: str | Path, output: str | Path | None = None, check: bool = True) -> Self:
         """Read a study file.
 
         Parameters
@@ -109,6 +111,8 @@ class Study:
             The study file.
         output : path, optional
             File of the result; default: what the study file says, else its name with .nc in this folder.
+        check : bool
+            Build every case, to see whether all are right.
 
         Raises
         ------
@@ -120,9 +124,8 @@ class Study:
         deck = Path(path).parent / file.deck
         base, deck_text = read_toml(deck)
         study = cls.__new__(cls)
-        study._set_up(
-            file, base, Source(str(deck), deck_text), str(path), output or f"{Path(path).stem}.nc", output
-        )
+        target = output or file.output or f"{Path(path).stem}.nc"
+        study._set_up(file, base, Source(str(deck), deck_text), str(path), target, check)
         return study
 
     def _set_up(
@@ -131,12 +134,12 @@ class Study:
         base: Mapping[str, Any],
         source: Source,
         name: str,
-        output: str | Path | None,
-        wanted: str | Path | None = None,
+        output: str | Path,
+        check: bool = True,
     ) -> None:
         self.file, self.name = file, name
-        self.plan: Plan = study_plan.plan(file, base, source, name)
-        self.output = Path(wanted or file.output or output or "study.nc")
+        self.plan: Plan = study_plan.plan(file, base, source, name, check)
+        self.output = Path(output)
         self.folder = StudyFolder(self.output)
 
     @property

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .case import Case
+from .case_arguments import as_toml
 from .deck import Deck
 from .errors import DeckError
 from .messages import Source, shown
@@ -116,7 +117,7 @@ def described(settings: Mapping[str, Any]) -> str:
     return ", ".join(f"{key} = {shown(value)}" for key, value in settings.items())
 
 
-def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str) -> Plan:
+def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, check: bool = True) -> Plan:
     """Make and check all cases of a study.
 
     Parameters
@@ -129,6 +130,8 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str) -
         Where the base deck came from, for messages.
     study : str
         What messages call the study.
+    check : bool
+        Build every case, so that whatever is wrong shows; otherwise only their decks are made.
 
     Raises
     ------
@@ -152,8 +155,10 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str) -
     cases, sentences = [], []
     for position, values in enumerate(settings):
         try:
-            case = Case._made(_merged(base, values), None, about)
-            cases.append(PlannedCase(position, values, case.deck_text))
+            merged = _merged(base, values)
+            if check:
+                Case._made(merged, None, about)
+            cases.append(PlannedCase(position, values, as_toml(merged, gap_given=False)))
         except DeckError as error:
             sentences.append(_with_case(str(error), about, position + 1, values))
     if sentences:

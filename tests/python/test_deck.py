@@ -691,8 +691,9 @@ def reference() -> dict[str, Any]:
     return names
 
 
-def test_the_deck_reference_is_up_to_date() -> None:
-    page = (ROOT / "docs/deck.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["deck.md", "studies.md"])
+def test_the_deck_reference_is_up_to_date(name: str) -> None:
+    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     assert reference()["filled"](page) == page, "run: python docs/deck_tables.py"
 
 
@@ -704,8 +705,8 @@ def test_the_deck_reference_has_every_key_of_every_table() -> None:
                 if isinstance(part, type) and issubclass(part, Table):
                     yield from tables(part)
 
-    page = (ROOT / "docs/deck.md").read_text(encoding="utf-8")
     names = reference()
+    page = "".join(path.read_text(encoding="utf-8") for path in names["PAGES"])
     shown_tables = {*names["TABLES"].values(), decks.Bodies, Surface}
     assert {table for table in tables(Deck) if not issubclass(table, Segment)} <= shown_tables
     assert decks.Load in shown_tables  # which has all keys of a segment

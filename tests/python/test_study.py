@@ -410,6 +410,10 @@ def test_a_study_that_is_stopped_goes_on_where_it_was(
 ) -> None:
     process = start()
     worker = wait_for_the_second(process.pid)
+    for other in (signal.SIGINT, signal.SIGTERM):  # as a terminal or batch system sends to all processes
+        worker.send_signal(other)
+    with pytest.raises(psutil.TimeoutExpired):
+        worker.wait(0.2)
     if number == signal.SIGINT:
         os.killpg(process.pid, number)  # as a terminal does, to the workers too
     else:

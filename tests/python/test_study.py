@@ -23,7 +23,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, DeckError, overrides, study_run
+from hexcontact import Case, DeckError, overrides, starters, study_run
 from hexcontact.cli import app
 from hexcontact.study import Study, run_study
 from hexcontact.study_run import Job, LocalPool, solve_case
@@ -600,13 +600,32 @@ def test_without_dask_there_is_one_sentence(folder: Path, monkeypatch: pytest.Mo
     assert "pip install distributed" in done.stderr
 
 
-# --- the example --------------------------------------------------------------------------------------------
+# --- the examples -------------------------------------------------------------------------------------------
 
 
 def test_example_is_a_good_study(folder: Path) -> None:
     study = Study.from_toml(CASES / "study_friction.toml")
     assert len(study) == 15
     assert {axis.name for axis in study.plan.axes} == {"friction_coefficient", "young_modulus_2"}
+
+
+def test_page_about_studies_runs_as_it_stands(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (CASES.parent / "docs/studies.md").read_text()
+    first, *_ = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (folder / "study.toml").write_text(first)
+    coarse = starters.text("fretting").replace("nodes_in_radius = 20", "nodes_in_radius = 6")
+    coarse = re.sub(r"steps = \d+", "steps = 2", coarse)
+    (folder / "fretting.toml").write_text(coarse)
+    solved = at_once(monkeypatch)
+    assert command("study.toml").returncode == 0
+    assert len(solved) == 12
+    reading, script = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    names: dict[str, Any] = {"__name__": "__main__"}
+    exec(reading, names)
+    names["study"].close()
+    exec(script.replace('"study.nc"', '"again.nc"'), names)
+    assert len(solved) == 18
+    assert (names["data"].status == 0).all()
 
 
 def test_outcome_of_whatever_goes_wrong_is_told_not_raised(

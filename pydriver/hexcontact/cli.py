@@ -568,6 +568,51 @@ def plot(
     print(f"written: {command.picture_of(results, what, picture, chosen)}")
 
 
+@app.command(epilog="Example: hexcontact report fretting.nc")
+@_guarded
+def report(
+    file: ResultFile,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Page to write (.html); default: FILE.html.")
+    ] = None,
+) -> None:
+    """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
+    from .report import write_report
+
+    print(f"written: {write_report(_open(file), output or file.with_suffix('.html'))}")
+
+
+@app.command(epilog="Example: hexcontact export fretting.nc --vtk")
+@_guarded
+def export(
+    file: ResultFile,
+    vtk: Annotated[bool, typer.Option("--vtk", help="A .vtu file by load step, a .pvd for ParaView.")] = False,
+    ugrid: Annotated[bool, typer.Option("--ugrid", help="A netCDF file with the fields on a mesh.")] = False,
+    csv: Annotated[
+        bool, typer.Option("--csv", help="The history as a table; with --step fields by node, too.")
+    ] = False,
+    step: Annotated[
+        str | None, typer.Option("--step", "-s", metavar="N,...", help="Only these load steps; -1: the last.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder to write into; default: FILE_export beside FILE."),
+    ] = None,
+) -> None:
+    """Write a result for other programs."""
+    if not (vtk or ugrid or csv):
+        raise DeckError("expected --vtk, --ugrid or --csv")
+    from . import export as write
+    from .plot_command import steps_of
+
+    result, folder = _open(file), output or file.with_name(f"{file.stem}_export")
+    steps, stem = None if step is None else steps_of(step), file.stem
+    written = [write.to_vtk(result, folder, stem, steps)] if vtk else []
+    written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps)] if ugrid else []
+    written += write.to_csv(result, folder, stem, steps) if csv else []
+    print("\n".join(f"written: {path}" for path in written))
+
+
 @app.command(epilog="Example: hexcontact verify")
 @_guarded
 def verify(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import mesh
 from .errors import DeckError, HexcontactError
 from .result import Layout, Metadata, Result, Step
 from .variables import SCHEMA_VERSION, VARIABLES
@@ -66,6 +67,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 else:
                     _column(file, name)[...] = values
             columns = {name: _column(file, name) for name in layout.fields}
+            mesh.write_mesh(file, layout.window)
         gap_column = columns.pop("initial_gap", None)
         gap: Any = None
         for position, step in enumerate(steps):
@@ -194,7 +196,9 @@ def read_output(path: Path) -> Result:
     with reading(path):
         import xarray
 
-        result = Result(xarray.open_dataset(path, engine="netcdf4"), str(path))
+        # rows and columns say the same as the mesh, which is for other programs
+        dataset = xarray.open_dataset(path, engine="netcdf4", drop_variables=mesh.VARIABLES)
+        result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
             if variable.ndim < 2:
                 variable.load()

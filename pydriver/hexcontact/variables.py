@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 SCHEMA_VERSION = 1
-CONVENTIONS = "CF-1.11"
+CONVENTIONS = "CF-1.11 UGRID-1.0"
 
 NAN = float("nan")
 NOT_KEPT = -1  # zone of a step whose fields the deck chose not to keep (output.every)

@@ -43,7 +43,7 @@ def test_layout_is_the_documented_one() -> None:
     # node (row 1, col -3) lies at origin - 3 a1 + a2
     assert float(data["x"].sel(row=1, col=-3)) == pytest.approx(1e-5 - 2.5e-4, rel=1e-15)
     assert float(data["y"].sel(row=1, col=-3)) == pytest.approx(np.sqrt(0.75) * 1e-4, rel=1e-15)
-    assert data.attrs["Conventions"] == "CF-1.11"
+    assert data.attrs["Conventions"] == "CF-1.11 UGRID-1.0"
     assert data.attrs["schema_version"] == 1
 
 

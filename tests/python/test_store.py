@@ -103,7 +103,7 @@ def test_xarray_opens_it_without_us(out: Path) -> None:
         assert data["seconds"].dtype == float and data["zone"].dtype == numpy.int8
         assert data["label"].values.tolist() == ["pressé 0", "pressé 1", "pressé 2"]
         assert data["pressure"].attrs["units"] == "Pa" and data["pressure"].attrs["long_name"]
-        assert data.attrs["Conventions"] == "CF-1.11" and data.attrs["deck"] == "deck = 1"
+        assert data.attrs["Conventions"] == "CF-1.11 UGRID-1.0" and data.attrs["deck"] == "deck = 1"
         assert "hexcontact" not in sys.modules
         print(float(data["pressure"].sum()))
     """

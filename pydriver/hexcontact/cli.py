@@ -190,6 +190,14 @@ Settings = Annotated[
 _PICTURES = (".png", ".pdf", ".svg")
 
 
+class Kind(enum.StrEnum):
+    """Kinds of pictures."""
+
+    png = "png"
+    pdf = "pdf"
+    svg = "svg"
+
+
 class Arrows(enum.StrEnum):
     """Arrows that a zone map may have."""
 
@@ -540,6 +548,9 @@ def plot(
             "--output", "-o", help="Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
         ),
     ] = None,
+    kind: Annotated[
+        Kind | None, typer.Option("--format", "-f", help="Kind of picture where --output names none.")
+    ] = None,
 ) -> None:
     """Draw a result, or what belongs to none; its help is made of the choices there are."""
     from . import plot_command as command
@@ -553,12 +564,15 @@ def plot(
         "arrows": None if arrows is None else arrows.value,
     }
     chosen = {name: value for name, value in given.items() if value is not None}
+    if output and kind:
+        raise DeckError(f"--format {kind}: the name of --output {output} says what kind of picture it is")
+    suffix = f".{kind or 'png'}"
     if not files:
         if chosen:
             raise DeckError(f"--{next(iter(chosen))}: not an option of --what {what}")
-        print(f"written: {command.general_picture(what, output or Path(f'{what}.png'))}")
+        print(f"written: {command.general_picture(what, output or Path(f'{what}{suffix}'))}")
         return
-    results, first = [_open(file) for file in files], output or files[0].with_suffix(".png")
+    results, first = [_open(file) for file in files], output or files[0].with_suffix(suffix)
     if what == "all":
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
@@ -586,7 +600,9 @@ def report(
 @_guarded
 def export(
     file: ResultFile,
-    vtk: Annotated[bool, typer.Option("--vtk", help="A .vtu file by load step, a .pvd for ParaView.")] = False,
+    vtk: Annotated[
+        bool, typer.Option("--vtk", help="A .vtu file by load step, a .pvd for ParaView.")
+    ] = False,
     ugrid: Annotated[bool, typer.Option("--ugrid", help="A netCDF file with the fields on a mesh.")] = False,
     csv: Annotated[
         bool, typer.Option("--csv", help="The history as a table; with --step fields by node, too.")

@@ -150,7 +150,9 @@ def _vtu(result: Result, number: int) -> str:
 
 
 def _about(result: Result, number: int) -> str:
-    return f"{result.case_title or 'hexcontact'}, load step {number}; {result.dataset.attrs['source']}; SI units"
+    return (
+        f"{result.case_title or 'hexcontact'}, load step {number}; {result.dataset.attrs['source']}; SI units"
+    )
 
 
 def _point_data(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any], str]]:
@@ -251,7 +253,7 @@ def _named(dataset: xarray.Dataset, names: Sequence[str]) -> Mapping[str, Any]:
 
 
 def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | None = None) -> list[Path]:
-    """Write the history as a table, and the fields of the steps that are asked for, with a line for each node.
+    """Write the history as a table, and of the steps that are asked for the fields, a line for each node.
 
     Parameters
     ----------

@@ -21,8 +21,8 @@ _CHUNK = 1 << 16  # triangles
 def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
     """Return the triangles between the nodes of a window.
 
-    The short diagonal halves each cell, so that all triangles are equilateral: the tractions of the solution are
-    linear on them.
+    The short diagonal halves each cell, so that all triangles are equilateral: the tractions of the solution
+    are linear on them.
 
     Parameters
     ----------

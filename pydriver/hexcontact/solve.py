@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import platform
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -36,7 +38,16 @@ def metadata_of(case: Case) -> Metadata:
             "coupling": case.solver.coupling,
             "entry": case.solver.entry,
             "tolerance": case.solver.tolerance,
+            "machine": _machine(),
         },
+    )
+
+
+def _machine() -> str:
+    """Say what the program runs on: "node7, Linux x86_64, 16 processors"."""
+    count = os.cpu_count() or 1
+    return (
+        f"{platform.node()}, {platform.system()} {platform.machine()}, {count} processor{'s' * (count > 1)}"
     )
 
 

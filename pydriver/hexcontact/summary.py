@@ -292,18 +292,19 @@ def file_rows(result: Result) -> list[Row]:
         *([("stopped", str(attributes["stopped"]))] if "stopped" in attributes else []),
         ("window", f"{sizes['row']} x {sizes['col']} nodes"),
         ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
-        ("algorithm", _algorithm(attributes)),
+        ("algorithm", algorithm(attributes)),
         ("fields", ", ".join(fields)),
     ]
 
 
-def _algorithm(attributes: Mapping[str, Any]) -> str:
-    algorithm = str(attributes.get("algorithm", "unknown"))
-    if algorithm in ("static", "incremental"):
-        algorithm += f", friction coefficient {float(attributes['friction_coefficient']):g}"
-    if algorithm.startswith("incremental"):
-        algorithm += ", entry interpolated" * (attributes.get("entry") == "interpolated")
-    return algorithm + ", coupling goodman" * (attributes.get("coupling") == "goodman")
+def algorithm(attributes: Mapping[str, Any]) -> str:
+    """Say from the attributes of a result how it was computed."""
+    words = str(attributes.get("algorithm", "unknown"))
+    if words in ("static", "incremental"):
+        words += f", friction coefficient {float(attributes['friction_coefficient']):g}"
+    if words.startswith("incremental"):
+        words += ", entry interpolated" * (attributes.get("entry") == "interpolated")
+    return words + ", coupling goodman" * (attributes.get("coupling") == "goodman")
 
 
 def case_of(result: Result) -> Case | None:

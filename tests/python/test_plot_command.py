@@ -184,3 +184,25 @@ def test_options_are_read() -> None:
     assert plot_command.point_of("10 um, -1e-3") == pytest.approx((1e-5, -1e-3))
     with pytest.raises(DeckError, match=r"--angle thirty: expected an angle such as 30 or 0\.5rad"):
         plot_command.angle_of("thirty")
+
+
+@pytest.mark.parametrize(("kind", "start"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_kind_of_picture_by_option_and_by_name(folder: Path, tmp_path: Path, kind: str, start: bytes) -> None:
+    code, out, err = plot(folder / "pressed.nc", "--what", "pressure", "--format", kind)
+    target = folder / f"pressed_pressure.{kind}"
+    assert (code, out, err) == (0, f"written: {target}\n", "")
+    assert target.read_bytes().startswith(start)
+    named = tmp_path / f"own.{kind}"
+    assert plot(folder / "pressed.nc", "-w", "section", "-o", named)[0] == 0
+    assert named.read_bytes().startswith(start)
+
+
+def test_all_pictures_have_the_kind_asked_for(folder: Path) -> None:
+    code, out, _ = plot(folder / "pressed.nc", "--what", "all", "-f", "svg")
+    names = re.findall(r"written: (.*)", out)
+    assert code == 0 and len(names) > 2 and all(name.endswith(".svg") for name in names)
+
+
+def test_name_and_kind_of_a_picture_are_not_both_given(folder: Path, tmp_path: Path) -> None:
+    code, _, err = plot(folder / "pressed.nc", "-o", tmp_path / "a.png", "-f", "pdf")
+    assert code == 2 and "--format pdf: the name of --output" in err and not list(tmp_path.iterdir())

@@ -1,0 +1,477 @@
+"""The page of a result: what it holds, and that it works in a browser (Chromium, where there is one)."""
+
+import base64
+import fcntl
+import hashlib
+import html.parser
+import io
+import json
+import os
+import re
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from hexcontact import Case, open_result
+from hexcontact.cli import app
+from hexcontact.report import report, write_report
+from hexcontact.report_fields import MOST_STEPS, Plane, kept_steps
+from hexcontact.result import Result, Step
+from hexcontact.step_view import StepView
+
+DECK = """\
+title = "Sheared <script>alert('1 & 2')</script> {{data}}"
+[body.1]
+young_modulus = "210 GPa"
+poisson_ratio = 0.3
+surface = { shape = "sphere", radius = "10 mm" }
+[body.2]
+young_modulus = "70 GPa"
+poisson_ratio = 0.3
+[friction]
+coefficient = 0.5
+[grid]
+nodes_in_radius = 8
+[solver]
+algorithm = "incremental"
+[[load]]
+normal_load = "100 N"
+steps = 2
+label = "press"
+[[load]]
+tangential_load_x = "30 N"
+steps = 4
+label = "shear </script>"
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sphere pressed and sheared, one pressed without friction, a run that was stopped, and their pages."""
+    folder = tmp_path_factory.mktemp("pages")
+    case = Case.from_text(DECK)
+    case.run(folder / "sheared.nc")
+    body = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    pressed = Case(
+        body_1=body | {"surface": {"shape": "sphere", "radius": 0.01}}, body_2=body, nodes_in_radius=6,
+        normal_load=100.0, title="Pressed",
+    )  # fmt: skip
+    pressed.run(folder / "pressed.nc")
+
+    def stop(step: Step) -> None:
+        if step.number == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        case.run(folder / "stopped.nc", on_step=stop)
+    for name in ("sheared", "pressed", "stopped"):
+        done = CliRunner().invoke(app, ["report", str(folder / f"{name}.nc")])
+        assert (done.exit_code, done.stdout) == (0, f"written: {folder / name}.html\n"), done.stderr
+    return folder
+
+
+def data_of(page: str) -> dict[str, Any]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found
+    data: dict[str, Any] = json.loads(found.group(1))
+    return data
+
+
+class Reader(html.parser.HTMLParser):
+    """Looks for what is never closed, and for everything that a page would fetch."""
+
+    VOID = frozenset({"meta", "input", "link", "img", "br"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.fetched: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.ids += [given["id"] or ""] if "id" in given else []
+        self.fetched += [value or "" for name, value in attrs if name in ("src", "srcset", "action", "data")]
+        self.fetched += [tag] if tag in ("link", "iframe", "object", "embed", "base") else []
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("name", ["sheared", "pressed", "stopped"])
+def test_page_is_whole_and_fetches_nothing(folder: Path, name: str) -> None:
+    page, reader = (folder / f"{name}.html").read_text(encoding="utf-8"), Reader()
+    reader.feed(page)
+    assert reader.open == [] and reader.fetched == []
+    assert len(set(reader.ids)) == len(reader.ids)
+    assert "default-src 'none'" in page
+    assert re.findall(r"https?://(?!www\.w3\.org/2000/svg)", page) == []
+    assert "@import" not in page and "url(" not in page.replace("url(#${id})", "")
+    assert len(page) < 1e6
+
+
+def test_text_of_the_deck_is_text(folder: Path) -> None:
+    page = (folder / "sheared.html").read_text(encoding="utf-8")
+    assert page.count("<script") == 2 and page.count("</script>") == 2
+    assert "<title>Sheared &lt;script&gt;alert(&#x27;1 &amp; 2&#x27;)&lt;/script&gt; {{data}}</title>" in page
+    assert data_of(page)["labels"][-1] == "shear </script>"
+    assert "tangential_load_x = &quot;30 N&quot;" in page
+
+
+def test_page_says_where_it_comes_from(folder: Path) -> None:
+    page, result = (folder / "sheared.html").read_text(encoding="utf-8"), open_result(folder / "sheared.nc")
+    attributes = result.dataset.attrs
+    for text in (
+        hashlib.sha256(DECK.encode()).hexdigest(),
+        attributes["run"],
+        attributes["machine"],
+        attributes["source"],
+    ):
+        assert text in page
+    assert os.uname().machine in attributes["machine"]
+    assert "Unfinished" not in page
+
+
+def test_unfinished_run_says_so(folder: Path) -> None:
+    page = (folder / "stopped.html").read_text(encoding="utf-8")
+    assert "Unfinished run: 3 of 6 load steps. interrupted" in page
+    assert data_of(page)["fields"]["steps"] == [1, 2, 3]
+
+
+def test_inputs_loads_and_residuals_are_in_tables(folder: Path) -> None:
+    page = (folder / "sheared.html").read_text(encoding="utf-8")
+    assert "sphere, radius 10.00 mm" in page and "coefficient 0.5, incremental" in page
+    history = open_result(folder / "sheared.nc").history
+    for number, row in history.iterrows():
+        (line,) = re.findall(rf'<tr id="row-{number}">.*?</tr>', page)
+        assert f"<td>{row['residual_normal']:.1e}</td><td>{row['residual_tangential']:.1e}</td>" in line
+    assert '<th scope="row">2</th><td>shear &lt;/script&gt;</td><td>3 to 6</td>' in page
+
+
+def test_maps_are_the_fields(folder: Path) -> None:
+    result = open_result(folder / "sheared.nc")
+    fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
+    assert [m["name"] for m in fields["maps"]] == ["pressure", "traction", "slip", "accumulated_slip"]
+    assert fields["length"] == "µm"
+    pressure = fields["maps"][0]
+    assert pressure["unit"] == "MPa" or pressure["unit"] == "GPa"
+    unit = {"MPa": 1e6, "GPa": 1e9}[pressure["unit"]]
+    for k, number in enumerate(fields["steps"]):
+        view = StepView.of(result, number)
+        assert pressure["max"][k] * unit == pytest.approx(view.pressure.max(), rel=1e-3)
+        gray = np.asarray(Image.open(io.BytesIO(base64.b64decode(pressure["images"][k]))))
+        plane = Plane(tuple(1e-6 * v for v in fields["limits"]), max(gray.shape))
+        assert plane.shape == gray.shape
+        expected = view.at(*plane.points)
+        read = np.where(gray > 0, (gray - 1.0) / 254.0, 0.0) * view.pressure.max()
+        np.testing.assert_allclose(read, expected, atol=view.pressure.max() * (0.5 / 254 + 1e-5))
+
+
+def test_zone_map_shows_the_zone_of_the_next_node(folder: Path) -> None:
+    result = open_result(folder / "sheared.nc")
+    fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
+    gray = np.asarray(Image.open(io.BytesIO(base64.b64decode(fields["zones"][-1]))))
+    plane, view = Plane(tuple(1e-6 * v for v in fields["limits"]), max(gray.shape)), StepView.of(result, -1)
+    x, y = plane.points
+    for row, col in np.random.default_rng(3).integers(0, gray.shape, (200, 2)):
+        away = np.hypot(view.x - x[row, col], view.y - y[row, col])
+        if np.partition(away.ravel(), 1)[1] - away.min() > 1e-3 * view.spacing:  # not between two nodes
+            assert gray[row, col] == view.data["zone"].values.ravel()[away.argmin()]
+    share = (gray == 1).sum() / (gray > 0).sum()
+    assert share == pytest.approx(float(view.data["stick_area"] / view.data["contact_area"]), abs=0.01)
+
+
+def test_arrows_point_along_the_traction_where_there_is_slip(folder: Path) -> None:
+    fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
+    (traction,) = [m for m in fields["maps"] if m["name"] == "traction"]
+    x, y, u, _ = np.reshape(traction["arrows"][-1], (-1, 4)).T
+    assert len(x) > 50 and x.min() > 0 and x.max() < 1000 and y.min() > 0 and y.max() < 1000
+    assert np.mean(u > 0) > 0.8  # the load on body 1 is along +x
+    (slip,) = [m for m in fields["maps"] if m["name"] == "slip"]
+    _, _, u, _ = np.reshape(slip["arrows"][-1], (-1, 4)).T
+    assert np.mean(u < 0) > 0.8  # and opposed to its slip
+
+
+def test_sections_hold_pressure_and_bounds(folder: Path) -> None:
+    fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
+    pressure, shear = fields["sections"]["panels"]
+    assert list(pressure["curves"]) == ["p"] and list(shear["curves"]) == ["q_x", "μp"]
+    for bound, traction in zip(shear["curves"]["μp"], shear["curves"]["q_x"], strict=True):
+        assert (np.abs(traction) <= np.array(bound) * 1.001 + 1e-3 * max(bound)).all()
+    pressed = data_of((folder / "pressed.html").read_text(encoding="utf-8"))
+    assert [list(p["curves"]) for p in pressed["fields"]["sections"]["panels"]] == [["p", "p (Hertz)"]]
+    assert pressed["charts"] == [] and pressed["fields"]["zones"] == []
+
+
+def test_curves_are_the_history(folder: Path) -> None:
+    charts = {c["title"]: c for c in data_of((folder / "sheared.html").read_text(encoding="utf-8"))["charts"]}
+    history = open_result(folder / "sheared.nc").history
+    load = charts["Tangential load"]
+    assert load["unit"] == "N"
+    np.testing.assert_allclose(load["curves"]["Q_x"], history["tangential_load_x"], rtol=1e-4, atol=1e-6)
+    loop = charts["Tangential load over shift, x"]
+    assert "µm" in loop["xlabel"]
+    np.testing.assert_allclose(1e-6 * np.array(loop["x"]), history["shift_x"], rtol=1e-4, atol=1e-12)
+    assert charts["Residuals"]["log"] and "Torque" not in charts
+
+
+def test_long_histories_show_some_steps_as_maps(folder: Path) -> None:
+    dataset = open_result(folder / "sheared.nc").dataset
+    long = dataset.isel(step=np.arange(1000) % 6).assign_coords(step=np.arange(1, 1001))
+    kept = kept_steps(Result(long))
+    assert len(kept) <= MOST_STEPS and kept[-1] == 1000 and len(set(np.diff(kept))) == 1
+    long.attrs = dataset.attrs | {"output_every": 300}
+    assert kept_steps(Result(long)) == [300, 600, 900, 1000]
+
+
+def test_result_without_fields_has_a_page(folder: Path) -> None:
+    result = open_result(folder / "sheared.nc")
+    bare = Result(
+        result.dataset.drop_dims(["row", "col"]).assign_coords(result.dataset[["row", "col"]].coords)
+    )
+    page = report(bare)
+    assert data_of(page)["fields"] is None and "so that there are no maps" in page
+
+
+def test_only_a_page_is_written_or_replaced(folder: Path) -> None:
+    before = (folder / "sheared.nc").read_bytes()
+    done = CliRunner().invoke(app, ["report", str(folder / "sheared.nc"), "-o", str(folder / "sheared.nc")])
+    assert done.exit_code == 2 and "expected a page, such as" in done.stderr
+    assert (folder / "sheared.nc").read_bytes() == before
+    with pytest.raises(FileNotFoundError):
+        write_report(open_result(folder / "pressed.nc"), folder / "missing" / "page.html")
+    assert not list(folder.glob("*.tmp"))
+
+
+# --- in a browser ---------------------------------------------------------------------------------
+
+
+class Browser:
+    """Chromium without a window, driven through a pipe by its DevTools protocol."""
+
+    FLAGS = (
+        *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+        *("--disable-dev-shm-usage", "--hide-scrollbars", "--remote-debugging-pipe"),
+    )
+
+    def __init__(self, program: str, profile: Path) -> None:
+        theirs_in, self.sender = os.pipe()
+        self.receiver, theirs_out = os.pipe()
+        words = [program, *self.FLAGS, f"--user-data-dir={profile}", "about:blank"]
+        # descriptors 3 and 4 are those that the browser talks through
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (theirs_in, theirs_out)]
+        start = "import os; from sys import argv as a; "
+        start += "os.dup2(int(a[1]), 3); os.dup2(int(a[2]), 4); os.execv(a[3], a[3:])"
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", start, *map(str, ends), *words],
+            pass_fds=ends, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        for end in (theirs_in, theirs_out, *ends):
+            os.close(end)
+        self.buffer, self.count, self.session = b"", 0, ""
+        self.events: list[dict[str, Any]] = []
+        targets = self.send("Target.getTargets")["targetInfos"]
+        page = next(t["targetId"] for t in targets if t["type"] == "page")
+        self.session = self.send("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.send(f"{domain}.enable")
+
+    def send(self, method: str, **params: Any) -> dict[str, Any]:
+        self.count += 1
+        message = {"id": self.count, "method": method, "params": params}
+        if self.session:
+            message["sessionId"] = self.session
+        os.write(self.sender, json.dumps(message).encode() + b"\0")
+        while True:
+            while b"\0" not in self.buffer:
+                assert select.select([self.receiver], [], [], 60.0)[0], f"no answer to {method}"
+                part = os.read(self.receiver, 1 << 16)
+                assert part, "the browser has gone"
+                self.buffer += part
+            text, _, self.buffer = self.buffer.partition(b"\0")
+            answer = json.loads(text)
+            if answer.get("id") == self.count:
+                assert "error" not in answer, answer
+                result: dict[str, Any] = answer["result"]
+                return result
+            self.events.append(answer)
+
+    def value(self, expression: str) -> Any:
+        answer = self.send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    def wait_for(self, expression: str) -> None:
+        limit = time.monotonic() + 30.0
+        while not self.value(expression):
+            assert time.monotonic() < limit, expression
+            time.sleep(0.02)
+
+    def open(self, page: Path, fragment: str = "") -> None:
+        self.send("Page.navigate", url="about:blank")
+        self.wait_for("location.href === 'about:blank'")
+        self.events.clear()
+        self.send("Page.navigate", url=page.as_uri() + fragment)
+        self.wait_for("document.readyState === 'complete' && !!document.body && !!document.body.dataset.step")
+
+    def press(self, key: str) -> None:
+        code = {"ArrowRight": 39, "ArrowLeft": 37, "Home": 36, "End": 35, "Tab": 9}[key]
+        for kind in ("rawKeyDown", "keyUp"):
+            self.send("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
+
+    def picture(self) -> Image.Image:
+        answer = self.send("Page.captureScreenshot", format="png", captureBeyondViewport=True)
+        return Image.open(io.BytesIO(base64.b64decode(answer["data"]))).convert("RGB")
+
+    def faults(self) -> list[Any]:
+        """Errors of scripts, complaints on the console, and requests that leave the page."""
+        found: list[Any] = []
+        for event in self.events:
+            params = event.get("params", {})
+            if event.get("method") in ("Runtime.exceptionThrown", "Log.entryAdded"):
+                found.append(params)
+            if event.get("method") == "Network.requestWillBeSent":
+                url = params["request"]["url"]
+                found += [] if url.startswith(("file:", "data:", "about:")) else [url]
+        return found
+
+    def close(self) -> None:
+        for end in (self.sender, self.receiver):
+            os.close(end)
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("no Chromium on this machine, so that pages are not opened (apt install chromium)")
+    browser = Browser(program, tmp_path_factory.mktemp("profile"))
+    yield browser
+    browser.close()
+
+
+def state(browser: Browser) -> tuple[str, str, str, str]:
+    """What shows the step: slider, words, table of the state, marked row."""
+    found: list[str] = browser.value(
+        "[document.getElementById('step').value, document.getElementById('now').textContent, "
+        "document.getElementById('state-number').textContent, document.querySelector('tr.now').id]"
+    )
+    return found[0], found[1], found[2], found[3]
+
+
+def hrefs(browser: Browser) -> list[str]:
+    found: list[str] = browser.value(
+        "[...document.querySelectorAll('#maps image')].map(i => i.getAttribute('href'))"
+    )
+    return found
+
+
+def test_page_opens_at_the_last_step(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "sheared.html")
+    assert state(browser) == ("5", "step 6 of 6, shear </script>", "6", "row-6")
+    assert browser.value("document.querySelectorAll('#charts figure').length") >= 8
+    assert len(hrefs(browser)) == 5 and all(h.startswith("data:image/png") for h in hrefs(browser))
+    assert browser.faults() == []
+
+
+def test_address_chooses_a_step(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "sheared.html", "#step=2")
+    assert state(browser) == ("1", "step 2 of 6, press", "2", "row-2")
+    browser.value("location.hash = '#step=4'")
+    browser.wait_for("document.body.dataset.step === '4'")
+    assert state(browser)[0] == "3"
+
+
+def test_slider_moves_by_keys_and_the_maps_with_it(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "sheared.html", "#step=2")
+    first = hrefs(browser)
+    browser.value("document.getElementById('step').focus()")
+    for key, step in (("ArrowRight", 3), ("ArrowRight", 4), ("ArrowLeft", 3), ("End", 6), ("Home", 1)):
+        browser.press(key)
+        browser.wait_for(f"document.body.dataset.step === '{step}'")
+        assert state(browser)[2:] == (str(step), f"row-{step}")
+        assert browser.value("location.hash") == f"#step={step}"
+        assert all(a != b for a, b in zip(first, hrefs(browser), strict=True))
+    spoken = browser.value("document.getElementById('step').getAttribute('aria-valuetext')")
+    assert spoken == "step 1 of 6, press"
+    assert browser.faults() == []
+
+
+def test_map_is_painted_with_the_values(browser: Browser, folder: Path) -> None:
+    browser.send(
+        "Emulation.setDeviceMetricsOverride", width=1250, height=900, deviceScaleFactor=1, mobile=False
+    )
+    browser.open(folder / "sheared.html")
+    box = browser.value(
+        "(() => { const b = document.querySelector('#map-pressure image').getBoundingClientRect();"
+        " return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()"
+    )
+    shot = browser.picture()
+    x, y, width, height = box
+    middle = np.array(shot.getpixel((int(x + width / 2), int(y + height / 2))), dtype=int)
+    assert np.abs(middle - [253, 231, 37]).max() < 12  # the brightest color of viridis: p_max
+    assert shot.getpixel((int(x + 4), int(y + 4))) == (255, 255, 255)  # no contact there
+
+
+def test_scale_can_be_that_of_the_step(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "sheared.html", "#step=1")
+    common = hrefs(browser)
+    browser.value("document.getElementById('common').click()")
+    browser.wait_for(
+        f"document.querySelector('#map-pressure image').getAttribute('href') !== {json.dumps(common[0])}"
+    )
+    assert browser.faults() == []
+
+
+def test_values_are_read_with_the_pointer(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "pressed.html")
+    x, y = browser.value(
+        "(() => { const i = document.querySelector('#map-pressure image');"
+        " i.scrollIntoView({block: 'center'});"
+        " const b = i.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+    )
+    browser.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+    browser.wait_for("document.getElementById('readout').textContent !== ''")
+    text = browser.value("document.getElementById('readout').textContent")
+    found = re.fullmatch(r"Pressure at x = (\S+), y = (\S+) µm: about (\S+) (MPa|GPa)", text)
+    assert found, text
+    peak = float(open_result(folder / "pressed.nc").max_pressure[-1]) / {"MPa": 1e6, "GPa": 1e9}[found[4]]
+    assert float(found[3]) == pytest.approx(peak, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["pressed", "stopped"])
+def test_other_results_have_pages_that_work(browser: Browser, folder: Path, name: str) -> None:
+    browser.open(folder / f"{name}.html")
+    assert browser.faults() == []
+    assert browser.value("document.getElementById('step').checkVisibility()") == (name == "stopped")
+    assert browser.value("document.getElementById('history').checkVisibility()") == (name == "stopped")
+
+
+def test_dark_screens_and_print(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "sheared.html")
+    background = "getComputedStyle(document.body).backgroundColor"
+    browser.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+    assert browser.value(background) == "rgb(13, 17, 23)"
+    browser.send("Emulation.setEmulatedMedia", media="print")
+    assert browser.value(background) == "rgb(255, 255, 255)"
+    assert not browser.value("document.getElementById('step').checkVisibility()")
+    assert browser.value("document.getElementById('now').checkVisibility()")
+    browser.send("Emulation.setEmulatedMedia", media="", features=[])

@@ -78,6 +78,7 @@ demo: install  ## press a sphere on aluminum, then shear it: history, result and
 	cd output && hexcontact plot dissimilar_fretting.nc --what tractions --step 10,11,15,20,25,30,35,40
 	cd output && hexcontact plot dissimilar_fretting.nc --what zones --step 10,11,15,20,25,30,35,40
 	cd output && hexcontact plot dissimilar_fretting.nc --what history
+	cd output && hexcontact report dissimilar_fretting.nc
 
 verify: install  ## compare with published, discrete and analytic solutions (minutes)
 	hexcontact verify

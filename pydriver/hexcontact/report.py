@@ -196,12 +196,18 @@ def _pairs(rows: Iterable[tuple[str, ...]]) -> str:
 
 def _table(caption: str, headers: Sequence[str], rows: Iterable[Sequence[str]], link: bool = False) -> str:
     def line(row: Sequence[str]) -> str:
-        first, rest = html.escape(row[0]), "".join(f"<td>{html.escape(cell)}</td>" for cell in row[1:])
+        cells = zip(kinds[1:], row[1:], strict=True)
+        first, rest = (
+            html.escape(row[0]),
+            "".join(f"<td{kind}>{html.escape(cell)}</td>" for kind, cell in cells),
+        )
         mark = f' id="row-{first}"' if link else ""
         start = f'<a href="#step={first}">{first}</a>' if link else first
         return f'<tr{mark}><th scope="row">{start}</th>{rest}</tr>'
 
-    head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in headers)
+    kinds = [' class="text"' * (name == "label") for name in headers]
+    names = zip(kinds, headers, strict=True)
+    head = "".join(f'<th scope="col"{kind}>{html.escape(name)}</th>' for kind, name in names)
     return (
         f'<table class="numbers"><caption>{html.escape(caption)}</caption><thead><tr>{head}</tr></thead>'
         f"<tbody>{''.join(map(line, rows))}</tbody></table>"

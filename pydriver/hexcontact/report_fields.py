@@ -29,6 +29,7 @@ _BYTES = 2.5e6  # of all smooth maps together, about: pages that a browser opens
 _ZONES = 480  # pixels of the longer side of a zone map
 _ARROWS = 15  # along the longer side
 _CUT = 201  # points of a section
+_NOISE = 1e-7  # share of the approach up to which slip is no more than the tolerance leaves
 _MAPS = (  # name, title, components, whether the page gives all steps one color scale at first
     ("pressure", "Pressure", ("pressure",), True),
     ("traction", "Shear traction", ("traction_x", "traction_y"), True),
@@ -137,6 +138,7 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     }
     nearest = fine.nearest(first) if first.friction and "zone" in first.data else None
     zones, sections = [], []
+    noise = _NOISE * float(np.abs(result.dataset["approach"].values).max())
     cut = np.linspace(limits[0], limits[1], _CUT), np.full(_CUT, 0.5 * (limits[2] + limits[3]))
     for number in numbers:
         view = StepView.of(result, number)
@@ -148,15 +150,18 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
             if "slip" in name:  # does not go to zero at the edge: nodes beyond it have no say
                 size = size / weight
             largest = float(np.sqrt(sum(part**2 for part in values))[view.contact].max(initial=0.0))
+            if "slip" in name and largest < noise:
+                largest = 0.0
             shown[name]["images"].append(_gray(size, largest, contact))
             shown[name]["max"].append(rounded(largest)[0])
             if len(parts) == 2:
-                shown[name]["arrows"].append(_arrows(view, limits, values, largest))
+                shown[name]["arrows"].append(_arrows(view, limits, values, largest) if largest else [])
         if nearest is not None:
             row, col, inside = nearest
             zone = np.where(inside, view.data["zone"].values[row, col], 0).astype("u1")
             zones.append(_png(zone))
         sections.append(_section(view, *cut))
+    shown = {name: entry for name, entry in shown.items() if "slip" not in name or any(entry["max"])}
     for entry in shown.values():
         factor, unit = scaled(max((m or 0.0 for m in entry["max"]), default=0.0), entry["unit"])
         entry |= {"unit": unit, "max": rounded([factor * (m or 0.0) for m in entry["max"]])}
@@ -216,8 +221,8 @@ def _arrows(
     pitch = max(x1 - x0, y1 - y0) / _ARROWS
     rows, cols = math.ceil((y1 - y0) / pitch / 0.866), math.ceil((x1 - x0) / pitch)
     j, i = np.meshgrid(np.arange(-rows, rows + 1), np.arange(-cols, cols + 1), indexing="ij")
-    x: Array = 0.5 * (x0 + x1) + pitch * (i + 0.5 * (j % 2))
-    y: Array = 0.5 * (y0 + y1) + 0.866 * pitch * j
+    x = 0.5 * (x0 + x1) + pitch * (i + 0.5 * (j % 2))
+    y = np.asarray(0.5 * (y0 + y1) + 0.866 * pitch * j, dtype=np.float64)
     inside = (x > x0) & (x < x1) & (y > y0) & (y < y1)
     x, y = x[inside], y[inside]
     u, v = (view.at(x, y, part) for part in components)

@@ -157,7 +157,7 @@ def test_inputs_loads_and_residuals_are_in_tables(folder: Path) -> None:
     for number, row in history.iterrows():
         (line,) = re.findall(rf'<tr id="row-{number}">.*?</tr>', page)
         assert f"<td>{row['residual_normal']:.1e}</td><td>{row['residual_tangential']:.1e}</td>" in line
-    assert '<th scope="row">2</th><td>shear &lt;/script&gt;</td><td>3 to 6</td>' in page
+    assert '<th scope="row">2</th><td class="text">shear &lt;/script&gt;</td><td>3 to 6</td>' in page
 
 
 def test_maps_are_the_fields(folder: Path) -> None:
@@ -202,6 +202,14 @@ def test_arrows_point_along_the_traction_where_there_is_slip(folder: Path) -> No
     (slip,) = [m for m in fields["maps"] if m["name"] == "slip"]
     _, _, u, _ = np.reshape(slip["arrows"][-1], (-1, 4)).T
     assert np.mean(u < 0) > 0.8  # and opposed to its slip
+
+
+def test_slip_that_is_only_noise_is_not_shown() -> None:
+    deck = DECK.replace("coefficient = 0.5", "coefficient = inf").replace("70 GPa", "210 GPa")
+    case = Case.from_text(deck)
+    fields = data_of(report(case.run()))["fields"]
+    assert [m["name"] for m in fields["maps"]] == ["pressure", "traction"]
+    assert [list(panel["curves"]) for panel in fields["sections"]["panels"]][-1] == ["q_x"]
 
 
 def test_sections_hold_pressure_and_bounds(folder: Path) -> None:

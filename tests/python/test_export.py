@@ -1,8 +1,10 @@
 """Results for other programs: VTK files read back by meshio, UGRID meshes against the rules, tables."""
 
+import base64
 import csv
 import re
 import xml.etree.ElementTree as ET
+import zlib
 from pathlib import Path
 
 import meshio
@@ -84,6 +86,22 @@ def test_vtk_file_holds_the_step(folder: Path, tmp_path: Path) -> None:
             np.testing.assert_array_equal(read.point_data[name][:, k], data[f"{name}_{axis}"].values.ravel())
         assert not read.point_data[name][:, 2].any()
     assert read.field_data["tangential_load_x"] == pytest.approx(20.0)
+
+
+def test_arrays_are_packed_as_vtk_defines_it(folder: Path, tmp_path: Path) -> None:
+    assert export(folder / "pressed.nc", "--vtk", "-o", tmp_path)[0] == 0
+    root = ET.parse(tmp_path / "pressed_0001.vtu").getroot()
+    assert {"header_type": "UInt64", "compressor": "vtkZLibDataCompressor"}.items() <= root.attrib.items()
+    arrays = {array.get("Name"): array for array in root.iter("DataArray")}
+    for name, width in (("pressure", 8), ("zone", 1), ("connectivity", 4)):
+        text = (arrays[name].text or "").strip()
+        header = np.frombuffer(base64.b64decode(text[:44]), "<u8")  # 32 bytes are 44 characters
+        packed = base64.b64decode(text[44:])
+        raw = zlib.decompress(packed)
+        assert header.tolist() == [1, len(raw), 0, len(packed)]
+        nodes = open_result(folder / "pressed.nc").lattice
+        count = 6 * (nodes.n_row - 1) * (nodes.n_col - 1) if name == "connectivity" else nodes.size
+        assert len(raw) == width * count
 
 
 def test_vtk_files_say_units(folder: Path, tmp_path: Path) -> None:

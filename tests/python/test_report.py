@@ -179,6 +179,12 @@ def test_maps_are_the_fields(folder: Path) -> None:
         np.testing.assert_allclose(read, expected, atol=view.pressure.max() * (0.5 / 254 + 1e-5))
 
 
+def test_pictures_begin_at_the_upper_left() -> None:
+    x, y = Plane((0.0, 2.0, 10.0, 11.0), 4).points
+    np.testing.assert_allclose(x, [[0.25, 0.75, 1.25, 1.75]] * 2)
+    np.testing.assert_allclose(y, [[10.75] * 4, [10.25] * 4])
+
+
 def test_zone_map_shows_the_zone_of_the_next_node(folder: Path) -> None:
     result = open_result(folder / "sheared.nc")
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]

@@ -190,7 +190,7 @@ def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
 
 
 def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None) -> Path:
-    """Write a netCDF file whose fields lie on the nodes of a mesh, for QGIS, xugrid and others.
+    """Write a netCDF file whose fields lie on the nodes of a mesh, for xugrid and others.
 
     The result itself describes the same mesh, but has its fields by row and column.
 

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any, Self
 
 from . import study_plan
 from .deck import read_toml
+from .deck_assembly import assemble
 from .errors import DeckError
-from .messages import Source
+from .messages import Source, deck_error
 from .study_deck import Dask, StudyFile
 from .study_plan import Plan, PlannedCase
 from .study_store import Outcome, StudyFolder
@@ -138,7 +139,11 @@ class Study:
         check: bool = True,
     ) -> None:
         self.file, self.name = file, name
-        self.plan: Plan = study_plan.plan(file, base, source, name, check)
+        # what the deck includes, and the rows of its series, are part of every case
+        whole = assemble(base, source.text, source, Path(source.name).parent)
+        if whole.problems:
+            raise deck_error(whole.problems, whole.source)
+        self.plan: Plan = study_plan.plan(file, whole.data, whole.source, name, check)
         self.output = Path(output)
         self.folder = StudyFolder(self.output)
 

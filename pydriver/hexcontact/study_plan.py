@@ -140,7 +140,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     """
     base = {key: value for key, value in base.items() if key != "output"} | _output(base)
     keys = frozenset(parameter.key for parameter in file.parameter)
-    about = _StudySource(source.name, source.text, keys, study)
+    about = _StudySource(source.name, source.text, keys, source.included, study)
     for key in keys:
         if key == "output" or key.startswith("output.file"):
             raise DeckError(f"{study}: parameter {key}: a study names the files of its cases itself")

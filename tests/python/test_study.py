@@ -637,3 +637,24 @@ def test_outcome_of_whatever_goes_wrong_is_told_not_raised(
     monkeypatch.setattr(Case, "from_text", broken)
     outcome = study_run.solve_case(Job("x", DECK, str(folder / "a.nc")))
     assert (outcome.exit_code, outcome.message) == (1, "ZeroDivisionError: by zero")
+
+
+def test_what_a_deck_includes_is_part_of_its_cases(tmp_path: Path) -> None:
+    """Another material in an included file makes other cases of the same study."""
+    (tmp_path / "material.toml").write_text("[body.1]\nyoung_modulus = '200 GPa'\npoisson_ratio = 0.3\n")
+    (tmp_path / "loads.csv").write_text("normal_load [N]\n1\n2\n")
+    (tmp_path / "deck.toml").write_text(
+        'include = ["material.toml"]\n'
+        "[body.1]\nsurface = { shape = 'sphere', radius = '1 mm' }\n"
+        "[body.2]\nrigid = true\nsurface = { shape = 'flat' }\n"
+        "[grid]\nnodes_in_radius = 5\n"
+        "[[load]]\nseries = { file = 'loads.csv' }\n"
+    )
+    file = tmp_path / "study.toml"
+    file.write_text('deck = "deck.toml"\n[[parameter]]\nkey = "body.1.poisson_ratio"\nvalues = [0.2, 0.3]\n')
+    before = [case.hash for case in hexcontact.Study.from_toml(file).plan.cases]
+    (tmp_path / "material.toml").write_text("[body.1]\nyoung_modulus = '100 GPa'\npoisson_ratio = 0.3\n")
+    after = [case.hash for case in hexcontact.Study.from_toml(file).plan.cases]
+    assert len(set(before + after)) == 4
+    (tmp_path / "loads.csv").write_text("normal_load [N]\n1\n3\n")
+    assert not set(after) & {case.hash for case in hexcontact.Study.from_toml(file).plan.cases}

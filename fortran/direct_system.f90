@@ -91,7 +91,7 @@ contains
     contact = pack([(i, i=1, size(it%p))], it%contact)
     stuck = pack(contact, it%zone(contact) == stick)
     sliding = pack(contact, it%zone(contact) == slip .and. it%compliance(contact) < infinite)
-    node = [contact, stuck, stuck, sliding]
+    allocate (node, source=[contact, stuck, stuck, sliding])
     place = unpack([(i, i=1, size(contact))], it%contact, 0)
     place = place(node)
     call new_driven_motions(driven, problem, target, reshape(it%contact, problem%lattice%extent))

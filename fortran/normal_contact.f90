@@ -27,6 +27,8 @@ module hc_normal_contact
   !> Coarse lattices only have to give a start.
   real(wp), parameter :: coarse_tolerance = 3.0e-2_wp
 
+  !> Lattices with fewer nodes are left to one thread.
+  integer, parameter :: worth_sharing = 150000
   !> Parts of the window that are tried, and their tolerance.
   integer, parameter :: part_tries = 3
   real(wp), parameter :: part_tolerance = 0.8_wp
@@ -96,7 +98,7 @@ contains
         ! the kernel grows with the spacing
         kernel%factor = pair%lambda_1*2.0_wp**(l - 1)
         ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
-        call level%prepare(pair, kernel, l == 1, l > 1, error, n_threads)
+        call level%prepare(pair, kernel, l == 1, l > 1, error, threads_of(level%lattice, self%n_threads))
         if (allocated(error)) return
       end associate
     end do
@@ -162,6 +164,16 @@ contains
     state%operator_applications = work
   end subroutine solve
 
+  !> Threads for a lattice: one where waking the others for each of the short passes takes longer than they save.
+  pure integer function threads_of(lattice, n_threads)
+    type(lattice_t), intent(in) :: lattice
+    !> Threads that were asked for; 0: as many as OpenMP would take
+    integer, intent(in) :: n_threads
+
+    threads_of = n_threads
+    if (n_threads == 0 .and. lattice%size() < worth_sharing) threads_of = 1
+  end function threads_of
+
   !> Nodes of a part of a lattice over those of the whole.
   pure real(wp) function share_of(part, whole)
     type(normal_level_t), intent(in) :: part, whole
@@ -218,7 +230,7 @@ contains
         if (state%converged .or. .not. part%converged) return
       end do
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
-      call whole%prepare(self%pair, self%kernel, .true., .true., error, self%n_threads)
+      call whole%prepare(self%pair, self%kernel, .true., .true., error, threads_of(whole%lattice, self%n_threads))
       if (allocated(error)) return
       call solve_level(whole, control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
@@ -246,7 +258,7 @@ contains
       inner%lattice = part_of(whole%lattice, low, high)
       inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
       inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
-      call inner%prepare(self%pair, self%kernel, .true., .true., error, self%n_threads)
+      call inner%prepare(self%pair, self%kernel, .true., .true., error, threads_of(inner%lattice, self%n_threads))
     end associate
   end subroutine take_part
 

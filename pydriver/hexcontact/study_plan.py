@@ -13,10 +13,9 @@ import numpy as np
 
 from .case import Case
 from .case_arguments import as_toml
-from .deck import Deck
+from .deck import Deck, with_overrides
 from .errors import DeckError
 from .messages import Source, shown
-from .overrides import apply
 from .study_deck import MOST_CASES, Parameter, StudyFile
 from .units import ANGLE
 from .validation import Kind, Quantity, Table, Whole
@@ -146,7 +145,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
             raise DeckError(f"{study}: parameter {key}: a study names the files of its cases itself")
     first = {entry.key: (entry.values or entry.range or ())[0] for entry in file.parameter}
     try:
-        deck = Deck.parse(_merged(base, first), about)
+        deck = Deck.parse(with_overrides(base, first), about)
     except DeckError as error:
         raise DeckError(_with_case(str(error), about, 1, first)) from None
     axes = tuple(_axis(entry, deck, file.combine, study) for entry in file.parameter)
@@ -155,7 +154,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     cases, sentences = [], []
     for position, values in enumerate(settings):
         try:
-            merged = _merged(base, values)
+            merged = with_overrides(base, values)
             if check:
                 Case._made(merged, None, about)
             cases.append(PlannedCase(position, values, as_toml(merged, gap_given=False)))
@@ -177,12 +176,6 @@ def _output(base: Mapping[str, Any]) -> dict[str, Any]:
         return {} if output is None else {"output": output}
     kept = {key: value for key, value in output.items() if key != "file"}
     return {"output": kept} if kept else {}
-
-
-def _merged(base: Mapping[str, Any], settings: Mapping[str, Any]) -> Mapping[str, Any]:
-    for key, value in settings.items():
-        base = apply(base, key, value)
-    return base
 
 
 def _with_case(error: str, source: _StudySource, number: int, settings: Mapping[str, Any]) -> str:

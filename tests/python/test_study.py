@@ -23,8 +23,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, DeckError, overrides, starters, study_run
+from hexcontact import Case, DeckError, starters, study_run
 from hexcontact.cli import app
+from hexcontact.deck import with_overrides
 from hexcontact.study import Study, run_study
 from hexcontact.study_run import Job, LocalPool, solve_case
 
@@ -110,13 +111,13 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def test_one_key_of_a_deck_is_replaced_in_a_copy() -> None:
     deck = {"load": [{"steps": 1}, {"steps": 2}], "grid": {"spacing": 1.0}}
-    changed = overrides.apply(deck, "load.2.steps", 5)
+    changed = with_overrides(deck, {"load.2.steps": 5})
     assert changed == {"load": [{"steps": 1}, {"steps": 5}], "grid": {"spacing": 1.0}}
     assert deck["load"][1] == {"steps": 2}  # type: ignore[index]
-    assert overrides.apply(deck, "friction.coefficient", 0.1)["friction"] == {"coefficient": 0.1}
+    assert with_overrides(deck, {"friction.coefficient": 0.1})["friction"] == {"coefficient": 0.1}
     for path in ("load.3.steps", "load.0.steps", "grid.spacing.x"):
         with pytest.raises(DeckError, match=re.escape(path)):
-            overrides.apply(deck, path, 1)
+            with_overrides(deck, {path: 1})
 
 
 def test_grid_has_every_value_with_every_other_in_si(folder: Path) -> None:

@@ -1,20 +1,20 @@
 !> Convolutions over a window of the lattice by FFT.
 !>
-!> A product takes four stages, each cut into independent 1-D transforms with
-!> one plan, so that the result does not depend on the number of threads:
-!> real transforms along the rows of the window (padding rows are never
-!> touched); transforms along the columns in blocks that stay in cache; there,
-!> multiplication with the spectra and the inverse transforms at once; inverse
-!> real transforms of the rows of the window.
+!> A product takes three stages, each cut into independent 1-D transforms, so that the
+!> result does not depend on the number of threads: transforms along the rows of the window
+!> (padding rows are never touched), two real rows as the two parts of a complex one;
+!> transforms along the columns in blocks that stay in cache, there multiplication with the
+!> spectra and transforms back at once; transforms of the rows back. The way back is the
+!> forward transform of the conjugate, so that two plans are enough.
 !>
 !> Every kernel is even or odd, so that its spectrum is real, or i times real.
 module hc_convolution
   use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_int
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_fftw, only: fftw_plan_many_dft, fftw_plan_many_dft_r2c, fftw_plan_many_dft_c2r, &
-                     fftw_execute_dft, fftw_execute_dft_r2c, fftw_execute_dft_c2r, fftw_destroy_plan, &
-                     fftw_forward, fftw_backward, fftw_estimate
+  use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
+  use hc_row_pairs, only: split_rows, join_rows
+  use hc_spectral_product, only: multiply, multiply_one
   !$ use omp_lib, only: omp_get_thread_num, omp_get_max_threads
   implicit none
   private
@@ -25,8 +25,6 @@ module hc_convolution
   integer, parameter :: block_bytes = 32768
   !> Smaller windows are left to one thread: starting the others takes longer than they save.
   integer, parameter :: worth_sharing = 16384
-  !> Number of frequencies that are multiplied at a time.
-  integer, parameter :: chunk = 128
 
   !> Plans, spectra and scratch space.
   type :: convolution_t
@@ -45,12 +43,11 @@ module hc_convolution
     integer, private :: n_frequency = 0, leading = 0
     !> The first odd kernel
     integer, private :: first_odd = 0
-    type(c_ptr), private :: row_forward = c_null_ptr, row_inverse = c_null_ptr
-    type(c_ptr), private :: column_forward = c_null_ptr, column_inverse = c_null_ptr
-    !> Row transforms (leading, n_row, component)
+    type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
+    !> Row transforms (leading, n_row or one more, component)
     complex(wp), allocatable, private :: work(:, :, :)
-    !> One padded row for each thread
-    real(wp), allocatable, private :: row_buffer(:, :)
+    !> Two padded rows before and after their transform, for each thread
+    complex(wp), allocatable, private :: row_buffer(:, :, :)
     !> One column block of each component for each thread
     complex(wp), allocatable, private :: block_buffer(:, :, :)
   contains
@@ -113,10 +110,9 @@ contains
     self%leading = self%n_block*self%width
     associate (column => self%width*padded(2))
       ! the columns that only fill up the last block are transformed too: zeros stay zeros
-      allocate (self%work(self%leading, extent(2), n_component), &
+      allocate (self%work(self%leading, even(extent(2)), n_component), self%row_buffer(padded(1), 2, self%n_threads), &
                 self%block_buffer(column, n_component, self%n_threads), source=(0.0_wp, 0.0_wp), stat=stat)
-      if (stat == 0) allocate (self%row_buffer(padded(1), self%n_threads), &
-                               self%spectrum(column, self%n_block, n_kernel), source=0.0_wp, stat=stat)
+      if (stat == 0) allocate (self%spectrum(column, self%n_block, n_kernel), source=0.0_wp, stat=stat)
     end associate
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
@@ -155,9 +151,15 @@ contains
     n_row = extent(2)
     length = padded(2)
     convolution_memory = n_kernel*leading*length + 2*(n_component + n_kernel)*leading*n_row &
-                         + n_threads*(padded(1) + 2*n_component*width*length)
+                         + n_threads*(4*padded(1) + 2*n_component*width*length)
     convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
   end function convolution_memory
+
+  !> Rows are transformed in pairs.
+  elemental integer function even(n)
+    integer, intent(in) :: n
+    even = n + modulo(n, 2)
+  end function even
 
   !> Columns that are transformed together: 4, 8, 12 or 16, so that all transforms begin at addresses
   !> alike modulo 16 bytes, as their common plan expects.
@@ -177,18 +179,13 @@ contains
     ! FFTW_ESTIMATE: the same plan, and the same result, in every run
     !$omp critical (hc_fftw_planner)
     length = n1
-    self%row_forward = fftw_plan_many_dft_r2c(1_c_int, length, 1_c_int, self%row_buffer, length, 1_c_int, n1, &
-                                              self%work, length, 1_c_int, n1, fftw_estimate)
-    self%row_inverse = fftw_plan_many_dft_c2r(1_c_int, length, 1_c_int, self%work, length, 1_c_int, n1, &
-                                              self%row_buffer, length, 1_c_int, n1, fftw_estimate)
+    self%row_plan = fftw_plan_many_dft(1_c_int, length, 1_c_int, self%row_buffer(:, 1, 1), length, 1_c_int, n1, &
+                                       self%row_buffer(:, 2, 1), length, 1_c_int, n1, fftw_forward, fftw_estimate)
     length = self%padded(2)
-    self%column_forward = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer, length, width, 1_c_int, &
-                                             self%block_buffer, length, width, 1_c_int, fftw_forward, fftw_estimate)
-    self%column_inverse = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer, length, width, 1_c_int, &
-                                             self%block_buffer, length, width, 1_c_int, fftw_backward, fftw_estimate)
+    self%column_plan = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer, length, width, 1_c_int, &
+                                          self%block_buffer, length, width, 1_c_int, fftw_forward, fftw_estimate)
     !$omp end critical (hc_fftw_planner)
-    if (.not. (c_associated(self%row_forward) .and. c_associated(self%row_inverse) .and. &
-               c_associated(self%column_forward) .and. c_associated(self%column_inverse))) then
+    if (.not. (c_associated(self%row_plan) .and. c_associated(self%column_plan))) then
       call raise(error, status%resources, 'FFTW could not plan the transforms of this window')
     end if
   end subroutine make_plans
@@ -206,14 +203,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     complex(wp), allocatable :: rows(:, :, :)
-    real(wp), allocatable :: kernel(:, :)
+    real(wp), allocatable :: kernel(:, :, :)
     real(wp) :: scale, sign
     integer :: n(2), n_kernel, j, m, b, thread, stat, from, to
 
     n = self%extent
     n_kernel = size(self%spectrum, 3)
     scale = 1.0_wp/(real(self%padded(1), wp)*real(self%padded(2), wp))
-    allocate (rows(self%leading, 0:n(2) - 1, n_kernel), stat=stat)
+    allocate (rows(self%leading, 0:even(n(2)) - 1, n_kernel), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the spectra of the kernels: use a smaller window')
       return
@@ -222,16 +219,20 @@ contains
     thread = 1
     !$omp parallel num_threads(self%n_threads) private(j, m, b, kernel, sign, from, to) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    allocate (kernel(n_kernel, 1 - n(1):n(1) - 1))
+    allocate (kernel(n_kernel, 1 - n(1):n(1) - 1, 2), source=0.0_wp)
     !$omp do schedule(dynamic)
-    do j = 0, n(2) - 1
-      call source%row(j, kernel)
+    do j = 0, n(2) - 1, 2
+      call source%row(j, kernel(:, :, 1))
+      if (j + 1 < n(2)) call source%row(j + 1, kernel(:, :, 2))
       do m = 1, n_kernel
-        self%row_buffer(:, thread) = 0.0_wp
-        self%row_buffer(:n(1), thread) = scale*kernel(m, 0:)
-        self%row_buffer(self%padded(1) - n(1) + 2:, thread) = scale*kernel(m, :-1)
-        call fftw_execute_dft_r2c(self%row_forward, self%row_buffer(:, thread), rows(:, j, m))
-        rows(self%n_frequency + 1:, j, m) = 0.0_wp
+        associate (given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
+          given(:n(1)) = scale*cmplx(kernel(m, 0:, 1), kernel(m, 0:, 2), wp)
+          given(n(1) + 1:) = 0.0_wp
+          given(self%padded(1) - n(1) + 2:) = scale*cmplx(kernel(m, :-1, 1), kernel(m, :-1, 2), wp)
+          call fftw_execute_dft(self%row_plan, given, transformed)
+          call split_rows(transformed, rows(:self%n_frequency, j, m), rows(:self%n_frequency, j + 1, m))
+        end associate
+        rows(self%n_frequency + 1:, j:j + 1, m) = 0.0_wp
       end do
     end do
     !$omp end do
@@ -247,7 +248,7 @@ contains
             buffer(j*w + 1:(j + 1)*w) = rows(from:to, j, m)
             if (j > 0) buffer((self%padded(2) - j)*w + 1:(self%padded(2) - j + 1)*w) = sign*conjg(rows(from:to, j, m))
           end do
-          call fftw_execute_dft(self%column_forward, buffer, buffer)
+          call fftw_execute_dft(self%column_plan, buffer, buffer)
           if (m < self%first_odd) then
             self%spectrum(:, b, m) = real(buffer, wp)
           else
@@ -293,17 +294,11 @@ contains
     thread = 1
     !$omp parallel num_threads(self%n_threads) private(i, o, row, b) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    self%row_buffer(n(1) + 1:, thread) = 0.0_wp
+    self%row_buffer(n(1) + 1:, 1, thread) = 0.0_wp
     do i = 1, size(field, 3)
       !$omp do schedule(static)
-      do row = 1, n(2)
-        ! rows off the contact need no transform
-        if (all(abs(field(:, row, i)) <= 0.0_wp)) then
-          self%work(:self%n_frequency, row, i) = 0.0_wp
-        else
-          self%row_buffer(:n(1), thread) = field(:, row, i)
-          call fftw_execute_dft_r2c(self%row_forward, self%row_buffer(:, thread), self%work(:, row, i))
-        end if
+      do row = 1, n(2), 2
+        call transform_rows(self, row, field(:, :, i), self%row_buffer(:, :, thread), self%work(:, row:row + 1, i))
       end do
       !$omp end do nowait
     end do
@@ -315,16 +310,49 @@ contains
     !$omp end do
     do o = 1, size(result, 3)
       !$omp do schedule(static)
-      do row = 1, n(2)
-        call fftw_execute_dft_c2r(self%row_inverse, self%work(:, row, o), self%row_buffer(:, thread))
-        result(:, row, o) = self%row_buffer(:n(1), thread)
+      do row = 1, n(2), 2
+        associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
+          call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
+          call fftw_execute_dft(self%row_plan, joined, transformed)
+          result(:, row, o) = real(transformed(:n(1)), wp)
+          if (row < n(2)) result(:, row + 1, o) = -aimag(transformed(:n(1)))
+        end associate
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
   end subroutine convolve
 
-  !> Transform a block of columns, multiply with the spectra, transform back.
+  !> Transform two rows of a field.
+  subroutine transform_rows(self, row, field, buffer, transformed)
+    class(convolution_t), intent(in) :: self
+    !> Index of the first row
+    integer, intent(in) :: row
+    !> Field (n_col, n_row)
+    real(wp), intent(in) :: field(:, :)
+    !> Scratch (padded row, 2); the first row is zero beyond the window and stays so
+    complex(wp), intent(inout), contiguous :: buffer(:, :)
+    !> Transforms of both rows (leading, 2)
+    complex(wp), intent(inout), contiguous :: transformed(:, :)
+    integer :: n, last
+
+    n = self%extent(1)
+    last = min(row + 1, self%extent(2))
+    ! rows off the contact need no transform
+    if (all(abs(field(:, row:last)) <= 0.0_wp)) then
+      transformed(:self%n_frequency, :) = 0.0_wp
+      return
+    end if
+    if (last > row) then
+      buffer(:n, 1) = cmplx(field(:, row), field(:, last), wp)
+    else
+      buffer(:n, 1) = field(:, row)
+    end if
+    call fftw_execute_dft(self%row_plan, buffer(:, 1), buffer(:, 2))
+    call split_rows(buffer(:, 2), transformed(:self%n_frequency, 1), transformed(:self%n_frequency, 2))
+  end subroutine transform_rows
+
+  !> Transform a block of columns, multiply with the spectra, transform back (the conjugate, that is).
   subroutine convolve_block(self, b, kernel, buffer)
     class(convolution_t), intent(inout) :: self
     !> Index of the block
@@ -342,35 +370,20 @@ contains
     do i = 1, size(kernel, 2)
       call copy_columns(w, n_row, self%leading, w, self%work(first, 1, i), buffer(:, i))
       buffer(n_row*w + 1:, i) = 0.0_wp
-      call fftw_execute_dft(self%column_forward, buffer(:, i), buffer(:, i))
+      call fftw_execute_dft(self%column_plan, buffer(:, i), buffer(:, i))
     end do
 
     if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
-      call scale(size(buffer, 1), self%spectrum(:, b, kernel(1, 1)), buffer(:, 1))
+      call multiply_one(size(buffer, 1), self%spectrum(:, b, kernel(1, 1)), buffer(:, 1))
     else
-      call multiply(self, b, kernel, buffer)
+      call multiply(self%spectrum(:, b, :), self%first_odd, kernel, buffer)
     end if
 
     do o = 1, size(kernel, 1)
-      call fftw_execute_dft(self%column_inverse, buffer(:, o), buffer(:, o))
+      call fftw_execute_dft(self%column_plan, buffer(:, o), buffer(:, o))
       call copy_columns(w, n_row, w, self%leading, buffer(:, o), self%work(first, 1, o))
     end do
   end subroutine convolve_block
-
-  !> A single even kernel, the whole operator of frictionless contact.
-  pure subroutine scale(n, spectrum, field)
-    !> Number of frequencies
-    integer, intent(in) :: n
-    !> Spectrum of the kernel
-    real(wp), intent(in) :: spectrum(n)
-    !> Transformed field
-    complex(wp), intent(inout) :: field(n)
-    integer :: f
-
-    do f = 1, n
-      field(f) = cmplx(spectrum(f)*real(field(f), wp), spectrum(f)*aimag(field(f)), wp)
-    end do
-  end subroutine scale
 
   !> Columns of a matrix from one place to another; their number is a multiple of four.
   pure subroutine copy_columns(width, n_row, from_leading, onto_leading, from, onto)
@@ -393,144 +406,26 @@ contains
     end do
   end subroutine copy_columns
 
-  !> Up to three fields and any kernels.
-  subroutine multiply(self, b, kernel, buffer)
-    class(convolution_t), intent(in) :: self
-    !> Index of the block
-    integer, intent(in) :: b
-    !> Number of the kernel (onto, from), negative to reverse its sign
-    integer, intent(in) :: kernel(:, :)
-    !> Transformed fields, replaced by the results
-    complex(wp), intent(inout), contiguous :: buffer(:, :)
-
-    integer, parameter :: plain = 1, rotated = 2
-    !> Fields as they are and times i (frequency, from)
-    complex(wp) :: field(chunk, 3, 2)
-    integer :: i, o, start, last, m, n_from, turn(3), k(3)
-    real(wp) :: sign(3)
-
-    n_from = size(kernel, 2)
-    do start = 1, size(buffer, 1), chunk
-      last = min(start + chunk - 1, size(buffer, 1))
-      m = last - start + 1
-      do i = 1, n_from
-        field(:m, i, plain) = buffer(start:last, i)
-        if (any(abs(kernel(:, i)) >= self%first_odd)) call rotate(m, field(:, i, plain), field(:, i, rotated))
-      end do
-      do o = 1, size(kernel, 1)
-        k(:n_from) = abs(kernel(o, :))
-        sign(:n_from) = merge(1.0_wp, -1.0_wp, kernel(o, :) > 0)
-        turn(:n_from) = merge(rotated, plain, k(:n_from) >= self%first_odd)
-        select case (n_from)
-        case (1)
-          call add_1(m, sign, self%spectrum(start:last, b, k(1)), field(:, 1, turn(1)), buffer(start:last, o))
-        case (2)
-          call add_2(m, sign, self%spectrum(start:last, b, k(1)), field(:, 1, turn(1)), &
-                     self%spectrum(start:last, b, k(2)), field(:, 2, turn(2)), buffer(start:last, o))
-        case default
-          call add_3(m, sign, self%spectrum(start:last, b, k(1)), field(:, 1, turn(1)), &
-                     self%spectrum(start:last, b, k(2)), field(:, 2, turn(2)), &
-                     self%spectrum(start:last, b, k(3)), field(:, 3, turn(3)), buffer(start:last, o))
-        end select
-      end do
-    end do
-  end subroutine multiply
-
-  !> A field times i.
-  pure subroutine rotate(n, field, rotated)
-    !> Number of frequencies
-    integer, intent(in) :: n
-    complex(wp), intent(in) :: field(n)
-    complex(wp), intent(inout) :: rotated(n)
-    integer :: f
-
-    do f = 1, n
-      rotated(f) = cmplx(-aimag(field(f)), real(field(f), wp), wp)
-    end do
-  end subroutine rotate
-
-  !> total = sign * spectrum * field
-  pure subroutine add_1(n, sign, s_1, f_1, total)
-    !> Number of frequencies
-    integer, intent(in) :: n
-    !> Sign and spectrum of the kernel
-    real(wp), intent(in) :: sign(1), s_1(n)
-    !> Transformed field and result
-    complex(wp), intent(in) :: f_1(n)
-    complex(wp), intent(inout) :: total(n)
-    real(wp) :: a
-    integer :: f
-
-    do f = 1, n
-      a = sign(1)*s_1(f)
-      total(f) = cmplx(a*real(f_1(f), wp), a*aimag(f_1(f)), wp)
-    end do
-  end subroutine add_1
-
-  !> total = sum over two fields of sign * spectrum * field
-  pure subroutine add_2(n, sign, s_1, f_1, s_2, f_2, total)
-    !> Number of frequencies
-    integer, intent(in) :: n
-    !> Signs and spectra of the kernels
-    real(wp), intent(in) :: sign(2), s_1(n), s_2(n)
-    !> Transformed fields and result
-    complex(wp), intent(in) :: f_1(n), f_2(n)
-    complex(wp), intent(inout) :: total(n)
-    real(wp) :: a, b
-    integer :: f
-
-    do f = 1, n
-      a = sign(1)*s_1(f)
-      b = sign(2)*s_2(f)
-      total(f) = cmplx(a*real(f_1(f), wp) + b*real(f_2(f), wp), a*aimag(f_1(f)) + b*aimag(f_2(f)), wp)
-    end do
-  end subroutine add_2
-
-  !> total = sum over three fields of sign * spectrum * field
-  pure subroutine add_3(n, sign, s_1, f_1, s_2, f_2, s_3, f_3, total)
-    !> Number of frequencies
-    integer, intent(in) :: n
-    !> Signs and spectra of the kernels
-    real(wp), intent(in) :: sign(3), s_1(n), s_2(n), s_3(n)
-    !> Transformed fields and result
-    complex(wp), intent(in) :: f_1(n), f_2(n), f_3(n)
-    complex(wp), intent(inout) :: total(n)
-    real(wp) :: a, b, c
-    integer :: f
-
-    do f = 1, n
-      a = sign(1)*s_1(f)
-      b = sign(2)*s_2(f)
-      c = sign(3)*s_3(f)
-      total(f) = cmplx(a*real(f_1(f), wp) + b*real(f_2(f), wp) + c*real(f_3(f), wp), &
-                       a*aimag(f_1(f)) + b*aimag(f_2(f)) + c*aimag(f_3(f)), wp)
-    end do
-  end subroutine add_3
-
   !> Run the transforms of one scalar product and nothing else, to compare times with.
   subroutine time_transforms(self)
     class(convolution_t), intent(inout) :: self
-    integer :: row, b, thread
+    integer :: row, b, k, thread
 
     thread = 1
-    !$omp parallel num_threads(self%n_threads) private(row, b) firstprivate(thread)
+    !$omp parallel num_threads(self%n_threads) private(row, b, k) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    !$omp do schedule(static)
-    do row = 1, self%extent(2)
-      call fftw_execute_dft_r2c(self%row_forward, self%row_buffer(:, thread), self%work(:, row, 1))
+    do k = 1, 2
+      !$omp do schedule(static)
+      do row = 1, self%extent(2), 2
+        call fftw_execute_dft(self%row_plan, self%row_buffer(:, 1, thread), self%row_buffer(:, 2, thread))
+      end do
+      !$omp end do
+      !$omp do schedule(static)
+      do b = 1, self%n_block
+        call fftw_execute_dft(self%column_plan, self%block_buffer(:, 1, thread), self%block_buffer(:, 1, thread))
+      end do
+      !$omp end do
     end do
-    !$omp end do
-    !$omp do schedule(static)
-    do b = 1, self%n_block
-      call fftw_execute_dft(self%column_forward, self%block_buffer(:, 1, thread), self%block_buffer(:, 1, thread))
-      call fftw_execute_dft(self%column_inverse, self%block_buffer(:, 1, thread), self%block_buffer(:, 1, thread))
-    end do
-    !$omp end do
-    !$omp do schedule(static)
-    do row = 1, self%extent(2)
-      call fftw_execute_dft_c2r(self%row_inverse, self%work(:, row, 1), self%row_buffer(:, thread))
-    end do
-    !$omp end do
     !$omp end parallel
   end subroutine time_transforms
 
@@ -538,15 +433,11 @@ contains
     type(convolution_t), intent(inout) :: self
 
     !$omp critical (hc_fftw_planner)
-    if (c_associated(self%row_forward)) call fftw_destroy_plan(self%row_forward)
-    if (c_associated(self%row_inverse)) call fftw_destroy_plan(self%row_inverse)
-    if (c_associated(self%column_forward)) call fftw_destroy_plan(self%column_forward)
-    if (c_associated(self%column_inverse)) call fftw_destroy_plan(self%column_inverse)
+    if (c_associated(self%row_plan)) call fftw_destroy_plan(self%row_plan)
+    if (c_associated(self%column_plan)) call fftw_destroy_plan(self%column_plan)
     !$omp end critical (hc_fftw_planner)
-    self%row_forward = c_null_ptr
-    self%row_inverse = c_null_ptr
-    self%column_forward = c_null_ptr
-    self%column_inverse = c_null_ptr
+    self%row_plan = c_null_ptr
+    self%column_plan = c_null_ptr
   end subroutine free_plans
 
 end module hc_convolution

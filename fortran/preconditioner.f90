@@ -1,7 +1,7 @@
 !> Fourier preconditioner: the inverse of the lattice symbol on a small periodic grid.
 !>
-!> The grid is a little larger than the window instead of twice as large, so
-!> that one application costs about a quarter of a product. It is symmetric
+!> The grid is that of the window, or the next of a fast length, instead of twice
+!> as large, so that one application costs about a quarter of a product. It is symmetric
 !> and positive definite, also when it is restricted to a set of nodes.
 module hc_preconditioner
   use hc_precision, only: wp, sp
@@ -65,7 +65,7 @@ contains
 
     if (present(tangential)) self%tangential = tangential
     n_component = merge(2, 1, self%tangential)
-    length = grid_length(lattice%extent)
+    length = good_size(lattice%extent)
     call new_convolution(self%convolution, lattice%extent, length, merge(3, 1, self%tangential), n_component, error, &
                          n_threads=n_threads)
     if (allocated(error)) return
@@ -105,16 +105,9 @@ contains
     integer, intent(in) :: n_threads
     !> For shear tractions instead of the pressure
     logical, intent(in) :: tangential
-    preconditioner_memory = convolution_memory(extent, grid_length(extent), merge(3, 1, tangential), &
+    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(3, 1, tangential), &
                                                merge(2, 1, tangential), n_threads)
   end function preconditioner_memory
-
-  !> Side of the periodic grid: an eighth more than the window.
-  elemental integer function grid_length(extent)
-    !> Number of columns or rows of the window
-    integer, intent(in) :: extent
-    grid_length = good_size(extent + (extent + 7)/8)
-  end function grid_length
 
   subroutine apply(self, displacement, traction, edge)
     class(preconditioner_t), intent(inout) :: self

@@ -9,7 +9,7 @@
 !> Arguments are sides of windows: for each a line of seconds instead of the table, to be read by a program
 !> (side; scalar product, bare and blocked transforms; 3x3 product, its bare and blocked transforms).
 program bench_operator
-  use, intrinsic :: iso_c_binding, only: c_ptr, c_int
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_int, c_double, c_double_complex
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -17,10 +17,44 @@ program bench_operator
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_fftw, only: fftw_plan_many_dft, fftw_plan_many_dft_r2c, fftw_plan_many_dft_c2r, fftw_execute_dft, &
-                     fftw_execute_dft_r2c, fftw_execute_dft_c2r, fftw_destroy_plan, &
-                     fftw_forward, fftw_backward, fftw_estimate, good_size
+  use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate, good_size
   implicit none
+
+  !> Of fftw3.h: real transforms, which the library does without.
+  integer(c_int), parameter :: fftw_backward = 1
+  interface
+    type(c_ptr) function fftw_plan_many_dft_r2c(rank, n, howmany, input, inembed, istride, idist, &
+                                                output, onembed, ostride, odist, flags) bind(c, name='fftw_plan_many_dft_r2c')
+      import :: c_ptr, c_int, c_double, c_double_complex
+      integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, flags
+      integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+      real(c_double), intent(inout) :: input(*)
+      complex(c_double_complex), intent(inout) :: output(*)
+    end function fftw_plan_many_dft_r2c
+
+    type(c_ptr) function fftw_plan_many_dft_c2r(rank, n, howmany, input, inembed, istride, idist, &
+                                                output, onembed, ostride, odist, flags) bind(c, name='fftw_plan_many_dft_c2r')
+      import :: c_ptr, c_int, c_double, c_double_complex
+      integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, flags
+      integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+      complex(c_double_complex), intent(inout) :: input(*)
+      real(c_double), intent(inout) :: output(*)
+    end function fftw_plan_many_dft_c2r
+
+    subroutine fftw_execute_dft_r2c(plan, input, output) bind(c, name='fftw_execute_dft_r2c')
+      import :: c_ptr, c_double, c_double_complex
+      type(c_ptr), value :: plan
+      real(c_double), intent(inout) :: input(*)
+      complex(c_double_complex), intent(inout) :: output(*)
+    end subroutine fftw_execute_dft_r2c
+
+    subroutine fftw_execute_dft_c2r(plan, input, output) bind(c, name='fftw_execute_dft_c2r')
+      import :: c_ptr, c_double, c_double_complex
+      type(c_ptr), value :: plan
+      complex(c_double_complex), intent(inout) :: input(*)
+      real(c_double), intent(inout) :: output(*)
+    end subroutine fftw_execute_dft_c2r
+  end interface
 
   integer, parameter :: sides(4) = [256, 512, 1024, 2048]
   integer :: i

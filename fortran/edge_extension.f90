@@ -25,6 +25,8 @@ module hc_edge_extension
   !> the contact), and at most so many.
   real(wp), parameter :: ring_factor = 0.7_wp, ring_power = 0.8_wp
   integer, parameter :: most_rings = 16
+  !> Marks of nodes without a ring, and of what lies around the window.
+  integer, parameter :: free = huge(0), outside = huge(0) - 1
   !> Times that a ring is smoothed.
   integer, parameter :: smoothings = 2
 
@@ -55,46 +57,83 @@ contains
     !> Active nodes (n_col, n_row)
     logical, intent(in) :: active(:, :)
 
-    !> 0 on active nodes, the place in the list on those of the rings, huge elsewhere
-    integer, allocatable :: mark(:, :)
-    integer, allocatable :: frontier(:), next(:)
-    integer :: n_ring, r, first, last, n, k
+    !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
+    !> those of the rings, `free` elsewhere and `outside` around
+    integer, allocatable :: mark(:)
+    integer, allocatable :: frontier(:), next(:), node(:)
+    integer :: beside(6), inner(6)
+    integer :: n_ring, n_col, width, step(6), r, n, k, n_inner, n_beside
 
     call find_edge(active, frontier)
-    allocate (self%node(0), self%ring(1))
-    self%ring(1) = 1
     n_ring = 0
     if (size(frontier) > 0) then
       n_ring = min(most_rings, int(ring_factor*(real(count(active), wp)/size(frontier))**ring_power))
     end if
-    allocate (mark, source=merge(0, huge(0), active))
+    n_col = size(active, 1)
+    width = n_col + 2
+    step = neighbors(1, :) + width*neighbors(2, :)
+    call mark_window(active, mark)
+    frontier = frontier + width + 1 + 2*((frontier - 1)/n_col)
+    allocate (node(0), self%ring(1))
+    self%ring(1) = 1
     do r = 1, n_ring
-      call next_ring(frontier, mark, size(self%node), next)
+      call next_ring(frontier, step, mark, size(node), next)
       if (size(next) == 0) exit
-      self%node = [self%node, next]
-      self%ring = [self%ring, size(self%node) + 1]
+      node = [node, next]
+      self%ring = [self%ring, size(node) + 1]
       call move_alloc(next, frontier)
     end do
 
-    n = size(self%node)
+    n = size(node)
     n_ring = size(self%ring) - 1
-    allocate (self%inner_start(n + 1), self%beside_start(n + 1), self%fall(n))
+    allocate (self%node(n), self%inner_start(n + 1), self%beside_start(n + 1), self%fall(n))
     allocate (self%inner(6*n), self%beside(7*n))
     self%inner_start(1) = 1
     self%beside_start(1) = 1
     do r = 1, n_ring
       do k = self%ring(r), self%ring(r + 1) - 1
-        first = self%inner_start(k)
-        last = self%beside_start(k)
-        self%beside(last) = k
-        call list_neighbors(self%node(k), mark, self%ring(r), self%ring(r + 1), self%inner(first:), self%beside(last + 1:), &
-                            self%inner_start(k + 1), self%beside_start(k + 1))
-        self%inner_start(k + 1) = first + self%inner_start(k + 1)
-        self%beside_start(k + 1) = last + 1 + self%beside_start(k + 1)
-        self%fall(k) = real(profile(r, n_ring)/profile(r - 1, n_ring)/(self%inner_start(k + 1) - first), sp)
+        call list_neighbors(node(k), step, mark, self%ring(r), self%ring(r + 1), inner, beside, n_inner, n_beside)
+        self%node(k) = in_window(node(k))
+        associate (first => self%inner_start(k), last => self%beside_start(k))
+          self%inner(first:first + n_inner - 1) = in_window(inner(:n_inner))
+          self%beside(last) = k
+          self%beside(last + 1:last + n_beside) = beside(:n_beside)
+          self%inner_start(k + 1) = first + n_inner
+          self%beside_start(k + 1) = last + 1 + n_beside
+        end associate
+        self%fall(k) = real(profile(r, n_ring)/profile(r - 1, n_ring)/n_inner, sp)
       end do
     end do
+
+  contains
+
+    !> Place in the window of a place in the marks.
+    elemental integer function in_window(place)
+      integer, intent(in) :: place
+      integer :: row
+      row = (place - 1)/width
+      in_window = place - 1 - row*width + (row - 1)*n_col
+    end function in_window
+
   end subroutine new_edge_extension
+
+  !> Marks of all nodes before there are rings.
+  pure subroutine mark_window(active, mark)
+    logical, intent(in) :: active(:, :)
+    integer, allocatable, intent(out) :: mark(:)
+    integer :: row, width, start
+
+    width = size(active, 1) + 2
+    allocate (mark(width*(size(active, 2) + 2)))
+    mark(:width) = outside
+    mark(size(mark) - width + 1:) = outside
+    do row = 1, size(active, 2)
+      start = row*width + 1
+      mark(start) = outside
+      mark(start + 1:start + width - 2) = merge(0, free, active(:, row))
+      mark(start + width - 1) = outside
+    end do
+  end subroutine mark_window
 
   !> Height of the continuation in a ring.
   pure real(wp) function profile(ring, n_ring)
@@ -102,16 +141,6 @@ contains
     integer, intent(in) :: ring, n_ring
     profile = 1.0_wp - sqrt(real(ring, wp)/(n_ring + 1))
   end function profile
-
-  !> Column and row of a node.
-  pure subroutine place(node, n_col, col, row)
-    !> Node, number of columns
-    integer, intent(in) :: node, n_col
-    integer, intent(out) :: col, row
-
-    row = (node - 1)/n_col + 1
-    col = node - (row - 1)*n_col
-  end subroutine place
 
   !> Active nodes with a neighbour that is not; a node at the rim of the window has none there.
   pure subroutine find_edge(active, edge)
@@ -144,63 +173,57 @@ contains
   end subroutine find_edge
 
   !> Nodes next to a ring that have no ring yet.
-  pure subroutine next_ring(ring, mark, listed, next)
-    !> Nodes of the ring before
-    integer, intent(in) :: ring(:)
+  pure subroutine next_ring(ring, step, mark, listed, next)
+    !> Nodes of the ring before, and steps to the neighbours of a node
+    integer, intent(in) :: ring(:), step(:)
     !> Marks of all nodes; those of the new ring get their place in the list
-    integer, intent(inout) :: mark(:, :)
+    integer, intent(inout) :: mark(:)
     !> Nodes that are in the list already
     integer, intent(in) :: listed
     !> Nodes of the new ring
     integer, allocatable, intent(out) :: next(:)
     integer, allocatable :: found(:)
-    integer :: i, k, n, col, row, c, r
+    integer :: i, k, n, near
 
-    allocate (found(6*size(ring)))
+    allocate (found(size(step)*size(ring)))
     n = 0
     do i = 1, size(ring)
-      call place(ring(i), size(mark, 1), col, row)
-      do k = 1, size(neighbors, 2)
-        c = col + neighbors(1, k)
-        r = row + neighbors(2, k)
-        if (c < 1 .or. r < 1 .or. c > size(mark, 1) .or. r > size(mark, 2)) cycle
-        if (mark(c, r) < huge(0)) cycle
+      do k = 1, size(step)
+        near = ring(i) + step(k)
+        if (mark(near) /= free) cycle
         n = n + 1
-        mark(c, r) = listed + n
-        found(n) = c + (r - 1)*size(mark, 1)
+        mark(near) = listed + n
+        found(n) = near
       end do
     end do
     next = found(:n)
   end subroutine next_ring
 
   !> Neighbours of a node in the ring before and in its own.
-  pure subroutine list_neighbors(node, mark, own, after, inner, beside, n_inner, n_beside)
-    !> The node
-    integer, intent(in) :: node
+  pure subroutine list_neighbors(node, step, mark, own, after, inner, beside, n_inner, n_beside)
+    !> The node, and steps to its neighbours
+    integer, intent(in) :: node, step(6)
     !> Marks of all nodes
-    integer, intent(in) :: mark(:, :)
+    integer, intent(in) :: mark(:)
     !> First marks of its own ring and of the next
     integer, intent(in) :: own, after
-    !> Neighbours in the ring before (nodes), and in its own (places in the list)
-    integer, intent(inout) :: inner(:), beside(:)
+    !> Neighbours in the ring before (places in the marks), and in its own (places in the list)
+    integer, intent(out) :: inner(6), beside(6)
     !> Their numbers
     integer, intent(out) :: n_inner, n_beside
-    integer :: k, col, row, c, r
+    integer :: k, near
 
     n_inner = 0
     n_beside = 0
-    call place(node, size(mark, 1), col, row)
-    do k = 1, size(neighbors, 2)
-      c = col + neighbors(1, k)
-      r = row + neighbors(2, k)
-      if (c < 1 .or. r < 1 .or. c > size(mark, 1) .or. r > size(mark, 2)) cycle
-      if (mark(c, r) < own) then
+    do k = 1, size(step)
+      near = node + step(k)
+      if (mark(near) < own) then
         ! no neighbour is further in than the ring before
         n_inner = n_inner + 1
-        inner(n_inner) = c + (r - 1)*size(mark, 1)
-      else if (mark(c, r) < after) then
+        inner(n_inner) = near
+      else if (mark(near) < after) then
         n_beside = n_beside + 1
-        beside(n_beside) = mark(c, r)
+        beside(n_beside) = mark(near)
       end if
     end do
   end subroutine list_neighbors

@@ -4,6 +4,7 @@ module hc_normal_iterate
   use hc_error, only: error_t, status, raise
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
   use hc_normal_level, only: normal_level_t
+  use hc_normal_rows, only: judge_row, add_row, largest_of
   implicit none
   private
 
@@ -120,28 +121,32 @@ contains
   subroutine balance(level, now)
     type(normal_level_t), intent(in) :: level
     type(iterate_t), intent(inout) :: now
-    real(wp) :: weight(size(now%p, 2)), lift(size(now%p, 2)), u
+    real(wp) :: weight(size(now%p, 2)), lift(size(now%p, 2)), w, l, u
     integer :: col, row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, u)
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, w, l, u)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
-        weight(row) = 0.0_wp
-        lift(row) = 0.0_wp
+        w = 0.0_wp
+        l = 0.0_wp
+        ! the gap may be infinite where nothing can touch
         if (allocated(now%punch)) then
+          !$omp simd private(u) reduction(+: w, l)
           do col = from, to
             u = now%punch(col, row)
-            weight(row) = weight(row) + u
-            ! the gap may be infinite where nothing can touch
-            if (u > 0.0_wp) lift(row) = lift(row) + u*(level%initial_gap(col, row) + now%w(col, row))
+            w = w + u
+            l = l + u*(merge(level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
           end do
         else
+          !$omp simd private(u) reduction(+: w, l)
           do col = from, to
             u = now%p(col, row)
-            weight(row) = weight(row) + u
-            if (u > 0.0_wp) lift(row) = lift(row) + u*(level%initial_gap(col, row) + now%w(col, row))
+            w = w + u
+            l = l + u*(merge(level%initial_gap(col, row), 0.0_wp, u > 0.0_wp) + now%w(col, row))
           end do
         end if
+        weight(row) = w
+        lift(row) = l
       end associate
     end do
     !$omp end parallel do
@@ -152,43 +157,25 @@ contains
   subroutine judge(level, now, candidate, next, changed)
     type(normal_level_t), intent(in) :: level
     type(iterate_t), intent(inout) :: now
-    logical, intent(in) :: candidate(:, :)
-    logical, intent(out) :: next(:, :)
+    logical, intent(in), contiguous :: candidate(:, :)
+    logical, intent(out), contiguous :: next(:, :)
     !> The new set is another one
     logical, intent(out) :: changed
-    real(wp) :: r, gap, p, p_max, worst, worst_active
-    integer :: col, row, n_next, n_changed
-    logical :: enters
+    real(wp) :: r, stiffness, p_max, worst, worst_active
+    integer :: row, n_next, n_changed
 
     r = classification_scale/(2.0_wp*pi*level%pair%lambda_1*sqrt(level%lattice%cell_area()*now%n_active/pi))
+    stiffness = 1.0_wp/level%compliance
     p_max = 0.0_wp
     worst = 0.0_wp
     worst_active = 0.0_wp
     n_next = 0
     n_changed = 0
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, gap, p, enters) &
+    !$omp parallel do schedule(static) num_threads(level%n_threads) &
     !$omp& reduction(max: p_max, worst, worst_active) reduction(+: n_next, n_changed)
     do row = 1, size(now%p, 2)
-      next(:, row) = .false.
-      do col = 1, size(now%p, 1)
-        gap = level%initial_gap(col, row) + now%w(col, row) - now%approach
-        if (col < now%span(1, row) .or. col > now%span(2, row)) then
-          if (gap >= 0.0_wp) cycle                                             ! no pressure there, and none called for
-        end if
-        if (.not. candidate(col, row)) cycle
-        p = now%p(col, row)
-        enters = p - r*gap > 0.0_wp
-        next(col, row) = enters
-        p_max = max(p_max, p)
-        worst = max(worst, abs(min(p, gap/level%compliance)))
-        if (enters) n_next = n_next + 1
-        if (now%active(col, row)) then
-          worst_active = max(worst_active, abs(gap))
-          if (.not. enters) n_changed = n_changed + 1
-        else
-          if (enters) n_changed = n_changed + 1
-        end if
-      end do
+      call judge_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
+                     candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed)
     end do
     !$omp end parallel do
     now%p_max = p_max
@@ -282,13 +269,16 @@ contains
   subroutine find_residual(level, now)
     type(normal_level_t), intent(in) :: level
     type(iterate_t), intent(inout) :: now
+    real(wp) :: gap, scale
     integer :: col, row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    scale = 1.0_wp/now%w_unit
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, gap)
     do row = 1, size(now%p, 2)
+      !$omp simd private(gap)
       do col = now%span(1, row), now%span(2, row)
-        if (.not. now%active(col, row)) cycle
-        now%r(col, row, 1) = real((now%approach - level%initial_gap(col, row) - now%w(col, row))/now%w_unit, sp)
+        gap = merge(level%initial_gap(col, row) + now%w(col, row) - now%approach, 0.0_wp, now%active(col, row))
+        now%r(col, row, 1) = merge(real(-scale*gap, sp), now%r(col, row, 1), now%active(col, row))
       end do
     end do
     !$omp end parallel do
@@ -301,18 +291,20 @@ contains
     logical, intent(in) :: held, by_load
     !> Sum of the pressures under a prescribed load
     real(wp), intent(in) :: pressures
-    real(wp) :: part(size(now%p, 2)), aim, mean
+    real(wp) :: part(size(now%p, 2)), aim, mean, row_sum
     real(sp) :: lack
     integer :: col, row
 
     mean = 0.0_wp
     if (by_load .and. .not. held) then
-      !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+      !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, row_sum)
       do row = 1, size(now%p, 2)
-        part(row) = 0.0_wp
+        row_sum = 0.0_wp
+        !$omp simd reduction(+: row_sum)
         do col = now%span(1, row), now%span(2, row)
-          if (now%active(col, row)) part(row) = part(row) + now%z(col, row, 1)
+          row_sum = row_sum + merge(now%z(col, row, 1), 0.0_sp, now%active(col, row))
         end do
+        part(row) = row_sum
       end do
       !$omp end parallel do
       mean = sum(part)/now%punch_sum
@@ -361,19 +353,22 @@ contains
     !> r^T z of the last direction, 0: there is none; on return that of the new one
     real(wp), intent(inout) :: rz
     real(wp), dimension(size(now%p, 2)) :: part, sum_z
-    real(wp) :: rz_new
+    real(wp) :: rz_new, z, product_z, total_z
     real(sp) :: back, mean
     integer :: col, row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, z, product_z, total_z)
     do row = 1, size(now%p, 2)
-      part(row) = 0.0_wp
-      sum_z(row) = 0.0_wp
+      product_z = 0.0_wp
+      total_z = 0.0_wp
+      !$omp simd private(z) reduction(+: product_z, total_z)
       do col = now%span(1, row), now%span(2, row)
-        if (.not. now%active(col, row)) cycle
-        part(row) = part(row) + real(now%r(col, row, 1), wp)*now%z(col, row, 1)
-        sum_z(row) = sum_z(row) + now%z(col, row, 1)
+        z = merge(now%z(col, row, 1), 0.0_sp, now%active(col, row))
+        product_z = product_z + merge(now%r(col, row, 1), 0.0_sp, now%active(col, row))*z
+        total_z = total_z + z
       end do
+      part(row) = product_z
+      sum_z(row) = total_z
     end do
     !$omp end parallel do
     rz_new = sum(part)
@@ -384,10 +379,14 @@ contains
     !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
     do row = 1, size(now%p, 2)
       if (.not. rz > 0.0_wp) now%d(:, row, 1) = 0.0_sp
+      !$omp simd
       do col = now%span(1, row), now%span(2, row)
-        if (.not. now%active(col, row)) cycle
-        now%d(col, row, 1) = now%z(col, row, 1) + back*now%d(col, row, 1)
-        if (by_load) now%d(col, row, 1) = now%d(col, row, 1) - mean*now%punch(col, row)
+        now%d(col, row, 1) = merge(now%z(col, row, 1) + back*now%d(col, row, 1), 0.0_sp, now%active(col, row))
+      end do
+      if (.not. by_load) cycle
+      !$omp simd
+      do col = now%span(1, row), now%span(2, row)
+        now%d(col, row, 1) = now%d(col, row, 1) - mean*now%punch(col, row)
       end do
     end do
     !$omp end parallel do
@@ -422,22 +421,20 @@ contains
     real(wp), intent(in) :: share
     real(wp) :: step, lift
     real(sp) :: largest
-    integer :: col, row
+    integer :: row
 
     step = share*now%p_unit
     lift = share*now%w_unit
     largest = 0.0_sp
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col) reduction(max: largest)
+    !$omp parallel do schedule(static) num_threads(level%n_threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
-      do col = now%span(1, row), now%span(2, row)
-        now%p(col, row) = now%p(col, row) + step*now%d(col, row, 1)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
         ! what left is gone, but for what single precision would leave of it
-        if (.not. now%active(col, row)) now%p(col, row) = 0.0_wp
-      end do
-      do col = 1, size(now%p, 1)
-        now%w(col, row) = now%w(col, row) + lift*now%kd(col, row, 1)
-        largest = max(largest, abs(now%kd(col, row, 1)))
-      end do
+        where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
+      end associate
+      call add_row(size(now%p, 1), lift, now%kd(:, row, 1), now%w(:, row))
+      largest = max(largest, largest_of(size(now%p, 1), now%kd(:, row, 1)))
     end do
     !$omp end parallel do
     now%stale = now%stale + single_error*abs(lift)*largest

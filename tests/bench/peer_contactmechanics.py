@@ -30,7 +30,7 @@ def hertz(side: int, fraction: float, tolerance: float, repeats: int) -> dict[st
             maxiter=20_000,
         )
 
-    setup, system = best_of(1, set_up)
+    setup, system = best_of(repeats, set_up)
     seconds, result = best_of(repeats, solve)
     if not result.success:
         raise RuntimeError(str(result.message))

@@ -32,7 +32,7 @@ def hertz(side: int, fraction: float, tolerance: float, repeats: int, threads: i
     lattice, contact = rhombic_window(side, fraction)
     pair = ElasticPair(1 / np.pi, 0.0, 0.0)
     gap = contact.gap
-    setup, problem = best_of(1, lambda: NormalContact(lattice, pair, gap, threads=threads))
+    setup, problem = best_of(repeats, lambda: NormalContact(lattice, pair, gap, threads=threads))
     solve, solution = best_of(repeats, lambda: problem.solve(normal_load=contact.load, tolerance=tolerance))
     if not solution.converged:
         raise RuntimeError(f"not converged, R_n = {solution.residual_normal:.1e}")

@@ -23,7 +23,7 @@ def hertz(side: int, fraction: float, tolerance: float, repeats: int) -> dict[st
         )
         return slippy.core.plan_convolve(start, kernel, circular=False, fft_im=False)
 
-    setup, product = best_of(1, set_up)
+    setup, product = best_of(repeats, set_up)
     seconds, (failed, pressure, _) = best_of(
         repeats,
         lambda: slippy.core.polonsky_and_keer(

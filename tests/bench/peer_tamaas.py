@@ -30,7 +30,7 @@ def hertz(side: int, fraction: float, tolerance: float, repeats: int) -> dict[st
         kept["model"].traction[:] = 0.0
         return solver.solve(contact.load)
 
-    setup, solver = best_of(1, set_up)
+    setup, solver = best_of(repeats, set_up)
     seconds, error = best_of(repeats, solve)
     model = kept["model"]
     pressure = np.array(model.traction)

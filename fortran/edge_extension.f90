@@ -30,17 +30,22 @@ module hc_edge_extension
   !> Times that a ring is smoothed.
   integer, parameter :: smoothings = 2
 
-  !> Neighbours of the nodes of the rings, in compressed rows.
+  !> Nodes in the rings from which on threads share the work.
+  integer, parameter :: worth_sharing = 8192
+
+  !> Neighbours of the nodes of the rings.
   type :: edge_extension_t
     private
     !> Nodes of the rings, ring by ring, and where each ring begins
     integer, allocatable :: node(:), ring(:)
-    !> Neighbours in the ring before, as nodes; where those of each node begin
-    integer, allocatable :: inner(:), inner_start(:)
-    !> The node itself and its neighbours in the same ring, as positions in the list; where they begin
-    integer, allocatable :: beside(:), beside_start(:)
+    !> Neighbours in the ring before, as nodes (6, n), and how many they are
+    integer, allocatable :: inner(:, :), n_inner(:)
+    !> Neighbours in the same ring and the node itself, as places in the list (7, n), and how many they are
+    integer, allocatable :: beside(:, :), n_beside(:)
     !> Fall from ring to ring over the number of neighbours in the ring before
     real(sp), allocatable :: fall(:)
+    !> Threads that share the work
+    integer :: n_threads = 1
   contains
     !> Continue a field beyond the active nodes
     procedure :: extend
@@ -51,18 +56,19 @@ module hc_edge_extension
 contains
 
   !> Rings around the active nodes.
-  pure subroutine new_edge_extension(self, active)
+  subroutine new_edge_extension(self, active, n_threads)
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, n_row)
     logical, intent(in) :: active(:, :)
+    !> Threads to use
+    integer, intent(in) :: n_threads
 
     !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
     !> those of the rings, `free` elsewhere and `outside` around
     integer, allocatable :: mark(:)
     integer, allocatable :: frontier(:), next(:), node(:)
-    integer :: beside(6), inner(6)
-    integer :: n_ring, n_col, width, step(6), r, n, k, n_inner, n_beside
+    integer :: n_ring, n_col, width, step(6), r, n, k
 
     call find_edge(active, frontier)
     n_ring = 0
@@ -86,24 +92,21 @@ contains
 
     n = size(node)
     n_ring = size(self%ring) - 1
-    allocate (self%node(n), self%inner_start(n + 1), self%beside_start(n + 1), self%fall(n))
-    allocate (self%inner(6*n), self%beside(7*n))
-    self%inner_start(1) = 1
-    self%beside_start(1) = 1
+    if (n >= worth_sharing) self%n_threads = n_threads
+    allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%inner(6, n), self%beside(7, n))
+    !$omp parallel num_threads(self%n_threads) private(r, k)
     do r = 1, n_ring
+      !$omp do schedule(static)
       do k = self%ring(r), self%ring(r + 1) - 1
-        call list_neighbors(node(k), step, mark, self%ring(r), self%ring(r + 1), inner, beside, n_inner, n_beside)
+        call list_neighbors(node(k), step, mark, self%ring(r), self%ring(r + 1), self%inner(:, k), self%beside(:, k), &
+                            self%n_inner(k), self%n_beside(k))
         self%node(k) = in_window(node(k))
-        associate (first => self%inner_start(k), last => self%beside_start(k))
-          self%inner(first:first + n_inner - 1) = in_window(inner(:n_inner))
-          self%beside(last) = k
-          self%beside(last + 1:last + n_beside) = beside(:n_beside)
-          self%inner_start(k + 1) = first + n_inner
-          self%beside_start(k + 1) = last + 1 + n_beside
-        end associate
-        self%fall(k) = real(profile(r, n_ring)/profile(r - 1, n_ring)/n_inner, sp)
+        self%inner(:self%n_inner(k), k) = in_window(self%inner(:self%n_inner(k), k))
+        self%fall(k) = real(profile(r, n_ring)/profile(r - 1, n_ring)/self%n_inner(k), sp)
       end do
+      !$omp end do nowait
     end do
+    !$omp end parallel
 
   contains
 
@@ -207,14 +210,15 @@ contains
     integer, intent(in) :: mark(:)
     !> First marks of its own ring and of the next
     integer, intent(in) :: own, after
-    !> Neighbours in the ring before (places in the marks), and in its own (places in the list)
-    integer, intent(out) :: inner(6), beside(6)
+    !> Neighbours in the ring before (places in the marks), and in its own (places in the list), itself included
+    integer, intent(out) :: inner(6), beside(7)
     !> Their numbers
     integer, intent(out) :: n_inner, n_beside
     integer :: k, near
 
     n_inner = 0
-    n_beside = 0
+    n_beside = 1
+    beside(1) = mark(node)
     do k = 1, size(step)
       near = node + step(k)
       if (mark(near) < own) then
@@ -229,73 +233,94 @@ contains
   end subroutine list_neighbors
 
   !> Continue a field beyond the active nodes.
-  pure subroutine extend(self, field)
+  subroutine extend(self, field)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
     real(sp), allocatable :: value(:), smooth(:)
-    real(sp) :: total
-    integer :: r, k, s, i
+    integer :: r, k, s
 
     if (.not. allocated(self%node)) return                                     ! not set up: zero beyond the edge
     allocate (value(size(self%node)), smooth(size(self%node)))
+    !$omp parallel num_threads(self%n_threads) private(r, k, s)
     do r = 1, size(self%ring) - 1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
+        !$omp do schedule(static)
         do k = first, last
-          total = 0.0_sp
-          do i = self%inner_start(k), self%inner_start(k + 1) - 1
-            total = total + field(self%inner(i))
-          end do
-          value(k) = self%fall(k)*total
+          value(k) = self%fall(k)*sum_of(field, self%inner(:self%n_inner(k), k))
         end do
+        !$omp end do
         do s = 1, smoothings
+          !$omp do schedule(static)
           do k = first, last
-            total = 0.0_sp
-            do i = self%beside_start(k), self%beside_start(k + 1) - 1
-              total = total + value(self%beside(i))
-            end do
-            smooth(k) = total/(self%beside_start(k + 1) - self%beside_start(k))
+            smooth(k) = sum_of(value, self%beside(:self%n_beside(k), k))/self%n_beside(k)
           end do
-          value(first:last) = smooth(first:last)
+          !$omp end do
+          !$omp do schedule(static)
+          do k = first, last
+            value(k) = smooth(k)
+            field(self%node(k)) = smooth(k)
+          end do
+          !$omp end do
         end do
-        field(self%node(first:last)) = value(first:last)
       end associate
     end do
+    !$omp end parallel
   end subroutine extend
 
   !> The transpose of `extend`; what is left on the rings has no meaning.
-  pure subroutine fold(self, field)
+  subroutine fold(self, field)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
     real(sp), allocatable :: value(:), share(:)
-    real(sp) :: total
     integer :: r, k, s, i
 
     if (.not. allocated(self%node)) return
     allocate (value(size(self%node)), share(size(self%node)))
+    !$omp parallel num_threads(self%n_threads) private(r, k, s, i)
     do r = size(self%ring) - 1, 1, -1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
-        value(first:last) = field(self%node(first:last))
-        do s = 1, smoothings
-          do k = first, last
-            share(k) = value(k)/(self%beside_start(k + 1) - self%beside_start(k))
-          end do
-          do k = first, last
-            total = 0.0_sp
-            do i = self%beside_start(k), self%beside_start(k + 1) - 1
-              total = total + share(self%beside(i))
-            end do
-            value(k) = total
-          end do
-        end do
+        !$omp do schedule(static)
         do k = first, last
-          do i = self%inner_start(k), self%inner_start(k + 1) - 1
-            field(self%inner(i)) = field(self%inner(i)) + self%fall(k)*value(k)
+          value(k) = field(self%node(k))
+        end do
+        !$omp end do
+        do s = 1, smoothings
+          !$omp do schedule(static)
+          do k = first, last
+            share(k) = value(k)/self%n_beside(k)
+          end do
+          !$omp end do
+          !$omp do schedule(static)
+          do k = first, last
+            value(k) = sum_of(share, self%beside(:self%n_beside(k), k))
+          end do
+          !$omp end do
+        end do
+        ! several nodes add to the same neighbour, always in the same order
+        !$omp single
+        do k = first, last
+          do i = 1, self%n_inner(k)
+            field(self%inner(i, k)) = field(self%inner(i, k)) + self%fall(k)*value(k)
           end do
         end do
+        !$omp end single
       end associate
     end do
+    !$omp end parallel
   end subroutine fold
+
+  !> Sum over some places.
+  pure real(sp) function sum_of(value, places)
+    real(sp), intent(in), contiguous :: value(:)
+    integer, intent(in), contiguous :: places(:)
+    integer :: i
+
+    sum_of = 0.0_sp
+    do i = 1, size(places)
+      sum_of = sum_of + value(places(i))
+    end do
+  end function sum_of
 
 end module hc_edge_extension

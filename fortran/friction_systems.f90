@@ -195,7 +195,7 @@ contains
     !> Nodes in contact (n)
     logical, intent(in) :: contact(:)
 
-    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent))
+    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%operators%n_threads)
   end subroutine take_contact
 
   subroutine pressure_product(self, x, y, error)
@@ -251,7 +251,7 @@ contains
     if (known) known = all(self%contact .eqv. contact)
     if (.not. known) then
       self%contact = contact
-      call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent))
+      call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%n_threads)
       call new_packing(self%nodes, contact, self%n_threads)
       self%from = 0.0_wp
     end if

@@ -203,7 +203,7 @@ contains
     call move_alloc(swap, next)
     now%n_active = now%n_next
     call find_span(now)
-    call new_edge_extension(now%edge, now%active)
+    call new_edge_extension(now%edge, now%active, level%n_threads)
     !$omp parallel do schedule(static) num_threads(level%n_threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = 0.0_sp

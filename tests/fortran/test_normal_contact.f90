@@ -151,7 +151,7 @@ contains
     active = disc(n, 12.5_wp)
     active(3:5, 30:34) = .true.
     active(1, 1) = .true.
-    call new_edge_extension(edge, active)
+    call new_edge_extension(edge, active, 2)
     call random_number(x)
     call random_number(y)
     x = merge(x, 0.0_sp, active)
@@ -204,7 +204,7 @@ contains
     if (.not. allocated(error)) call new_preconditioner(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error)
     if (allocated(error)) return
     active = disc(n, 40.3_wp)
-    call new_edge_extension(edge, active)
+    call new_edge_extension(edge, active, 2)
     x = 0.0_wp
     r(:, :, 1) = merge(1.0_wp, 0.0_wp, active)
     do i = 1, n, 2
@@ -241,14 +241,14 @@ contains
 
     active = .false.
     active(3::5, 3::5) = .true.
-    call new_edge_extension(edge, active)
+    call new_edge_extension(edge, active, 2)
     field = reshape(merge(1.0_sp, 0.0_sp, active), [n*n])
     before = field
     call edge%extend(field)
     call check_true(error, all(abs(field - before) <= 0.0_sp), 'the field is as it was')
     if (allocated(error)) return
     active = .true.
-    call new_edge_extension(edge, active)
+    call new_edge_extension(edge, active, 2)
     field = 1.0_sp
     call edge%extend(field)
     call edge%fold(field)

@@ -85,11 +85,11 @@ contains
   !> M B is about the traction that a rigid motion of the active nodes causes.
   subroutine fulfil(rows, mb, missing, x, independent, n_threads)
     !> C and M B
-    real(wp), intent(in) :: rows(:, :), mb(:, :)
+    real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> What C^T x lacks
     real(wp), intent(in) :: missing(:)
     !> Unknowns
-    real(wp), intent(inout) :: x(:)
+    real(wp), intent(inout), contiguous :: x(:)
     !> False where the constraints depend on each other: x is left alone
     logical, intent(out) :: independent
     !> Threads to use
@@ -100,15 +100,13 @@ contains
     call invert_gram(rows, mb, inverse, independent, n_threads)
     if (.not. independent) return
     share = [(dot_product(inverse(m, :), missing), m=1, size(share))]
-    do m = 1, size(missing)
-      x = x + share(m)*mb(:, m)
-    end do
+    call add_columns(mb, share, x, n_threads)
   end subroutine fulfil
 
   !> (C^T M B)^-1, zero if the constraints depend on each other.
   subroutine invert_gram(rows, mb, inverse, independent, n_threads)
     !> C and M B
-    real(wp), intent(in) :: rows(:, :), mb(:, :)
+    real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> The inverse
     real(wp), intent(out) :: inverse(:, :)
     !> The matrix can be inverted
@@ -148,7 +146,7 @@ contains
     !> Nodes that carry unknowns (n)
     logical, intent(in) :: active(:)
     !> Constraint vectors B (n, number of constraints, may be 0), zero off the active nodes, and M B
-    real(wp), intent(in) :: constraint(:, :), mb(:, :)
+    real(wp), intent(in), contiguous :: constraint(:, :), mb(:, :)
     !> Right-hand side (n)
     real(wp), intent(in) :: rhs(:)
     !> Unknowns (n), on entry a start that fulfils the constraints
@@ -259,7 +257,7 @@ contains
     !> Nodes that carry unknowns (n)
     logical, intent(in) :: active(:)
     !> B, along which the multipliers act, M B, and C of the constraints (n, number of constraints), zero off the active nodes
-    real(wp), intent(in) :: columns(:, :), mb(:, :), rows(:, :)
+    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
     !> Weight of each residual (n)
     real(wp), intent(in) :: weight(:)
     !> Right-hand side (n)

@@ -19,9 +19,14 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .errors import HexcontactError, ResourceError
 from .study_store import Outcome
+
+if TYPE_CHECKING:
+    from .case import Case
+    from .restart import Restart
 
 _POLL = 0.2  # s between looks at whether to stop
 _BLOCKED = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
@@ -69,9 +74,16 @@ def solve_case(job: Job, apart: bool = False) -> Outcome:
     began = False
     try:
         case = Case.from_text(job.deck, target.name)
-        with Store(own, metadata_of(case), overwrite=True) as store:
-            began = True
-            record(case, store, Reporter())
+        with contextlib.ExitStack() as stack:
+            restart = _interrupted(job, case, stack)
+            if restart is None:
+                store = stack.enter_context(Store(own, metadata_of(case), overwrite=True))
+                began = True
+                record(case, store, Reporter())
+            else:
+                own, began = restart.store.path, True
+                record(case, restart.store, Reporter(), before=restart.before)
+        apart = own != target
         if apart:
             os.replace(own, target)
     except HexcontactError as error:
@@ -84,6 +96,28 @@ def solve_case(job: Job, apart: bool = False) -> Outcome:
     except Exception as error:  # one case must not end the others
         return ended(error, HexcontactError.exit_code, f"{type(error).__name__}: {error}", False)
     return Outcome(job.hash, seconds=time.perf_counter() - started)
+
+
+def _interrupted(job: Job, case: Case, stack: contextlib.ExitStack) -> Restart | None:
+    """Open what an interrupted attempt has left, to go on with it; None if there is no such thing."""
+    from .restart import reopened
+    from .store import journal_of
+
+    target = Path(job.path)
+    attempts = target.parent.glob(f"{target.stem}.*.nc.d") if target.parent.is_dir() else ()
+    for journal in (journal_of(target), *sorted(attempts)):
+        if not journal.is_dir():
+            continue
+        with contextlib.ExitStack() as attempt:
+            try:
+                restart = attempt.enter_context(reopened(journal, case))
+            except (HexcontactError, OSError):
+                continue  # damaged, of another deck, or another attempt is at it right now
+            if restart is None or restart.warning:  # finished, or of another version: then all of it anew
+                continue
+            stack.push(attempt.pop_all())
+            return restart
+    return None
 
 
 def _keep(own: Path, target: Path) -> None:

@@ -26,6 +26,9 @@ import hexcontact
 from hexcontact import Case, DeckError, starters, study_run
 from hexcontact.cli import app
 from hexcontact.deck import with_overrides
+from hexcontact.progress import Reporter
+from hexcontact.solve import metadata_of, record
+from hexcontact.store import Store
 from hexcontact.study import Study, run_study
 from hexcontact.study_run import Job, LocalPool, solve_case
 
@@ -440,6 +443,39 @@ def test_a_study_that_is_stopped_goes_on_where_it_was(
     assert len(solved) == 1
     assert (dataset.status == 0).all()
     assert Path("study/0001.nc").stat().st_mtime_ns == first
+
+
+@pytest.mark.parametrize("name", ["0001.nc", "0001.0123abcd.nc"])
+def test_a_case_that_was_interrupted_goes_on_after_its_last_step(folder: Path, name: str) -> None:
+    whole = solve_case(Job("h", SHEARED, str(folder / "whole.nc")))
+    assert whole.exit_code == 0
+    case = Case.from_text(SHEARED, "0001.nc")
+    with pytest.raises(KeyboardInterrupt), Store(folder / name, metadata_of(case), overwrite=True) as store:
+        record(case, store, Reporter(), stop_after_third)
+    again = solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=name != "0001.nc")
+    assert again.exit_code == 0, again.message
+    assert sorted(path.name for path in folder.glob("0001*")) == ["0001.nc"]
+    with xarray.open_dataset("whole.nc") as expected, xarray.open_dataset("0001.nc") as found:
+        assert "resumed after step 3" in found.attrs["history"]
+        for variable in ("pressure", "traction_x", "slip_increment_x", "approach"):
+            assert_array_equal(found[variable], expected[variable])
+
+
+def test_an_attempt_that_is_still_under_way_or_damaged_is_left_alone(folder: Path) -> None:
+    case = Case.from_text(SHEARED, "0001.nc")
+    with Store(folder / "0001.0123abcd.nc", metadata_of(case), overwrite=True) as store:
+        with pytest.raises(KeyboardInterrupt):
+            record(case, store, Reporter(), stop_after_third)
+        (folder / "0001.ffffffff.nc.d").mkdir()
+        assert solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=True).exit_code == 0
+        assert len(store.heads) == 3
+    with xarray.open_dataset("0001.nc") as found:
+        assert "resumed" not in found.attrs["history"]
+
+
+def stop_after_third(step: Any) -> None:
+    if step.number == 3:
+        raise KeyboardInterrupt
 
 
 def test_a_worker_that_is_killed_takes_only_its_own_case_with_it(folder: Path) -> None:

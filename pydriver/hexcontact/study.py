@@ -242,8 +242,7 @@ class Study:
             pool.stop()
 
     def _pool(self, jobs: int | None, dask: str | None, work: int) -> LocalPool | DaskPool:
-        where = Dask(address=dask) if dask else self.file.dask if jobs is None else None
-        if where is not None:
+        if (where := self.cluster(jobs, dask)) is not None:
             from .study_dask import DaskPool
 
             return DaskPool(where)
@@ -254,6 +253,10 @@ class Study:
         workers = min(jobs or cores(), work)
         threads = os.environ.get("OMP_NUM_THREADS", "")
         return LocalPool(workers, int(threads) if threads.isdecimal() else max(1, cores() // workers))
+
+    def cluster(self, jobs: int | None = None, dask: str | None = None) -> Dask | None:
+        """Return the Dask cluster that `run` would use; None: processes of this machine."""
+        return Dask(address=dask) if dask else self.file.dask if jobs is None else None
 
     def run_case(self, number: int, retry: bool = False) -> Outcome:
         """Run one case here, unless it is done; for job arrays.

@@ -124,6 +124,10 @@ def interrupted(study: Study) -> str:
 def run_in_background(study: Study, cancel: threading.Event, options: dict[str, Any]) -> Any:
     """Return what to do in a second thread, and the event that is set when it is over."""
     over = threading.Event()
+    if (where := study.cluster(options.get("jobs"), options.get("dask"))) is not None:
+        from .study_dask import load
+
+        load(where)
 
     def work() -> None:
         try:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import queue
+import signal
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -29,13 +30,29 @@ _CLASSES = {
 }
 
 
+def load(where: Dask) -> None:
+    """Import what a cluster needs, in the main thread: dask-jobqueue cannot be imported in another one."""
+    _package("distributed", "distributed")
+    if where.cluster not in (None, "local"):
+        _package("dask_jobqueue", "dask-jobqueue")
+
+
 def _package(name: str, install: str) -> Any:
+    # dask-jobqueue takes Ctrl-C for itself when it is imported
+    handler = signal.getsignal(signal.SIGINT)
     try:
         return importlib.import_module(name)
     except ImportError as error:
         raise DeckError(
             f"a Dask cluster needs the package {install} ({error}); pip install {install}"
         ) from None
+    except ValueError as error:
+        raise DeckError(
+            f"import {name} in the main thread before a study is run in another one ({error})"
+        ) from None
+    finally:
+        if signal.getsignal(signal.SIGINT) is not handler:
+            signal.signal(signal.SIGINT, handler)
 
 
 class DaskPool:

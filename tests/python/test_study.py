@@ -627,6 +627,25 @@ def test_cluster_of_a_batch_system_gets_its_options(folder: Path, monkeypatch: p
     assert (dataset.status == 0).all()
 
 
+def test_what_dask_jobqueue_does_when_imported_does_no_harm(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It sets a handler of Ctrl-C, which only the main thread can; the command works in another one."""
+    (folder / "dask_jobqueue.py").write_text(
+        "import signal\nfrom distributed import LocalCluster\n"
+        "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "def SLURMCluster():\n    return LocalCluster(n_workers=0, processes=False, dashboard_address=None)\n"
+    )
+    monkeypatch.syspath_prepend(folder)
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(text + '[dask]\ncluster = "slurm"\n')
+    handler = signal.getsignal(signal.SIGINT)
+    done = command("study.toml", "--quiet")
+    sys.modules.pop("dask_jobqueue", None)
+    assert done.returncode == 0, done.stderr
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
 def test_where_no_scheduler_answers_there_is_one_sentence(folder: Path) -> None:
     done = command("study.toml", "--dask", "nonsense://")
     assert done.returncode == 2

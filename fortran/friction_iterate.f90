@@ -12,8 +12,9 @@ module hc_friction_iterate
   use hc_contact_residuals, only: normal_residual, tangential_residual, least_traction
   use hc_friction_law, only: linearize, on_cone, normal_to
   use hc_friction_problem, only: friction_problem_t, classification_scale
+  use hc_spring_blend, only: soft
   use hc_driven_motions, only: driven_motions_t, new_driven_motions
-  use hc_friction_systems, only: operators_t, pressure_system_t, shear_system_t, new_shear_system, blend_end
+  use hc_friction_systems, only: operators_t, pressure_system_t, shear_system_t, new_shear_system
   implicit none
   private
 
@@ -254,7 +255,7 @@ contains
           bound = friction%bound(self%p(i))
           e = self%shear%direction(:, i)
           across = 0.0_wp
-          if (self%shear%compliance(i) < blend_end*self%shear%elastic_compliance) then
+          if (self%shear%compliance(i) < soft*self%shear%elastic_compliance) then
             across = dot_product(normal_to(e), [self%q(i), self%q(n + i)])
           end if
           self%q([i, n + i]) = bound*e + across*normal_to(e)
@@ -262,7 +263,7 @@ contains
       end do
       !$omp end parallel do
     end associate
-    call self%shear%blend(self%contact)
+    call self%shear%weigh(self%contact)
   end subroutine classify
 
   !> Let the nodes stick that slip least: without any, nothing resists a prescribed load.

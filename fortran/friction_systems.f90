@@ -6,11 +6,8 @@
 !>
 !>     R^T T R + D,     R: frame -> (x, y)
 !>
-!> is symmetric positive definite on these unknowns. Its preconditioner is the
-!> inverse symbol, except where D is much larger than the elastic compliance of
-!> a node: there it is 1/D, and in between
-!>
-!>     M = sqrt(chi) R^T T^-1 R sqrt(chi) + (1 - chi)/D.
+!> is symmetric positive definite on these unknowns. Its preconditioner is the inverse symbol in
+!> stick, and goes over to 1/D where a node slips far (see spring_blend).
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_friction_systems
@@ -21,6 +18,7 @@ module hc_friction_systems
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
+  use hc_spring_blend, only: node_compliance, blend
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
   use hc_krylov, only: linear_system_t
   use hc_packing, only: packing_t, new_packing
@@ -28,14 +26,10 @@ module hc_friction_systems
   private
 
   public :: operators_t, new_operators, operators_memory
-  public :: pressure_system_t, shear_system_t, new_shear_system, coupled_system_t, blend_end
+  public :: pressure_system_t, shear_system_t, new_shear_system, coupled_system_t
 
   !> Components of the shear traction
   integer, parameter :: shear(2) = [along_x, along_y]
-  !> The blend goes from the one preconditioner to the other while D grows by this factor,
-  real(wp), parameter :: blend_range = 16.0_wp
-  !> up to this many elastic compliances of a node.
-  real(wp), parameter :: blend_end = 8.0_wp
 
   !> Operator and preconditioners over one window, and the work they did.
   type :: operators_t
@@ -71,8 +65,9 @@ module hc_friction_systems
     real(wp), allocatable :: direction(:, :)
     !> Compliance D along t, 0 in stick [m/Pa]
     real(wp), allocatable :: compliance(:)
-    !> sqrt(chi) of each node
-    real(wp), allocatable :: weight(:)
+    !> Weights of each node in the preconditioners without and with soft springs; does anyone need them?
+    real(wp), allocatable :: weight(:, :)
+    logical, private :: used(2) = .true.
     !> Elastic compliance 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa]
     real(wp) :: elastic_compliance = 0.0_wp
     !> Continuation of displacements beyond the contact
@@ -89,7 +84,7 @@ module hc_friction_systems
     !> Components along x and y from those in the frames, and back
     procedure :: to_plane, to_frame
     !> Take the nodes in contact; work the weights out from the compliances
-    procedure :: blend
+    procedure :: weigh
     !> Let the traction of a slipping node be the smaller the softer it is
     procedure :: soften
   end type shear_system_t
@@ -227,23 +222,20 @@ contains
     n = operators%flexibility%lattice%size()
     self%operators => operators
     self%n_threads = operators%n_threads
-    associate (pair => operators%flexibility%pair)
-      self%elastic_compliance = (2.0_wp*pair%lambda_1 + pair%lambda_5)*operators%flexibility%lattice%spacing()
-    end associate
+    self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%pair)
     allocate (self%direction(2, n), self%compliance(n), source=0.0_wp)
-    allocate (self%weight(n), source=1.0_wp)
+    allocate (self%weight(n, 2), source=spread([1.0_wp, 0.0_wp], 1, n))
     allocate (self%from(2*n), self%onto(2*n), source=0.0_wp)
     allocate (self%displacement(2*n), self%traction(2*n), source=0.0_sp)
     self%direction(1, :) = 1.0_wp
     call new_packing(self%nodes, [(.true., i=1, n)], self%n_threads)
   end subroutine new_shear_system
 
-  !> chi falls with log D from 1 to 0; the symbol does not see the softest nodes at all.
-  subroutine blend(self, contact)
+  !> Take the nodes in contact; weigh the preconditioners by the compliances.
+  subroutine weigh(self, contact)
     class(shear_system_t), intent(inout) :: self
     !> Nodes in contact (n)
     logical, intent(in) :: contact(:)
-    real(wp) :: ratio
     integer :: i
     logical :: known
 
@@ -255,19 +247,13 @@ contains
       call new_packing(self%nodes, contact, self%n_threads)
       self%from = 0.0_wp
     end if
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(ratio)
-    do i = 1, size(self%weight)
-      ratio = self%compliance(i)/(blend_end*self%elastic_compliance)
-      if (ratio <= 1.0_wp/blend_range) then
-        self%weight(i) = 1.0_wp
-      else if (ratio >= 1.0_wp) then
-        self%weight(i) = 0.0_wp
-      else
-        self%weight(i) = sqrt(-log(ratio)/log(blend_range))
-      end if
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, size(contact)
+      self%weight(i, :) = blend(self%compliance(i)/self%elastic_compliance)
     end do
     !$omp end parallel do
-  end subroutine blend
+    self%used = [any(contact .and. self%weight(:, 1) > 0.0_wp), any(contact .and. self%weight(:, 2) > 0.0_wp)]
+  end subroutine weigh
 
   !> What the preconditioner makes of slip, of a traction that was found in stick.
   pure subroutine soften(self, displacement, traction)
@@ -278,9 +264,9 @@ contains
     real(wp), intent(inout) :: traction(:)
     integer :: i
 
-    do i = 1, size(self%weight)
-      if (self%weight(i) < 1.0_wp) then
-        traction(i) = self%weight(i)**2*traction(i) + (1.0_wp - self%weight(i)**2)/self%compliance(i)*displacement(i)
+    do i = 1, size(self%compliance)
+      if (self%weight(i, 1) < 1.0_wp) then
+        traction(i) = self%weight(i, 1)**2*traction(i) + (1.0_wp - self%weight(i, 1)**2)/self%compliance(i)*displacement(i)
       end if
     end do
   end subroutine soften
@@ -352,47 +338,65 @@ contains
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: t, e, unit
-    integer :: n, k, i
+    real(wp) :: t, e, unit, loose
+    integer :: n, k, i, m
 
     n = size(x)/2
     unit = self%operators%tangential%unit
-    ! the continuation beyond the contact is made afresh
-    self%displacement = 0.0_sp
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, loose)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
-        t = self%weight(i)/unit*x(i)
-        e = self%weight(i)/unit*x(n + i)
-        self%displacement(i) = real(-self%direction(2, i)*t + self%direction(1, i)*e, sp)
-        self%displacement(n + i) = real(self%direction(1, i)*t + self%direction(2, i)*e, sp)
+        loose = 1.0_wp - sum(self%weight(i, :)**2)
+        y(i) = 0.0_wp
+        if (self%compliance(i) > 0.0_wp) y(i) = loose/self%compliance(i)*x(i)
+        y(n + i) = 0.0_wp
       end do
     end do
     !$omp end parallel do
-    call invert(self%operators, self%operators%flexibility%lattice%extent, self%edge, self%displacement, self%traction)
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
-    do k = 1, size(self%nodes%first)
-      do i = self%nodes%first(k), self%nodes%last(k)
-        t = -self%direction(2, i)*self%traction(i) + self%direction(1, i)*self%traction(n + i)
-        e = self%direction(1, i)*self%traction(i) + self%direction(2, i)*self%traction(n + i)
-        y(i) = self%weight(i)*t
-        y(n + i) = self%weight(i)*e
-        if (self%weight(i) < 1.0_wp) y(i) = y(i) + (1.0_wp - self%weight(i)**2)/self%compliance(i)*x(i)
+    do m = 1, size(self%used)
+      if (.not. self%used(m)) cycle
+      ! the continuation beyond the contact is made afresh
+      self%displacement = 0.0_sp
+      !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
+      do k = 1, size(self%nodes%first)
+        do i = self%nodes%first(k), self%nodes%last(k)
+          t = self%weight(i, m)/unit*x(i)
+          e = self%weight(i, m)/unit*x(n + i)
+          self%displacement(i) = real(-self%direction(2, i)*t + self%direction(1, i)*e, sp)
+          self%displacement(n + i) = real(self%direction(1, i)*t + self%direction(2, i)*e, sp)
+        end do
       end do
+      !$omp end parallel do
+      call invert(self%operators, self%operators%flexibility%lattice%extent, self%edge, m == 2, self%displacement, self%traction)
+      !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
+      do k = 1, size(self%nodes%first)
+        do i = self%nodes%first(k), self%nodes%last(k)
+          t = -self%direction(2, i)*self%traction(i) + self%direction(1, i)*self%traction(n + i)
+          e = self%direction(1, i)*self%traction(i) + self%direction(2, i)*self%traction(n + i)
+          y(i) = y(i) + self%weight(i, m)*t
+          y(n + i) = y(n + i) + self%weight(i, m)*e
+        end do
+      end do
+      !$omp end parallel do
     end do
-    !$omp end parallel do
   end subroutine shear_precondition
 
   !> Apply the tangential preconditioner to vectors in single precision, and count it.
-  subroutine invert(operators, extent, edge, displacement, traction)
+  subroutine invert(operators, extent, edge, on_springs, displacement, traction)
     type(operators_t), intent(inout) :: operators
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
+    !> Continuation beyond the contact, where nodes on soft springs play no part
     type(edge_extension_t), intent(in) :: edge
+    logical, intent(in) :: on_springs
     real(sp), intent(inout) :: displacement(extent(1), extent(2), 2)
     real(sp), intent(out) :: traction(extent(1), extent(2), 2)
 
-    call operators%tangential%apply_single(displacement, traction, edge)
+    if (on_springs) then
+      call operators%tangential%apply_single(displacement, traction, on_springs=.true.)
+    else
+      call operators%tangential%apply_single(displacement, traction, edge)
+    end if
     operators%preconditioning = operators%preconditioning + operators%tangential%cost
   end subroutine invert
 

@@ -3,6 +3,9 @@
 !> The grid is that of the window, or the next of a fast length, instead of twice
 !> as large, so that one application costs about a quarter of a product. It is symmetric
 !> and positive definite, also when it is restricted to a set of nodes.
+!>
+!> For shear tractions there is a second one, of a body whose every node has a soft
+!> spring (see spring_blend).
 module hc_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
@@ -11,6 +14,7 @@ module hc_preconditioner
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
   use hc_edge_extension, only: edge_extension_t
+  use hc_spring_blend, only: node_compliance, soft
   use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
@@ -22,6 +26,8 @@ module hc_preconditioner
 
   !> Blocks (onto, from) of the symmetric inverse.
   integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
+  !> Kernels of the tangential inverse; those on soft springs come after them.
+  integer, parameter :: n_tangential = 3
 
   !> Approximate inverse of the normal or of the tangential flexibility.
   type :: preconditioner_t
@@ -60,16 +66,17 @@ contains
 
     integer, allocatable :: f(:, :)
     integer :: length(2), b, i, n_component
-    real(wp) :: scale, k(3), matrix(3)
+    real(wp) :: scale, k(3), matrix(3), spring
     real(wp), allocatable :: symbol(:)
 
     if (present(tangential)) self%tangential = tangential
     n_component = merge(2, 1, self%tangential)
     length = good_size(lattice%extent)
-    call new_convolution(self%convolution, lattice%extent, length, merge(3, 1, self%tangential), n_component, error, &
-                         n_threads=n_threads)
+    call new_convolution(self%convolution, lattice%extent, length, merge(2*n_tangential, 1, self%tangential), n_component, &
+                         error, n_threads=n_threads)
     if (allocated(error)) return
     self%unit = pair%lambda_1*lattice%spacing()
+    spring = soft*node_compliance(lattice, pair)
     scale = self%unit/product(real(length, wp))
     !$omp parallel do num_threads(self%convolution%n_threads) private(f, i, k, matrix, symbol)
     do b = 1, self%convolution%n_block
@@ -88,14 +95,23 @@ contains
           ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
           matrix = [pair%lambda_1*k(symbol_1) + pair%lambda_5*k(symbol_xx), pair%lambda_5*k(symbol_xy), &
                     pair%lambda_1*k(symbol_1) + pair%lambda_5*(k(symbol_1) - k(symbol_xx))]
-          self%convolution%spectrum(i, b, :) = real(scale*[matrix(3), -matrix(2), matrix(1)] &
-                                                    /(matrix(1)*matrix(3) - matrix(2)**2), sp)
+          self%convolution%spectrum(i, b, :n_tangential) = real(scale*inverse(matrix), sp)
+          matrix([1, 3]) = matrix([1, 3]) + spring
+          self%convolution%spectrum(i, b, n_tangential + 1:) = real(scale*inverse(matrix), sp)
         end do
       end if
     end do
     !$omp end parallel do
     self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
   end subroutine new_preconditioner
+
+  !> Inverse of a symmetric matrix.
+  pure function inverse(matrix)
+    !> Elements xx, xy and yy
+    real(wp), intent(in) :: matrix(3)
+    real(wp) :: inverse(3)
+    inverse = [matrix(3), -matrix(2), matrix(1)]/(matrix(1)*matrix(3) - matrix(2)**2)
+  end function inverse
 
   !> Bytes that the preconditioner takes, for a window of the given size.
   pure integer(selected_int_kind(18)) function preconditioner_memory(extent, n_threads, tangential)
@@ -105,7 +121,7 @@ contains
     integer, intent(in) :: n_threads
     !> For shear tractions instead of the pressure
     logical, intent(in) :: tangential
-    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(3, 1, tangential), &
+    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), &
                                                merge(2, 1, tangential), n_threads)
   end function preconditioner_memory
 
@@ -142,7 +158,7 @@ contains
     end associate
   end subroutine apply
 
-  subroutine apply_single(self, displacement, traction, edge)
+  subroutine apply_single(self, displacement, traction, edge, on_springs)
     class(preconditioner_t), intent(inout) :: self
     !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
     real(sp), intent(inout), contiguous, target :: displacement(:, :, :)
@@ -150,8 +166,10 @@ contains
     real(sp), intent(out), contiguous, target :: traction(:, :, :)
     !> Continuation beyond the nodes where displacements are given
     type(edge_extension_t), intent(in), optional :: edge
+    !> Displacements of nodes on soft springs; absent: without springs
+    logical, intent(in), optional :: on_springs
     real(sp), pointer, contiguous :: field(:)
-    integer :: m
+    integer :: m, block(2, 2)
 
     if (present(edge)) then
       do m = 1, size(displacement, 3)
@@ -160,7 +178,9 @@ contains
       end do
     end if
     if (self%tangential) then
-      call self%convolution%convolve(tangential_block, displacement, traction)
+      block = tangential_block
+      if (present(on_springs)) block = block + merge(n_tangential, 0, on_springs)
+      call self%convolution%convolve(block, displacement, traction)
     else
       call self%convolution%convolve(normal_block, displacement, traction)
     end if

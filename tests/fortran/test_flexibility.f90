@@ -1,7 +1,7 @@
 !> The flexibility operators: explicit matrix and convolution.
 module test_flexibility
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
@@ -11,6 +11,7 @@ module test_flexibility
   use hc_contact_residuals, only: normal_self_compliance
   use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   use hc_triangle_integrals, only: linear_load_displacement
+  use hc_spring_blend, only: node_compliance, soft
   use hc_preconditioner, only: preconditioner_t, new_preconditioner
   use testing, only: test_t, new_test, check, check_raised, check_true
   implicit none
@@ -379,6 +380,7 @@ contains
     type(elastic_pair_t) :: pair
     real(wp), dimension(65, 65, 2) :: traction, displacement, back
     real(wp) :: x(65, 65), y(65, 65)
+    real(sp), dimension(65, 65, 2) :: given, wanted
 
     pair = elastic_pair_t(0.7_wp, 0.1_wp, 0.6_wp)
     call new_lattice(lattice, equilateral_basis(1.0_wp), [-32, -32], [65, 65], error)
@@ -394,6 +396,12 @@ contains
     if (allocated(error)) return
     call preconditioner%apply(displacement, back)
     call check(error, reshape(back, [size(back)]), reshape(traction, [size(back)]), 0.05_wp, 'shear traction')
+    if (allocated(error)) return
+    displacement = displacement + soft*node_compliance(lattice, pair)*traction
+    given = real(displacement/preconditioner%unit, sp)
+    call preconditioner%apply_single(given, wanted, on_springs=.true.)
+    back = wanted
+    call check(error, reshape(back, [size(back)]), reshape(traction, [size(back)]), 0.05_wp, 'shear traction on springs')
   end subroutine test_shear_preconditioner
 
   !> Both preconditioners are symmetric and positive definite, column by column of their matrices.

@@ -13,6 +13,7 @@ module test_friction
   use hc_friction_law, only: coulomb_t, linearize, on_cone, normal_to
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
   use hc_friction_problem, only: friction_problem_t, new_friction_problem
+  use hc_krylov, only: projected_cg
   use hc_friction_systems, only: operators_t, new_operators, shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use testing, only: test_t, new_test, check, check_raised, check_true
@@ -38,6 +39,7 @@ contains
       new_test('load_residuals', test_load_residuals), &
       new_test('conclude', test_conclude), &
       new_test('shear_system', test_shear_system), &
+      new_test('slip_preconditioner', test_slip_preconditioner), &
       new_test('cattaneo_mindlin', test_cattaneo_mindlin), &
       new_test('lubkin', test_lubkin), &
       new_test('no_friction', test_no_friction), &
@@ -357,7 +359,7 @@ contains
     system%direction(2, :) = sin(2.0_wp*pi*angle)
     ! stick, and slip with compliances from far below to far above that of a node
     system%compliance = [(merge(0.0_wp, system%elastic_compliance*10.0_wp**(0.4_wp*(i - 14)), modulo(i, 3) == 0), i=1, n)]
-    call system%blend(spread(.true., 1, size(system%weight)))
+    call system%weigh(spread(.true., 1, n))
     call random_number(x)
     call system%product(x, y, error)
     if (allocated(error)) return
@@ -396,6 +398,46 @@ contains
     i = maxloc(system%compliance, dim=1)
     call check(error, m(i, i)*system%compliance(i), 1.0_wp, 1.0e-14_wp, '1/D')
   end subroutine test_shear_system
+
+  !> Nodes that slip far or not so far: conjugate gradients take few iterations, and no more on twice as fine a lattice.
+  subroutine test_slip_preconditioner(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(operators_t), target :: operators
+    type(shear_system_t) :: system
+    type(elastic_pair_t) :: pair
+    real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:), none(:, :)
+    logical, allocatable :: active(:)
+    real(wp) :: no_multiplier(0), residual
+    integer :: level, side, n, iterations
+
+    pair = elastic_pair_t(1.0_wp, 0.0_wp, 0.5_wp)
+    do level = 1, 2
+      side = 40*level + 1
+      n = side**2
+      call new_lattice(lattice, equilateral_basis(2.0_wp/(side - 1)), [-side/2, -side/2], [side, side], error)
+      if (allocated(error)) return
+      call new_operators(operators, lattice, pair, error, n_threads=1)
+      if (allocated(error)) return
+      if (allocated(x)) deallocate (x, y, unknown, image, rhs, none)
+      allocate (x(side, side), y(side, side), unknown(2*n), image(2*n), rhs(2*n), none(2*n, 0))
+      call lattice%coordinates(x, y)
+      call new_shear_system(system, operators)
+      ! compliances from nothing to that of the whole contact, as they grow across a slip zone
+      system%compliance = reshape(2.0_wp*sqrt(x**2 + y**2)**3, [n])
+      active = [reshape(x**2 + y**2 < 0.8_wp, [n]), spread(.false., 1, n)]
+      system%n_threads = 1
+      call system%weigh(active(:n))
+      unknown = 0.0_wp
+      image = 0.0_wp
+      rhs = merge(1.0_wp, 0.0_wp, active)
+      call projected_cg(system, active, none, none, rhs, unknown, image, 1.0e-6_wp, 100, no_multiplier, residual, &
+                        iterations, error)
+      if (allocated(error)) return
+      call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 10, 'iterations')
+      if (allocated(error)) return
+    end do
+  end subroutine test_slip_preconditioner
 
   !> Does Cholesky's factor exist?
   pure logical function positive_definite(matrix)

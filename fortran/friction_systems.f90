@@ -20,6 +20,7 @@ module hc_friction_systems
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
   use hc_spring_blend, only: node_compliance, blend
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
+  use hc_friction_law, only: magnitude
   use hc_krylov, only: linear_system_t
   use hc_packing, only: packing_t, new_packing
   implicit none
@@ -255,19 +256,21 @@ contains
     self%used = [any(contact .and. self%weight(:, 1) > 0.0_wp), any(contact .and. self%weight(:, 2) > 0.0_wp)]
   end subroutine weigh
 
-  !> What the preconditioner makes of slip, of a traction that was found in stick.
+  !> A spring in series with the stiffness that a node was found to have in stick: what it leaves of the traction.
   pure subroutine soften(self, displacement, traction)
     class(shear_system_t), intent(in) :: self
     !> Displacement, in the frames (2 n)
     real(wp), intent(in) :: displacement(:)
     !> Its traction if all nodes stuck, in the frames (2 n)
     real(wp), intent(inout) :: traction(:)
-    integer :: i
+    real(wp) :: stiffness
+    integer :: i, n
 
-    do i = 1, size(self%compliance)
-      if (self%weight(i, 1) < 1.0_wp) then
-        traction(i) = self%weight(i, 1)**2*traction(i) + (1.0_wp - self%weight(i, 1)**2)/self%compliance(i)*displacement(i)
-      end if
+    n = size(self%compliance)
+    do i = 1, n
+      if (.not. self%compliance(i) > 0.0_wp) cycle
+      stiffness = magnitude(traction([i, n + i]))/max(magnitude(displacement([i, n + i])), tiny(1.0_wp))
+      traction(i) = traction(i)/(1.0_wp + stiffness*self%compliance(i))
     end do
   end subroutine soften
 

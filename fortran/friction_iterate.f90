@@ -29,9 +29,7 @@ module hc_friction_iterate
   type :: iterate_t
     !> Pressure and the closing of the gap that it causes
     real(wp), allocatable :: p(:), w(:)
-    !> Tangential displacement that the pressure causes
-    real(wp), allocatable :: dragged(:)
-    !> Shear traction and the tangential displacement that it causes
+    !> Shear traction, and the tangential displacement that it causes together with the pressure
     real(wp), allocatable :: q(:), u(:)
     !> Closing of the gap that the shear traction, cut to the cone, causes
     real(wp), allocatable :: closing(:)
@@ -137,7 +135,7 @@ contains
 
     self%p = reshape(start%pressure, [n])
     self%q = reshape(start%traction, [2*n])
-    allocate (self%w(n), self%closing(n), self%dragged(2*n), self%u(2*n), source=0.0_wp)
+    allocate (self%w(n), self%closing(n), self%u(2*n), source=0.0_wp)
     self%contact = self%p > 0.0_wp .and. self%candidate
     self%motion = merge(start%motion, target%value, target%control == force_control)
     if (any(self%contact)) then
@@ -168,16 +166,16 @@ contains
 
     n = size(self%p)
     allocate (moved(3*n))
-    if (self%dragging .and. .not. self%first) then
+    self%u = 0.0_wp
+    if (self%dragging .and. .not. (self%cold .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
-      self%dragged = moved(n + 1:)
+      self%u = moved(n + 1:)
     else
       call self%operators%apply([normal], self%p, [normal], moved(:n), error)
     end if
     if (allocated(error)) return
     self%w = moved(:n)
     self%closing = 0.0_wp
-    self%u = 0.0_wp
     if (all_zero(self%q)) return
     if (self%pressing) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
@@ -186,7 +184,7 @@ contains
       call self%operators%apply([along_x, along_y], self%q, [along_x, along_y], moved(n + 1:), error)
     end if
     if (allocated(error)) return
-    self%u = moved(n + 1:)
+    self%u = self%u + moved(n + 1:)
   end subroutine refresh
 
   pure logical function all_zero(values)
@@ -350,9 +348,9 @@ contains
         ds(i) = 0.0_wp
         ds(n + i) = 0.0_wp
         if (.not. (self%contact(i) .or. self%p(i) > 0.0_wp)) cycle
-        ds(i) = self%u(i) + self%dragged(i) - self%origin(i) &
+        ds(i) = self%u(i) - self%origin(i) &
                 - (self%motion(along_x) - self%motion(about_z)*self%problem%y(col, row))
-        ds(n + i) = self%u(n + i) + self%dragged(n + i) - self%origin(n + i) &
+        ds(n + i) = self%u(n + i) - self%origin(n + i) &
                     - (self%motion(along_y) + self%motion(about_z)*self%problem%x(col, row))
       end do
     end do

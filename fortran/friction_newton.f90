@@ -125,12 +125,11 @@ contains
     now%p = x(:n)
     x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
     call now%shear%to_plane(x(n + 1:), now%q)
-    ! from here on w and u are those of all tractions together
+    ! from here on w is that of all tractions together
     now%w = ax(:n)
     now%closing = 0.0_wp
     ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*x(n + 1:2*n)
     call now%shear%to_plane(ax(n + 1:), now%u)
-    now%dragged = 0.0_wp
     call now%find_residuals()
     now%first = .false.
   end subroutine coupled_sweep

@@ -51,8 +51,8 @@ contains
 
     call press(now, error)
     if (allocated(error)) return
-    if (now%dragging) then
-      call now%operators%apply([normal], now%p, [along_x, along_y], now%dragged, error)
+    if (now%dragging .and. now%cold .and. now%first) then
+      call now%operators%apply([normal], now%p, [along_x, along_y], now%u, error)
       if (allocated(error)) return
     end if
     ! what the new pressure makes of the old shear traction is what has to be mended
@@ -135,7 +135,7 @@ contains
 
     real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :), moved(:), q(:)
     logical, allocatable :: active(:)
-    real(wp), allocatable :: u(:), missing(:), multiplier(:)
+    real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
     real(wp) :: goal, residual, motion(n_motion)
     integer :: n, iterations
@@ -163,10 +163,10 @@ contains
         call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
       end if
       if (independent) then
-        call now%shear%product(x, ax, error)
+        call displace(now, x, ax, error)
         if (allocated(error)) return
         ! motions that are prescribed are known; the others are multipliers
-        moved = now%origin - now%dragged + now%prescribed_displacement()
+        moved = now%origin + now%prescribed_displacement()
         call now%shear%to_frame(moved, rhs)
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
@@ -186,7 +186,6 @@ contains
       now%q = q
     end do
     if (now%sliding) return
-    allocate (u, source=now%u)
     motion = now%motion
     call driven%set_motions(multiplier, now%motion)
     call now%shear%to_plane(x, now%q)
@@ -203,12 +202,43 @@ contains
       now%share = 0.5_wp
     else
       ! Newton's method goes in circles: what lies between carries the same loads
-      now%q = q + now%share*(now%q - q)
-      now%u = u + now%share*(now%u - u)
+      now%q = merge(q + now%share*(now%q - q), 0.0_wp, [now%contact, now%contact])
       now%motion = motion + now%share*(now%motion - motion)
       now%share = max(less*now%share, least_share)
+      call now%shear%to_frame(now%q, x)
+      call displace(now, x, ax, error)
+      if (allocated(error)) return
+      ax(:n) = ax(:n) - now%shear%compliance*x(:n)
+      call now%shear%to_plane(ax, now%u)
     end if
   end subroutine shear_off
+
+  !> What a shear traction and the pressure displace together, springs included.
+  subroutine displace(now, x, ax, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout) :: now
+    !> Shear traction, in the frames (2 n)
+    real(wp), intent(in), contiguous, target :: x(:)
+    !> Tangential displacement, in the frames (2 n)
+    real(wp), intent(out), contiguous, target :: ax(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: traction(:), moved(:)
+    integer :: n
+
+    if (.not. now%dragging) then
+      call now%shear%product(x, ax, error)
+      return
+    end if
+    n = size(now%p)
+    allocate (traction(3*n), moved(2*n))
+    traction(:n) = now%p
+    call now%shear%to_plane(x, traction(n + 1:))
+    call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], moved, error)
+    if (allocated(error)) return
+    call now%shear%to_frame(moved, ax)
+    ax(:n) = ax(:n) + now%shear%compliance*x(:n)
+  end subroutine displace
 
   !> About the pressure that an approach of the nodes in contact causes: worked out once a step.
   subroutine lift_pressure(now, constraint, mb, error)

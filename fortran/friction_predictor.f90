@@ -9,12 +9,14 @@
 !>
 !> The new loads are then applied to it (full approximation scheme), after a
 !> still coarser lattice has been asked in the same way, and the change of its
-!> tractions and motions is added to the fine ones. The fronts of contact, stick and slip are where
+!> tractions and motions is added to the fine ones. Nodes between coarse ones that slip are put
+!> onto the cone. The fronts of contact, stick and slip are where
 !> they should be then but for a node or two, and no history has to be kept for it.
 module hc_friction_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, force_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, slip, normal, force_control
+  use hc_friction_law, only: magnitude
   use hc_friction_problem, only: friction_problem_t
   use hc_friction_systems, only: operators_t
   use hc_friction_level, only: solve_level
@@ -118,7 +120,9 @@ contains
     type(friction_problem_t), intent(in) :: problem
     !> Fine state: tractions and motions change
     type(contact_state_t), intent(inout) :: state
-    real(wp), allocatable :: change(:, :), change_of_traction(:, :, :)
+    real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
+    real(wp) :: bound, length
+    integer :: col, row
 
     allocate (change, mold=state%pressure)
     allocate (change_of_traction, mold=state%traction)
@@ -127,6 +131,17 @@ contains
     state%pressure = merge(max(state%pressure + change, 0.0_wp), 0.0_wp, problem%candidate)
     state%traction = state%traction + change_of_traction
     where (spread(state%pressure <= 0.0_wp, 3, 2)) state%traction = 0.0_wp
+    ! what is interpolated between tractions on the cone lies inside, and would stick
+    allocate (slipping, mold=state%pressure)
+    call prolong(coarse_problem%lattice, merge(1.0_wp, 0.0_wp, after%zone == slip), problem%lattice, slipping)
+    do row = 1, size(slipping, 2)
+      do col = 1, size(slipping, 1)
+        if (slipping(col, row) < 1.0_wp) cycle
+        bound = problem%friction%bound(state%pressure(col, row))
+        length = magnitude(state%traction(col, row, :))
+        if (length > 0.0_wp .and. length < bound) state%traction(col, row, :) = state%traction(col, row, :)*(bound/length)
+      end do
+    end do
     state%motion = state%motion + (after%motion - before%motion)
   end subroutine add_change
 

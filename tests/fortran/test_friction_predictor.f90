@@ -2,7 +2,7 @@
 module test_friction_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, force_control, displacement_control
+  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, slip, force_control, displacement_control
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t
   use hc_friction_systems, only: operators_t, new_operators
@@ -115,7 +115,7 @@ contains
       load, 0.3_wp*mu*load, 0.1_wp*mu*load, 0.0_wp], [4, 3])
     real(wp) :: work
     logical :: predicted
-    integer :: i
+    integer :: i, inside
 
     call set_up(24, contact, state, coarse, operators, error)
     if (allocated(error)) return
@@ -132,6 +132,12 @@ contains
                       'shear traction')
       if (allocated(error)) return
       call check_true(error, norm2(guess%motion - after%motion) < 0.02_wp*norm2(state%motion - after%motion), 'motions')
+      if (allocated(error)) return
+      if (i > 1) cycle
+      ! where the slip zone only grows
+      inside = count(after%zone == slip .and. &
+                     hypot(guess%traction(:, :, 1), guess%traction(:, :, 2)) < 0.999_wp*mu*guess%pressure)
+      call check_true(error, inside < 0.05_wp*count(after%zone == slip), 'slip on the cone')
       if (allocated(error)) return
     end do
   end subroutine test_change

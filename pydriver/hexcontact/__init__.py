@@ -15,7 +15,7 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
+from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError, StopRun
 
 # Threads that wait for each other keep their cores busy, by default for so long that two runs on the same
 # cores take most of each other's time. OpenMP reads this when the compiled core is loaded.
@@ -23,13 +23,15 @@ if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 if TYPE_CHECKING:
-    from . import analytic, influence, plotting
+    from . import analytic, influence, plotting, surfaces
     from .case import Case
     from .lattice import Lattice
     from .native import ElasticPair, FlexibilityOperator, NormalContact
     from .native_friction import ContactState, FrictionalContact
     from .restart import resume
-    from .result import Result, Step
+    from .result import Result
+    from .session import Session
+    from .step import Step
     from .store import open_result
     from .study import Study, run_study
 
@@ -44,13 +46,14 @@ _HOME = {
     "Lattice": "lattice",
     "NormalContact": "native",
     "Result": "result",
-    "Step": "result",
+    "Session": "session",
+    "Step": "step",
     "Study": "study",
     "open_result": "store",
     "resume": "restart",
     "run_study": "study",
 }
-_MODULES = ("analytic", "influence", "plotting")
+_MODULES = ("analytic", "influence", "plotting", "surfaces")
 
 __all__ = [
     "Case",
@@ -65,7 +68,9 @@ __all__ = [
     "NormalContact",
     "ResourceError",
     "Result",
+    "Session",
     "Step",
+    "StopRun",
     "Study",
     "analytic",
     "influence",
@@ -73,6 +78,7 @@ __all__ = [
     "plotting",
     "resume",
     "run_study",
+    "surfaces",
 ]
 
 

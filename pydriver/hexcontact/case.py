@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import deck as decks
 from . import grid as grids
 from . import native, native_friction
-from .case_arguments import as_toml, body_keys, given, with_radians
+from .case_arguments import as_toml, body_keys, given, middle_of, with_radians
 from .case_checks import algorithm_of, checked_deck
 from .deck import Deck
 from .deck_assembly import Assembled, assemble
@@ -27,7 +27,10 @@ from .surfaces import Separation, Surface
 from .validation import SMALLEST
 
 if TYPE_CHECKING:
+    from .progress import Reporter
     from .result import Result
+    from .session import Session
+    from .step import Step
 
 __all__ = ["Body", "Case", "LoadStep", "OutputSettings", "SolverSettings", "Target"]
 
@@ -104,7 +107,7 @@ class Case:
         The only load (N) or motion (m), in one step or in `steps`.
     steps : int, optional
         Number of equal increments of it.
-    loads : sequence of mappings, optional
+    loads : sequence of mappings, or mapping, optional
         Entries of [[load]] instead, for anything more; twist in rad.
     friction_coefficient : float, optional
         Coefficient of friction; frictionless if absent.
@@ -194,7 +197,7 @@ class Case:
         normal_load: float | None = None,
         approach: float | None = None,
         steps: int | None = None,
-        loads: Sequence[Mapping[str, Any]] | None = None,
+        loads: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None,
         friction_coefficient: float | None = None,
         algorithm: str | None = None,
         method: str | None = None,
@@ -209,11 +212,12 @@ class Case:
         if lattice is not None:
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
             if gap is None:  # so that the deck of the case finds the same window again
-                middle = [lattice.cols[lattice.n_col // 2], lattice.rows[lattice.n_row // 2]]
-                center = (origin + middle @ lattice.basis).tolist()
+                center = middle_of(lattice)
         elif array is not None and window is None and array.ndim == 2:
             window = array.shape
         if loads is None:
+            if normal_load is None and approach is None:
+                raise DeckError("loads: missing; expected normal_load or approach, or loads")
             loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
         elif normal_load is not None or approach is not None or steps is not None:
             raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
@@ -234,7 +238,7 @@ class Case:
                 algorithm=algorithm, method=method, tolerance=tolerance, coupling=coupling, entry=entry
             )
             or None,
-            load=[with_radians(load) for load in loads],
+            load=[with_radians(load) for load in ([loads] if isinstance(loads, Mapping) else loads)],
             output=given(fields=fields, every=every) or None,
         )
         self._set_up(assemble(data, None, Source(), Path()), gap if callable(gap) else array, lattice)
@@ -395,13 +399,56 @@ class Case:
         self,
         output: str | Path | None = None,
         overwrite: bool = False,
-        on_step: Callable[..., object] | None = None,
-        progress: Any = None,
+        on_step: Callable[[Step], object] | None = None,
+        progress: Reporter | bool | None = None,
     ) -> Result:
         """Solve the case; see `hexcontact.solve.run`."""
         from . import solve
 
         return solve.run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
+
+    def start(self, output: str | Path | None = None, overwrite: bool = False) -> Session:
+        """Begin a run that waits between its load steps, for loads that depend on answers.
+
+        Parameters
+        ----------
+        output : path, optional
+            netCDF file to write; each step is on the disk before the next begins.
+        overwrite : bool
+            Replace an output that is there already.
+
+        Returns
+        -------
+        Session
+            Iterate over it for the loads of the case, or apply others with `Session.advance`.
+        """
+        from .session import Session
+
+        return Session(self, output, overwrite)
+
+    def changed(self, changes: Mapping[str, Any]) -> Case:
+        """Return the same case with other values for some keys of its deck.
+
+        Parameters
+        ----------
+        changes : mapping
+            New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
+            "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is found
+            anew, also where a `Lattice` was given.
+
+        Raises
+        ------
+        DeckError
+            With a sentence for each thing that is wrong then.
+        """
+        data = decks.parse_toml(self.deck_text, "deck")
+        if self._given_gap is not None:
+            del data["body"]["1"]["surface"]  # stands for the gap
+        folder = self.deck_file.parent if self.deck_file else Path()
+        case = type(self).__new__(type(self))
+        case._set_up(assemble(data, None, Source(), folder, changes), self._given_gap, None)
+        case.deck_file = self.deck_file
+        return case
 
     def __eq__(self, other: object) -> bool:
         """Whether two cases are the same problem, solved and kept in the same way."""
@@ -429,6 +476,12 @@ class Case:
             f"Case({title}{self.solver.algorithm}, {rows} x {cols} nodes, "
             f"{(n := len(self.load_steps))} load step{'s' * (n > 1)})"
         )
+
+    def _repr_html_(self) -> str:
+        from .display import html_table
+        from .summary import case_rows
+
+        return html_table(self.title or "Case", ("", ""), case_rows(self))
 
     # --- the window -----------------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from .surfaces import Surface
 
 if TYPE_CHECKING:
     from .case import Body
+    from .lattice import Lattice
 
 
 def given(**keys: Any) -> dict[str, Any]:
@@ -49,6 +50,13 @@ def with_radians(load: Any) -> Any:
     if isinstance(load.get("path"), list):
         load["path"] = [with_radians(segment) for segment in load["path"]]
     return load
+
+
+def middle_of(lattice: Lattice) -> list[float]:
+    """Return the point (m) about which a deck finds the same window again."""
+    middle = [lattice.cols[lattice.n_col // 2], lattice.rows[lattice.n_row // 2]]
+    center: list[float] = (lattice.origin + middle @ lattice.basis).tolist()
+    return center
 
 
 def _rows(key: str, rows: Any) -> Any:

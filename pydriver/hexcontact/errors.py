@@ -25,3 +25,10 @@ class ResourceError(HexcontactError, MemoryError):
     """The machine cannot hold the case (memory, threads, a library's limit)."""
 
     exit_code = 4
+
+
+class StopRun(Exception):
+    """Raised by a callback (`on_step`) to end a run after the step at hand; the message says why.
+
+    It does not leave `hexcontact.Case.run`: the run returns what is finished.
+    """

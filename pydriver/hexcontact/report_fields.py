@@ -159,7 +159,7 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
         if nearest is not None:
             row, col, inside = nearest
             zone = np.where(inside, view.data["zone"].values[row, col], 0).astype("u1")
-            zones.append(_png(zone))
+            zones.append(png_of(zone))
         sections.append(_section(view, *cut))
     shown = {name: entry for name, entry in shown.items() if "slip" not in name or any(entry["max"])}
     for entry in shown.values():
@@ -198,11 +198,11 @@ def _limits(result: Result, numbers: Sequence[int], view: StepView) -> tuple[flo
 
 def _gray(values: Array, largest: float, contact: NDArray[np.bool_]) -> str:
     shades = np.zeros(values.shape) if largest == 0.0 else np.clip(values / largest, 0.0, 1.0)
-    return _png(np.where(contact, 1 + np.round(254 * shades), 0).astype("u1"))
+    return png_of(np.where(contact, 1 + np.round(254 * shades), 0).astype("u1"))
 
 
-def _png(gray: NDArray[np.uint8]) -> str:
-    """Return a gray picture as PNG in base64."""
+def png_of(gray: NDArray[np.uint8]) -> str:
+    """Return a picture, gray or in colors, as PNG in base64."""
     from PIL import Image
 
     file = io.BytesIO()

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
-import math
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .variables import CONVENTIONS, FIELDS, NAN, SCHEMA_VERSION, VARIABLES
+from .messages import did_you_mean
+from .result_tools import ResultTools
+from .step import Step
+from .variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -27,47 +29,11 @@ if TYPE_CHECKING:
     from .pressure_field import PressureField
 
 _COORDINATES = ("step", "row", "col", "x", "y")
-_TOLD = (  # of the last step when a result is printed
-    *("normal_load", "tangential_load_x", "tangential_load_y", "approach", "shift_x", "shift_y"),
-    *("contact_radius_fit", "stick_radius_fit", "max_pressure", "residual_normal", "residual_tangential"),
-)
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
     *("lattice_spacing", "lattice_basis", "lattice_origin"),
     *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
 )
-
-
-@dataclass(frozen=True)
-class Step:
-    """A finished load step.
-
-    Attributes
-    ----------
-    index : int
-        Position in the whole history, from 0.
-    lattice : Lattice
-        Window it was solved on.
-    fields : mapping of str to ndarray
-        Arrays of shape (n_row, n_col), SI; names of `hexcontact.variables`. ``initial_gap`` among them.
-    history : mapping of str to number or text
-        Values by step; names of `hexcontact.variables`.
-    """
-
-    index: int
-    lattice: Lattice
-    fields: Mapping[str, NDArray[Any]]
-    history: Mapping[str, float | int | str]
-
-    @property
-    def number(self) -> int:
-        """Number of the step as users count, from 1."""
-        return self.index + 1
-
-    @property
-    def head(self) -> Step:
-        """The same step without the values of its fields: small enough to keep."""
-        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, np.empty(0)))
 
 
 def now() -> str:
@@ -337,7 +303,7 @@ def assemble(metadata: Metadata, steps: Iterable[Step], complete: bool = True) -
     return xarray.Dataset(variables, coords=coordinates, attrs=layout.attributes(complete))
 
 
-class Result:
+class Result(ResultTools):
     """A result by the names of its quantities.
 
     ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; everything else
@@ -369,7 +335,8 @@ class Result:
         if name in self.dataset.variables:
             return self.dataset[name]
         what = "not in this result" if name in VARIABLES else "no quantity of a result"
-        raise KeyError(f"{name} is {what}; there are {', '.join(map(str, self.dataset.variables))}")
+        hint = did_you_mean(name, map(str, self.dataset.variables))
+        raise KeyError(f"{name} is {what}{hint or '; result.quantities lists what there is'}")
 
     def __dir__(self) -> list[str]:
         """Name the quantities too."""
@@ -378,6 +345,10 @@ class Result:
     def __len__(self) -> int:
         """Return the number of load steps."""
         return int(self.dataset.sizes["step"])
+
+    def __iter__(self) -> Iterator[xarray.Dataset]:
+        """Go through the load steps."""
+        return (self.dataset.isel(step=place) for place in range(len(self)))
 
     @property
     def case_title(self) -> str:
@@ -393,6 +364,11 @@ class Result:
     def complete(self) -> bool:
         """Whether all planned load steps are there."""
         return bool(self.dataset.attrs.get("complete", True))
+
+    @property
+    def stopped(self) -> str:
+        """Why the run ended before its time; empty if it did not, or could not say so."""
+        return str(self.dataset.attrs.get("stopped", ""))
 
     @property
     def lattice(self) -> Lattice:
@@ -461,23 +437,14 @@ class Result:
 
     def __repr__(self) -> str:
         """Say in a few lines what is there."""
-        sizes, attributes = self.dataset.sizes, self.dataset.attrs
-        planned = attributes.get("planned_steps") or "?"
-        steps = f"{len(self)} load step{'s' * (len(self) != 1)}"
-        spacing = attributes.get("lattice_spacing", NAN)
-        lines = [
-            (f"Result of {self.case_title!r}" if self.case_title else "Result")
-            + (f", {self.path}" if self.path else ""),
-            f"  {steps if self.complete else f'{steps} of {planned} (unfinished run)'}"
-            f", {sizes['row']} x {sizes['col']} nodes, spacing {spacing:.6g} m",
-        ]
-        last = self.dataset.isel(step=-1)
-        for name in _TOLD:
-            if name in self.dataset and not math.isnan(value := float(last[name])):
-                lines.append(f"  {name:<19} {value:.6g} {VARIABLES[name].units.replace('1', '')}".rstrip())
+        from .display import result_header, result_rows, text_table
+
         fields = [name for name in FIELDS if name in self.dataset]
-        lines.append(f"  fields: {', '.join(fields)}")
-        return "\n".join(lines)
+        table = text_table(("", ""), result_rows(self))
+        lines = [result_header(self), *table.splitlines(), f"fields: {', '.join(fields)}"]
+        return "\n  ".join([*lines, *([self.stopped] if self.stopped else [])])
 
     def _repr_html_(self) -> str:
-        return self.dataset._repr_html_()
+        from .display import result_html
+
+        return result_html(self)

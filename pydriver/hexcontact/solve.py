@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import ConvergenceError
+from .errors import ConvergenceError, HexcontactError, StopRun
+from .load_history import MOTIONS, LoadStep
 from .load_series import LOADS
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
@@ -70,13 +73,16 @@ def run(
     overwrite : bool
         Replace an output that is there already.
     on_step : callable, optional
-        Called with each finished `Step`.
+        Called with each finished `Step`, after it was written. If it returns something true, or raises
+        `hexcontact.StopRun`, the run ends there; any other exception ends it, too, and is passed on.
     progress : Reporter or bool, optional
         Who is told about each step; True: a bar on a terminal, lines otherwise.
 
     Returns
     -------
     Result
+        What is finished: all load steps, or those up to where `on_step` ended the run. With an output, the
+        finished steps are kept as after a signal then, and `hexcontact.resume` goes on.
 
     Raises
     ------
@@ -90,13 +96,15 @@ def run(
     shown = progress if isinstance(progress, Reporter) else reporter(quiet=not progress)
     if output is None:
         finished: list[Step] = []
+        stopped = ""
         with shown.watching(case.title, len(case.load_steps)):
             for step in steps(case, kept_in_memory=True):
                 finished.append(step)
                 shown.finished(step)
-                if on_step is not None:
-                    on_step(step)
-        return Result(assemble(metadata_of(case), finished))
+                if stopped := stops(on_step, step):
+                    break
+        dataset = assemble(metadata_of(case), finished, complete=not stopped)
+        return Result(dataset.assign_attrs(stopped=stopped) if stopped else dataset)
 
     from .store import Store, open_result
 
@@ -126,7 +134,7 @@ def record(
     shown : Reporter
         Who is told about each step.
     on_step : callable, optional
-        Called with each finished `Step`, when it is safe.
+        Called with each finished `Step`, when it is safe; may end the run, as in `run`.
     before : sequence of Step
         The steps that the store has already, as for `steps`.
 
@@ -138,12 +146,44 @@ def record(
     for step in steps(case, before=before):
         store.append(step)
         shown.finished(step)
-        if on_step is not None:
-            on_step(step)
+        try:
+            stopped = stops(on_step, step)
+        except Exception as error:
+            store.close(f"on_step raised {type(error).__name__} after step {step.number}: {error}")
+            if not isinstance(error, HexcontactError):  # to which the store adds it
+                error.add_note(store.kept)
+            raise
+        if stopped:
+            store.close(stopped)
+            return
     store.finish()
 
 
-def steps(case: Case, kept_in_memory: bool = False, before: Sequence[Step] = ()) -> Iterator[Step]:
+def stops(on_step: Callable[[Step], object] | None, step: Step) -> str:
+    """Tell a callback of a finished step; return why the run ends here, nothing if it goes on.
+
+    The last step of a run ends it anyway.
+    """
+    if on_step is None:
+        return ""
+    try:
+        wish = on_step(step)
+        if not wish:
+            return ""
+        reason = wish if isinstance(wish, str) else ""
+    except StopRun as wanted:
+        reason = str(wanted)
+    if step.load_fraction >= 1.0:
+        return ""
+    return f"stopped by on_step after step {step.number}" + (f": {reason}" if reason else "")
+
+
+def steps(
+    case: Case,
+    kept_in_memory: bool = False,
+    before: Sequence[Step] = (),
+    targets: Iterable[LoadStep] | None = None,
+) -> Iterator[Step]:
     """Solve a case step by step.
 
     Parameters
@@ -155,6 +195,9 @@ def steps(case: Case, kept_in_memory: bool = False, before: Sequence[Step] = ())
     before : sequence of Step
         The first steps if they are solved already: the heads of them, the last one with all its fields. What
         follows is to the bit what it would have been in one go.
+    targets : iterable of LoadStep, optional
+        What comes after them instead of the rest of the case; each is asked for when the one before is
+        solved.
 
     Yields
     ------
@@ -178,7 +221,8 @@ def steps(case: Case, kept_in_memory: bool = False, before: Sequence[Step] = ())
         if step.history["segment"] != segment + 1:
             segment, begun = int(step.history["segment"]) - 1, reached_by_now
         reached_by_now = _standing(step.history)
-    for target in case.load_steps[len(before) :]:
+    planned = len(case.load_steps)
+    for target in case.load_steps[len(before) :] if targets is None else targets:
         started = time.perf_counter()
         if target.segment != segment:
             segment, begun = target.segment, reached_by_now
@@ -189,9 +233,19 @@ def steps(case: Case, kept_in_memory: bool = False, before: Sequence[Step] = ())
             state = window.carried(state, smaller)
         if not reached.converged:
             raise ConvergenceError(window.complaint(reached, target, values))
-        step = window.step(target, reached, state, started)
+        step = dataclasses.replace(
+            window.step(target, reached, state, started),
+            prescribed=_prescribed(target, values, case.frictional),
+            load_fraction=(target.index + 1) / planned if targets is None else math.nan,
+        )
         yield step
         state, reached_by_now = reached, _standing(step.history)
+
+
+def _prescribed(target: LoadStep, values: Sequence[float], frictional: bool) -> dict[str, float]:
+    """Return what drives a load step by the keys of the deck; `values` are those of z, x, y and the twist."""
+    driven = zip(MOTIONS if frictional else MOTIONS[:1], target.targets, values, strict=False)
+    return {LOADS[motion][drive.control == "displacement"]: value for motion, drive, value in driven}
 
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:

@@ -1,0 +1,153 @@
+"""Tables and small pictures that notebooks and terminals show for cases, steps and results."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .progress import quantity
+
+if TYPE_CHECKING:
+    from .result import Result
+
+Row = Sequence[str]
+
+_TABLE = "border-collapse:collapse;margin:0.3em 0"
+_CELL = "padding:0.15em 1.2em 0.15em 0;border:0;background:none"
+_HEAD = f"{_CELL};border-bottom:1px solid currentColor;font-weight:600"
+_TITLE = "font-weight:600;text-align:left;padding:0.2em 0;color:inherit;caption-side:top"
+
+# Colors of a map of pressure, from none to the largest (viridis), and of zones: separated, stick, slip.
+_SHADES = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725")
+_ZONES = ("#ffffff", "#0072b2", "#e69f00")
+_PIXELS = 240  # of the longer side of a picture
+
+
+def text_table(headers: Row, rows: Iterable[Row]) -> str:
+    """Return a table as plain text; numbers are at the right of their columns."""
+    table = [list(headers), *map(list, rows)]
+    widths = [max(len(row[k]) for row in table) for k in range(len(headers))]
+    left = [k == 0 or not _numbers(row[k] for row in table[1:]) for k in range(len(headers))]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if first else cell.rjust(width)
+            for cell, width, first in zip(row, widths, left, strict=True)
+        ).rstrip()
+        for row in table
+    ]
+    return "\n".join(lines if any(headers) else lines[1:])
+
+
+def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") -> str:
+    """Return a table as HTML that looks the same in light and dark notebooks."""
+    rows = [list(row) for row in rows]
+    right = [k > 0 and _numbers(row[k] for row in rows) for k in range(len(headers))]
+
+    def line(row: Row, tag: str, style: str) -> str:
+        cells = (
+            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{html.escape(cell)}</{tag}>'
+            for cell, at_right in zip(row, right, strict=True)
+        )
+        return f'<tr style="background:none">{"".join(cells)}</tr>'
+
+    head = f"<thead>{line(headers, 'th', _HEAD)}</thead>" if any(headers) else ""
+    body = "".join(line(row, "td", _CELL) for row in rows)
+    caption = f'<caption style="{_TITLE}">{html.escape(title)}</caption>' if title else ""
+    under = f'<div style="opacity:0.75">{html.escape(note)}</div>' if note else ""
+    return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
+
+
+def _numbers(cells: Iterable[str]) -> bool:
+    """Tell whether a column holds numbers, some of which may be missing."""
+    found = [cell for cell in cells if cell not in ("", "-")]
+    return bool(found) and all(cell.lstrip("+-").replace("inf", "0")[:1].isdigit() for cell in found)
+
+
+# --- results ------------------------------------------------------------------------------------------------
+
+
+def result_header(result: Result) -> str:
+    """Return what a result is of: title, file, how much of it there is."""
+    sizes, attributes = result.dataset.sizes, result.dataset.attrs
+    steps = f"{len(result)} load step{'s' * (len(result) != 1)}"
+    if not result.complete:
+        steps += f" of {attributes['planned_steps']}, unfinished" if attributes.get("planned_steps") else ""
+    named = [f"Result of {result.case_title!r}" if result.case_title else "Result", result.path]
+    about = f"{steps}, {sizes['row']} x {sizes['col']} nodes"
+    spacing = quantity(float(attributes.get("lattice_spacing", np.nan)), "m")
+    return ", ".join(filter(None, named)) + f"\n  {about}, spacing {spacing}"
+
+
+def result_rows(result: Result) -> list[Row]:
+    """Return what the last step of a result came to."""
+    from .summary import step_rows
+
+    last = result.dataset.isel(step=-1)
+    names = [name for name, values in result.dataset.data_vars.items() if values.dims == ("step",)]
+    history = {str(name): last[name].item() for name in names}
+    try:
+        return list(step_rows(history))
+    except KeyError:  # a result that was put together by hand, of some quantities
+        return [(name.replace("_", " "), f"{value}") for name, value in history.items()]
+
+
+def result_html(result: Result) -> str:
+    """Return the last step of a result as a table beside maps of it, and all there is to unfold."""
+    title, _, about = result_header(result).partition("\n")
+    last = f"Load step {int(result.dataset['step'][-1])}"
+    note = about.strip() + (f"; {result.stopped}" if result.stopped else "")
+    table = html_table(f"{title}: {last}", ("", ""), result_rows(result), note)
+    pictures = "".join(_pictures(result))
+    below = f"<details><summary>all quantities</summary>{result.quantities._repr_html_()}</details>"
+    row = "display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start"
+    return f'<div><div style="{row}"><div>{table}</div>{pictures}</div>{below}</div>'
+
+
+def _pictures(result: Result) -> Iterable[str]:
+    """Yield maps of the last step: pressure, and where there is friction the zones."""
+    from .report_fields import Plane
+    from .step_view import StepView
+
+    try:
+        view = StepView.of(result, -1)
+    except ValueError:  # not kept
+        return
+    if not view.contact.any():
+        return
+    plane = Plane(view.window(1.15), _PIXELS)
+    values = view.at(*plane.points)
+    largest = float(view.pressure.max())
+    shades = np.array([_rgb(color) for color in _SHADES])
+    share = np.clip(values / largest, 0.0, 1.0) * (len(shades) - 1)
+    places = np.arange(len(shades))
+    colors = np.stack([np.interp(share, places, shades[:, k]) for k in range(3)], axis=-1)
+    colors[values <= 0.0] = 255.0
+    width = quantity(view.window(1.15)[1] - view.window(1.15)[0], "m", 3)
+    yield _figure(colors, f"pressure, up to {quantity(largest, 'Pa')}; {width} wide")
+    if view.friction and "zone" in view.data:
+        row, col, inside = plane.nearest(view)
+        zone = np.where(inside, np.maximum(view.data["zone"].values[row, col], 0), 0)
+        zones = np.array([_rgb(color) for color in _ZONES])[zone]
+        words = zip(("stick", "slip"), _ZONES[1:], strict=True)
+        yield _figure(zones, ", ".join(f'<span style="color:{c}">&#9632;</span> {word}' for word, c in words))
+
+
+def _rgb(color: str) -> list[int]:
+    return [int(color[k : k + 2], 16) for k in (1, 3, 5)]
+
+
+def _figure(colors: NDArray[np.float64], caption: str) -> str:
+    """Return a picture with its caption (HTML)."""
+    from .report_fields import png_of
+
+    picture = png_of(np.round(colors).astype("u1"))
+    rows, cols = colors.shape[:2]
+    frame = "border:1px solid #999;display:block"
+    return (
+        f'<figure style="margin:0.5em 0"><img width="{cols}" height="{rows}" style="{frame}" '
+        f'alt="" src="data:image/png;base64,{picture}"><figcaption>{caption}</figcaption></figure>'
+    )

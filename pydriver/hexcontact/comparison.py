@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .display import html_table, text_table
+from .errors import DeckError
 from .progress import quantity
 from .variables import VARIABLES
 
@@ -184,12 +185,12 @@ def _own(exact: Mapping[str, float] | object, name: str, result: Result) -> Exac
     if isinstance(exact, Mapping):
         for quantity_name in exact:
             if result[str(quantity_name)].dims != ("step",):
-                raise KeyError(f"{quantity_name} does not have one value by step")
+                raise DeckError(f"{quantity_name}: expected a quantity with one value by step")
         return Exact(name, {str(key): float(value) for key, value in exact.items()})
     names = ("normal_load", "approach", "max_pressure", "contact_radius")
     values = {key: float(value) for key in names if (value := getattr(exact, key, None)) is not None}
     if not values:
-        raise TypeError(
+        raise DeckError(
             "exact: expected values by the names of quantities, or a solution of hexcontact.analytic"
         )
     return Exact(name, {key: value for key, value in values.items() if math.isfinite(value)})

@@ -23,7 +23,7 @@ _TITLE = "font-weight:600;text-align:left;padding:0.2em 0;color:inherit;caption-
 
 # Colors of a map of pressure, from none to the largest (viridis), and of zones: separated, stick, slip.
 _SHADES = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725")
-_ZONES = ("#ffffff", "#0072b2", "#e69f00")
+_ZONES = ("#ffffff", "#0072b2", "#f0c05a")
 _PIXELS = 240  # of the longer side of a picture
 
 
@@ -57,7 +57,7 @@ def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") ->
     head = f"<thead>{line(headers, 'th', _HEAD)}</thead>" if any(headers) else ""
     body = "".join(line(row, "td", _CELL) for row in rows)
     caption = f'<caption style="{_TITLE}">{html.escape(title)}</caption>' if title else ""
-    under = f'<div style="opacity:0.75">{html.escape(note)}</div>' if note else ""
+    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{html.escape(note)}</div>' if note else ""
     return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
 
 

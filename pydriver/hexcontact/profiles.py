@@ -203,7 +203,7 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
     for name in names:
         if name not in kept:
             raise DeckError(f"{name} of step {step} was not kept (output.every)")
-    if not kept:
+    if not names and not any(VARIABLES[name].is_field for name in kept):
         raise DeckError(f"no field of step {step} was kept (output.fields, output.every)")
     return kept
 

@@ -89,7 +89,7 @@ class ResultTools:
         IndexError
             If there is no such step.
         """
-        return profile(self._result.lattice, self._fields(names, step), Line(start, end), points, step=step)
+        return self._along(Line(start, end), names, step, points)
 
     def section(
         self,
@@ -127,7 +127,11 @@ class ResultTools:
         """
         pressure = self._fields(["pressure"], step)["pressure"]
         line = section_line(self._result.lattice, pressure, angle, through)
-        return profile(self._result.lattice, self._fields(names, step), line, points, step=step)
+        return self._along(line, names, step, points)
+
+    def _along(self, line: Line, names: Sequence[str], step: int, points: int | None) -> xarray.Dataset:
+        number = int(self._result.step(step)["step"])
+        return profile(self._result.lattice, self._fields(names, step), line, points, step=number)
 
     def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
         """Return the values at the nodes of some fields of a step, or of all."""

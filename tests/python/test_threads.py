@@ -1,0 +1,184 @@
+"""Cases in threads and processes of their own: the same answers to the bit, and nobody waits."""
+
+import operator
+import pickle
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from hexcontact import (
+    Case,
+    FlexibilityOperator,
+    FrictionalContact,
+    Lattice,
+    NormalContact,
+    Result,
+    Step,
+    open_result,
+)
+from hexcontact.native import ElasticPair, Method
+from hexcontact.surfaces import Sphere
+
+STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+SOFT = {"young_modulus": 70e9, "poisson_ratio": 0.33}
+
+
+def fretting(**arguments: Any) -> Case:
+    given: dict[str, Any] = {
+        "body_1": {**STEEL, "surface": Sphere(radius=10e-3)},
+        "body_2": SOFT,
+        "nodes_in_radius": 8,
+        "friction_coefficient": 0.2,
+        "loads": [{"normal_load": 100.0, "steps": 2}, {"tangential_load_x": 15.0, "steps": 2}],
+    }
+    return Case(**{**given, **arguments})
+
+
+CASES: dict[str, Callable[[], Case]] = {
+    "dissimilar": fretting,
+    "alike": lambda: fretting(body_2=STEEL, nodes_in_radius=10),
+    "direct": lambda: fretting(nodes_in_radius=5, method="direct"),
+    "frictionless": lambda: fretting(friction_coefficient=None, loads={"normal_load": 200.0, "steps": 3}),
+}
+
+
+def assert_same(one: Result, other: Result) -> None:
+    """See to it that two results are the same to the bit, but for the times they took."""
+    for name in set(one.dataset.data_vars) - {"seconds"}:
+        assert_array_equal(one[str(name)].values, other[str(name)].values, err_msg=str(name))
+
+
+# --- threads ------------------------------------------------------------------------------------------------
+
+
+def test_cases_in_threads_have_the_answers_of_cases_in_turn(tmp_path: Path) -> None:
+    cases = {name: make() for name, make in CASES.items()}
+    serial = {name: case.run() for name, case in cases.items()}
+    barrier = threading.Barrier(2)
+
+    def together(place: int) -> list[tuple[str, Result]]:
+        names = list(cases)[:: 1 if place else -1]
+        barrier.wait()
+        # the same case is run in both threads, in memory and into a file
+        return [(n, cases[n].run(tmp_path / f"{n}.nc" if place else None)) for n in names]
+
+    with ThreadPoolExecutor(2) as pool:
+        for found in pool.map(together, range(2)):
+            for name, result in found:
+                assert_same(result, serial[name])
+
+
+def test_two_sessions_in_two_threads_do_not_feel_each_other() -> None:
+    def driven(load: float) -> list[float]:
+        session = fretting().start()
+        session.advance(normal_load=100.0)
+        return [float(session.advance(tangential_load_x=q).shift_x) for q in np.linspace(0.1, 1.0, 6) * load]
+
+    alone = [driven(load) for load in (10.0, 18.0)]
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(driven, (10.0, 18.0))) == alone
+
+
+@pytest.fixture
+def ticks() -> Iterator[list[float]]:
+    """Times at which another thread of Python could run, about every millisecond."""
+    times: list[float] = []
+    done = threading.Event()
+
+    def count() -> None:
+        while not done.wait(0.001):
+            times.append(time.perf_counter())
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    yield times
+    done.set()
+    thread.join()
+
+
+LATTICE = Lattice(1e-5, -60, -60, 121, 121)
+GAP = (LATTICE.x**2 + LATTICE.y**2) / 20e-3
+PAIR = ElasticPair.from_materials(210e9, 0.3, 70e9, 0.33)
+
+
+def press(method: Method) -> Callable[[], object]:
+    lattice = LATTICE if method == "fft" else Lattice(1e-5, -25, -25, 51, 51)
+    gap = (lattice.x**2 + lattice.y**2) / 20e-3
+    contact = NormalContact(lattice, PAIR, gap, method=method, threads=1)
+    return lambda: contact.solve(normal_load=100.0, tolerance=1e-12)
+
+
+def shear() -> Callable[[], object]:
+    contact = FrictionalContact(LATTICE, PAIR, GAP, friction_coefficient=0.2, threads=1)
+    state = contact.virgin()
+    controls = ["force", "force", "force", "displacement"]
+    return lambda: contact.advance(state, controls, [100.0, 5.0, 0.0, 0.0])
+
+
+def apply() -> Callable[[], object]:
+    operator_ = FlexibilityOperator(LATTICE, PAIR, "direct", threads=1)
+    return lambda: operator_.apply(GAP, GAP, GAP)
+
+
+@pytest.mark.parametrize("work", [lambda: press("fft"), lambda: press("direct"), shear, apply])
+def test_python_goes_on_while_the_core_works(
+    ticks: list[float], work: Callable[[], Callable[[], object]]
+) -> None:
+    call = work()
+    for _ in range(100):  # on a busy machine the other thread waits for a core
+        begun = time.perf_counter()
+        call()
+        ended = time.perf_counter()
+        margin = 0.1 * (ended - begun)  # in which arrays are checked, with the interpreter locked
+        if sum(begun + margin < t < ended - margin for t in list(ticks)) >= 3:
+            return
+    pytest.fail("no other thread of Python ran while the compiled core was at work")
+
+
+# --- processes ----------------------------------------------------------------------------------------------
+
+
+def test_cases_and_results_go_to_other_processes_and_come_back(tmp_path: Path) -> None:
+    case = fretting()
+    here = case.run(tmp_path / "out.nc")
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        there = pool.submit(Case.run, case).result()
+        assert_same(there, here)
+        # a result that is read from its file when it is asked for, too
+        tractions = pool.submit(operator.attrgetter("traction_x"), open_result(tmp_path / "out.nc")).result()
+        assert_array_equal(tractions.values, here.traction_x.values)
+        comparison = pool.submit(Result.compare, here).result()
+        assert comparison.note == here.compare().note
+
+
+def test_pickled_objects_are_the_same() -> None:
+    case = fretting()
+    assert pickle.loads(pickle.dumps(case)) == case
+    result = case.run()
+    again = pickle.loads(pickle.dumps(result))
+    assert_same(again, result)
+    assert again.compare().step == 4
+    seen: list[Step] = []
+    case.run(
+        on_step=lambda step: pickle.loads(pickle.dumps(step)).approach != step.approach or seen.append(step)
+    )
+    assert len(seen) == 4
+
+
+def test_a_dask_cluster_takes_cases() -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as client:
+        cases = [fretting(friction_coefficient=mu, gap=None) for mu in (0.2, 0.4)]
+        found = client.gather(client.map(Case.run, cases))
+    for case, result in zip(cases, found, strict=True):
+        assert_same(result, case.run())

@@ -55,8 +55,8 @@ def closed_solutions(result: Result, number: int) -> tuple[list[Exact], str]:
     if _pressure_is_frictionless(so_far):
         return [], "no closed solution is known for these surfaces"
     return [], (
-        "no closed solution is known for dissimilar bodies with friction under these loads; "
-        "coupling = goodman, coefficient = inf or similar bodies have some"
+        "no closed solution is known for dissimilar bodies with friction under these loads; there are some "
+        "for similar bodies, for pressing without slip, and for pressing with solver.coupling = goodman"
     )
 
 

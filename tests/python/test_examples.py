@@ -6,7 +6,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import matplotlib
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```python\n(.*?)^```\n(?:```\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL)
@@ -36,3 +38,42 @@ def test_programs_of_a_page_print_what_it_says(
     assert sum(bool(output) for _, output, _ in found) >= 8
     for program, output, line in found:
         assert printed("\n" * (line - 1) + program, page, names) == output, f"{page}, line {line}"
+
+
+COARSE = {  # what is changed so that they take a second, and the pictures that they write
+    "hertz_to_fretting": (
+        {"nodes_in_radius": 8},
+        ["hertz_section", "fretting_zones", "fretting_tractions", "mindlin_loop"],
+    ),
+    "stick_map": ({"nodes_in_radius": 6, "steps": 3}, ["stick_map", "stick_section"]),
+}
+
+
+def test_the_list_of_scripts_is_complete() -> None:
+    assert {path.stem for path in (ROOT / "cases").glob("*.py")} == set(COARSE)
+
+
+@pytest.mark.parametrize("name", COARSE)
+def test_scripts_of_the_cases_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changes, pictures = COARSE[name]
+    program = (ROOT / f"cases/{name}.py").read_text()
+    assert program.startswith("# %% [markdown]\n")
+    for key, value in changes.items():
+        program, count = re.subn(rf"^{key} = \d+", f"{key} = {value}", program, flags=re.MULTILINE)
+        assert count == 1, key
+    monkeypatch.chdir(tmp_path)
+    with matplotlib.rc_context():
+        output = printed(program, name, {})
+    assert len(output.splitlines()) > 5
+    assert "nan" not in output.lower()
+    assert {path.stem for path in tmp_path.glob("*.png")} == set(pictures)
+    for picture in tmp_path.glob("*.png"):
+        with Image.open(picture) as image:
+            colors = image.convert("RGB").getcolors(10**6)
+        assert colors is not None
+        assert len(colors) > 20  # something is drawn
+
+
+def test_the_readme_of_the_cases_names_the_scripts() -> None:
+    page = (ROOT / "cases/README.md").read_text()
+    assert [path.name for path in (ROOT / "cases").glob("*.py") if f"`{path.name}`" not in page] == []

@@ -216,8 +216,6 @@ class Case:
         elif array is not None and window is None and array.ndim == 2:
             window = array.shape
         if loads is None:
-            if normal_load is None and approach is None:
-                raise DeckError("loads: missing; expected normal_load or approach, or loads")
             loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
         elif normal_load is not None or approach is not None or steps is not None:
             raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")

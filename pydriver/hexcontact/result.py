@@ -346,6 +346,10 @@ class Result(ResultTools):
         """Return the number of load steps."""
         return int(self.dataset.sizes["step"])
 
+    def __contains__(self, name: object) -> bool:
+        """Tell whether there is a quantity of this name."""
+        return name in self.dataset.variables
+
     def __iter__(self) -> Iterator[xarray.Dataset]:
         """Go through the load steps."""
         return (self.dataset.isel(step=place) for place in range(len(self)))

@@ -343,6 +343,7 @@ class Session:
         if self.case.window_fixed:
             grid = {key: value for key, value in grid.items() if key != "extent"}
             grid |= {"window": list(lattice.shape), "center": middle_of(lattice)}
+        tables.pop("accuracy", None)  # this lattice and no other
         deck = tomli_w.dumps({**tables, "grid": grid, "load": list(loads)})
         self._about = dataclasses.replace(self._about, deck=deck, planned_steps=count)
         if self._store is not None:

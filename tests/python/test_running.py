@@ -399,8 +399,3 @@ def test_the_gap_of_a_case_stays_when_it_is_changed() -> None:
     assert float(other.run().contact_radius_fit[0]) == pytest.approx(
         2.0 * float(case.run().contact_radius_fit[0]), rel=0.02
     )
-
-
-def test_arguments_of_a_case_that_are_missing_are_named() -> None:
-    with pytest.raises(DeckError, match=r"^loads: missing; expected normal_load or approach, or loads$"):
-        fretting(loads=None)

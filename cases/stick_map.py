@@ -70,7 +70,8 @@ print(table.pivot(index="friction", columns="beta", values="stick ratio").round(
 # %% [markdown]
 # Over mu/beta the three curves fall together. If shear did not move the pressure, the stick ratio would
 # depend on mu/beta alone (Goodman, Spence). It does move it, by up to some percent, but the stick ratio
-# hardly feels that. What is left of a scatter is the lattice: a slip ring narrower than a spacing is not seen.
+# hardly feels that. What is left of a scatter is the lattice: a slip ring narrower than a spacing is not
+# seen.
 
 # %%
 ratio = np.geomspace(0.15, 12, 80)

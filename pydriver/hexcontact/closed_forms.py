@@ -213,22 +213,32 @@ class ClosedForms:
         tuple of ndarray or None
             (twist, torque) from the first torque to the last step that has a closed solution.
         """
+        numbers = self.dataset["step"].values[::-1]
+        return next((loop for number in numbers if (loop := self.torsion(int(number))) is not None), None)
+
+    def torsion(self, number: int) -> tuple[Array, Array] | None:
+        """Return the same curve up to a load step; None if that step has no closed solution.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+        """
         if not self.apply or self._gap is None:
             return None
-        for number in self.dataset["step"].values[::-1]:
-            history = _History(self.dataset, int(number), self.static)
-            shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
-            if not history.normal_load > 0.0 or shear > _ASIDE * self.friction * history.normal_load:
-                continue
-            hertz = self._gap.contact(history.normal_load)
-            contact = LubkinTorsion(
-                self.friction, history.normal_load, hertz.semi_major, 2.0 / self.modulus * (1.0 + self.gamma)
-            )
-            loads = history.at_constant_pressure(history["torque"], contact.sliding_torque)
-            if loads is not None:
-                turned = _until_sliding(loads.tolist(), _BEFORE_SLIDING * contact.sliding_torque)
-                return _curve(turned, _lubkin(contact, max(map(abs, turned)))) if _circular(hertz) else None
-        return None
+        history = _History(self.dataset, number, self.static)
+        shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
+        if not history.normal_load > 0.0 or shear > _ASIDE * self.friction * history.normal_load:
+            return None
+        hertz = self._gap.contact(history.normal_load)
+        contact = LubkinTorsion(
+            self.friction, history.normal_load, hertz.semi_major, 2.0 / self.modulus * (1.0 + self.gamma)
+        )
+        loads = history.at_constant_pressure(history["torque"], contact.sliding_torque)
+        if loads is None or not _circular(hertz):
+            return None
+        turned = _until_sliding(loads.tolist(), _BEFORE_SLIDING * contact.sliding_torque)
+        return _curve(turned, _lubkin(contact, max(map(abs, turned))))
 
 
 def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | None:

@@ -49,7 +49,12 @@ def closed_solutions(result: Result, number: int) -> tuple[list[Exact], str]:
     load = float(so_far["normal_load"][-1])
     if not load > 0.0:
         return [], "nothing is pressed in this load step"
-    known = [*_normal(so_far, load), *_shear(so_far, number), *_torsion(so_far), *_dissimilar(so_far, load)]
+    known = [
+        *_normal(so_far, load),
+        *_shear(so_far, number),
+        *_torsion(so_far, number),
+        *_dissimilar(so_far, load),
+    ]
     if known:
         return known, ""
     if _pressure_is_frictionless(so_far):
@@ -170,12 +175,10 @@ def _shear(dataset: xarray.Dataset, number: int) -> list[Exact]:
     return [Exact(slip.name, values, fields, dict.fromkeys(fields, scale))]
 
 
-def _torsion(dataset: xarray.Dataset) -> list[Exact]:
-    """Return Lubkin's twist, if the torque up to this step has it."""
-    if "torque" not in dataset or _friction(dataset) == 0.0:
-        return []
-    loop = ClosedForms(dataset).torsion_loop()
-    torque = float(dataset["torque"][-1])
+def _torsion(dataset: xarray.Dataset, number: int) -> list[Exact]:
+    """Return Lubkin's twist, if the torque up to this step has it and the contact does not slide."""
+    loop = ClosedForms(dataset).torsion(number) if "torque" in dataset else None
+    torque = float(dataset["torque"][-1]) if "torque" in dataset else 0.0
     if loop is None or not torque or abs(loop[1][-1] - torque) > _STEADY * abs(torque):
         return []
     return [Exact("Lubkin", {"twist": float(loop[0][-1])})]

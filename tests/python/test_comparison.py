@@ -120,6 +120,12 @@ def test_torsion_has_lubkin() -> None:
     for step in (2, 3):
         assert abs(result.compare(step=step)["twist"].error) < 2e-3
     assert "twist" not in found(result, step=1)
+    both = sheared(loads=[{"normal_load": 100.0}, {"torque": 2e-3}, {"tangential_load_x": 9.0}])
+    assert "twist" in found(both, step=2)
+    assert "twist" not in found(both)
+    slides = sheared(loads=[{"normal_load": 100.0}, {"twist": 1.0}])
+    assert int((slides.zone[-1] == 1).sum()) <= 1  # the node in the center, which does not move
+    assert "twist" not in found(slides)
 
 
 def test_dissimilar_bodies_have_what_goodman_and_spence_know() -> None:

@@ -199,6 +199,7 @@ def test_a_session_waits_between_its_steps(tmp_path: Path) -> None:
     assert session.step is first
     second = next(session)
     assert len(open_result(path)) == 2
+    assert [step.pressure.size > 0 for step in session.steps] == [False, True]  # the others are on the disk
     assert second.normal_load == pytest.approx(100.0)
     assert not session.result().complete
     assert list(session.history.index) == [1, 2]
@@ -269,12 +270,14 @@ def test_a_step_that_fails_leaves_the_session_where_it_was() -> None:
     assert session.step is before
     # by approach the sliding load is not known beforehand: the third of four increments slides
     session.advance(approach=before.approach)
-    with pytest.raises(ConvergenceError, match="gross sliding"):
+    with pytest.raises(ConvergenceError, match=r"step 5 of 6: gross sliding"):
         session.advance(tangential_load_x=28.0, steps=4)
+    assert len(Case.from_text(session.result().deck).load_steps) == 4
     assert session.step.tangential_load_x == pytest.approx(14.0)
     assert session.step.number == 4
     last = session.advance(tangential_load_x=15.0)
     assert last.number == 5
+    assert len(Case.from_text(session.result().deck).load_steps) == 5
     # ... as if the step that failed had not been tried
     other = fretting().start()
     other.advance(normal_load=100.0)
@@ -310,6 +313,18 @@ def test_steps_of_the_case_may_be_taken_back(whole: Result) -> None:
     session.back(2)
     assert [step.number for step in session] == [2, 3, 4, 5]
     assert_same(session.result(), whole)
+
+
+def test_a_deck_has_the_loads_of_the_case_as_far_as_they_were_solved() -> None:
+    session = fretting().start()
+    for step in session:
+        if step.number == 3:
+            break
+    session.advance(tangential_load_x=-2.0, steps=2, label="back")
+    steps = Case.from_text(session.result().deck).load_steps
+    assert [step.label for step in steps] == ["press", "press", "shear", "back", "back"]
+    assert [step.z.value for step in steps] == [50.0, 100.0, 100.0, 100.0, 100.0]
+    assert [step.x.value for step in steps] == pytest.approx([0.0, 0.0, 4.0, 1.0, -2.0])
 
 
 def test_a_file_cannot_go_back_and_a_closed_session_does_nothing(tmp_path: Path) -> None:

@@ -400,7 +400,31 @@ class Case:
         on_step: Callable[[Step], object] | None = None,
         progress: Reporter | bool | None = None,
     ) -> Result:
-        """Solve the case; see `hexcontact.solve.run`."""
+        """Solve the case.
+
+        Parameters
+        ----------
+        output : path, optional
+            netCDF file to write; each step is on the disk before the next begins. Without it the result is in
+            memory only, whatever the deck says.
+        overwrite : bool
+            Replace an output that is there already.
+        on_step : callable, optional
+            Called with each finished `Step`. If it returns something true, or raises `hexcontact.StopRun`, the
+            run ends there.
+        progress : Reporter or bool, optional
+            True: a bar on a terminal, lines otherwise.
+
+        Returns
+        -------
+        Result
+            All load steps, or those up to where `on_step` ended the run.
+
+        Raises
+        ------
+        DeckError, ConvergenceError, ResourceError
+            As `hexcontact.solve.run`, which does it.
+        """
         from . import solve
 
         return solve.run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)

@@ -55,9 +55,12 @@ class Lock:
         if held or holder.get("host", socket.gethostname()) != socket.gethostname():
             os.close(self._descriptor)
             since = f" since {holder['since']}" if "since" in holder else ""
+            advice = f"if that run is over, delete {path}"
+            if holder.get("process") == os.getpid() and held:
+                advice = "it belongs to this program, which may close the session or wait for the run"
             raise DeckError(
                 f"{output} is being written by another run, process {holder.get('process', '?')} "
-                f"on {holder.get('host', '?')}{since}; if that run is over, delete {path}"
+                f"on {holder.get('host', '?')}{since}; {advice}"
             )
         text = {
             "process": os.getpid(),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import tomllib
+import weakref
 from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -99,6 +100,8 @@ class Session:
             from .store import Store
 
             self._store = Store(output, self._about, overwrite)
+            # a session that nobody has any more, as when the cell of a notebook is run again, holds no file
+            weakref.finalize(self, self._store.close, "the session was dropped")
 
     # --- what is known --------------------------------------------------------------------------------------
 

@@ -1,14 +1,18 @@
 """The programs of the documentation and of cases/ run, and print what the pages say."""
 
 import contextlib
+import doctest
 import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import matplotlib
 import pytest
 from PIL import Image
+
+from hexcontact import case, session
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```python\n(.*?)^```\n(?:```\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL)
@@ -38,6 +42,13 @@ def test_programs_of_a_page_print_what_it_says(
     assert sum(bool(output) for _, output, _ in found) >= 8
     for program, output, line in found:
         assert printed("\n" * (line - 1) + program, page, names) == output, f"{page}, line {line}"
+
+
+@pytest.mark.parametrize("module", [case, session])
+def test_examples_in_the_sources_are_right(module: ModuleType) -> None:
+    found = doctest.testmod(module)
+    assert found.attempted > 0
+    assert found.failed == 0
 
 
 COARSE = {  # what is changed so that they take a second, and the pictures that they write

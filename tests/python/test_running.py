@@ -1,5 +1,6 @@
 """Runs that a script has a say in: callbacks, ends before the end, loads chosen between the steps."""
 
+import gc
 import math
 import pickle
 from collections.abc import Callable
@@ -349,6 +350,19 @@ def test_an_exception_in_a_session_keeps_what_is_finished(tmp_path: Path) -> Non
     result = hexcontact.resume(path)  # there is nothing left to be solved
     assert result.complete
     assert result.tangential_load_x.values == pytest.approx([0.0, 2.0, 4.0], abs=1e-9)
+
+
+def test_a_session_holds_its_file_as_long_as_somebody_has_it(tmp_path: Path) -> None:
+    path = tmp_path / "out.nc"
+    session = fretting().start(path)
+    next(session)
+    with pytest.raises(DeckError, match="is being written by another run, .* may close the session"):
+        fretting().start(path, overwrite=True)
+    del session
+    gc.collect()
+    assert open_result(path).stopped == "the session was dropped"
+    with fretting().start(path, overwrite=True) as again:
+        assert next(again).number == 1
 
 
 def test_a_window_that_grew_by_hand_goes_on(tmp_path: Path) -> None:

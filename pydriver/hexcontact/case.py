@@ -410,8 +410,8 @@ class Case:
         overwrite : bool
             Replace an output that is there already.
         on_step : callable, optional
-            Called with each finished `Step`. If it returns something true, or raises `hexcontact.StopRun`, the
-            run ends there.
+            Called with each finished `Step`. If it returns something true, or raises `hexcontact.StopRun`,
+            the run ends there.
         progress : Reporter or bool, optional
             True: a bar on a terminal, lines otherwise.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +88,13 @@ class Comparison(Sequence[Entry]):
     def __init__(self, entries: Sequence[Entry], step: int, note: str = "") -> None:
         self.entries, self.step, self.note = list(entries), step, note
 
-    def __getitem__(self, place: Any) -> Any:
+    @overload
+    def __getitem__(self, place: int | str) -> Entry: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> list[Entry]: ...
+
+    def __getitem__(self, place: int | str | slice) -> Entry | list[Entry]:
         """Return a line by its position, or the first one about a quantity."""
         if isinstance(place, str):
             for entry in self.entries:

@@ -47,7 +47,7 @@ class Surface(Table):
     """
 
     shape: str = ""
-    offset: Point = Field((0.0, 0.0), description="moves the shape in x and y")
+    offset: Point = Field(default=(0.0, 0.0), description="moves the shape in x and y")
 
     formula: ClassVar[str] = ""
     """Height about the shape's own center, for the documentation."""
@@ -111,7 +111,7 @@ class Sphere(Surface):
 
     shape: Literal["sphere"] = "sphere"
     radius: PositiveLength = Field(description="radius R")
-    exact: Annotated[bool, Flag()] = Field(False, description="take the true arc, not the parabola")
+    exact: Annotated[bool, Flag()] = Field(default=False, description="take the true arc, not the parabola")
     formula: ClassVar[str] = "h = r²/(2R); exact: h = R − √(R² − r²) for r ≤ R"
 
     @property
@@ -141,7 +141,7 @@ class Paraboloid(Surface):
         description="radius of curvature R₁ along the first axis (x if angle is 0)"
     )
     radius_y: PositiveLength = Field(description="radius of curvature R₂ across it")
-    angle: Angle = Field(0.0, description="angle of the first axis, from x towards y")
+    angle: Angle = Field(default=0.0, description="angle of the first axis, from x towards y")
     formula: ClassVar[str] = "h = s²/(2R₁) + t²/(2R₂), s along and t across the first axis"
 
     @property
@@ -160,7 +160,7 @@ class Cylinder(Surface):
 
     shape: Literal["cylinder"] = "cylinder"
     radius: PositiveLength = Field(description="radius R")
-    angle: Angle = Field(0.0, description="angle of its axis, from x towards y")
+    angle: Angle = Field(default=0.0, description="angle of its axis, from x towards y")
     formula: ClassVar[str] = "h = t²/(2R), t the distance from the axis"
 
     @property

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 import os
 import platform
 import time
@@ -12,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import ConvergenceError, HexcontactError, StopRun
-from .load_history import MOTIONS, LoadStep
 from .load_series import LOADS
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
@@ -20,6 +17,7 @@ from .window import kind_of
 
 if TYPE_CHECKING:
     from .case import Case
+    from .load_history import LoadStep
     from .store import Store
 
 
@@ -221,7 +219,6 @@ def steps(
         if step.history["segment"] != segment + 1:
             segment, begun = int(step.history["segment"]) - 1, reached_by_now
         reached_by_now = _standing(step.history)
-    planned = len(case.load_steps)
     for target in case.load_steps[len(before) :] if targets is None else targets:
         started = time.perf_counter()
         if target.segment != segment:
@@ -233,19 +230,9 @@ def steps(
             state = window.carried(state, smaller)
         if not reached.converged:
             raise ConvergenceError(window.complaint(reached, target, values))
-        step = dataclasses.replace(
-            window.step(target, reached, state, started),
-            prescribed=_prescribed(target, values, case.frictional),
-            load_fraction=(target.index + 1) / planned if targets is None else math.nan,
-        )
+        step = window.step(target, reached, state, started)
         yield step
         state, reached_by_now = reached, _standing(step.history)
-
-
-def _prescribed(target: LoadStep, values: Sequence[float], frictional: bool) -> dict[str, float]:
-    """Return what drives a load step by the keys of the deck; `values` are those of z, x, y and the twist."""
-    driven = zip(MOTIONS if frictional else MOTIONS[:1], target.targets, values, strict=False)
-    return {LOADS[motion][drive.control == "displacement"]: value for motion, drive, value in driven}
 
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:

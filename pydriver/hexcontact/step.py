@@ -43,8 +43,7 @@ class Step:
     prescribed : mapping of str to float
         The loads (N, N m) and motions (m, rad) that drove the step; empty for a step read from a file.
     load_fraction : float
-        How much of the load history is done after the step, from 0 to 1; NaN for a step read from a file, or
-        driven by hand.
+        How much of the load history is done after the step, from 0 to 1; NaN for a step read from a file.
     """
 
     index: int

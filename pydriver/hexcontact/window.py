@@ -19,6 +19,8 @@ from .edges import ContactEdges
 from .errors import DeckError
 from .estimators import area_radius, pressure_center
 from .grid import rim_sides
+from .load_history import MOTIONS
+from .load_series import LOADS
 from .messages import listed
 from .result import Step
 from .variables import FIELDS
@@ -225,7 +227,24 @@ class Window(ABC, Generic[S]):
             "label": target.label,
             "seconds": time.perf_counter() - started,
         }
-        return Step(target.index, self.lattice, fields, history)
+        return Step(
+            target.index,
+            self.lattice,
+            fields,
+            history,
+            prescribed=self._prescribed(target, history),
+            load_fraction=(target.index + 1) / len(self.case.load_steps),
+        )
+
+    def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
+        """Return what drives a load step, by the keys of the deck."""
+        driven = {}
+        for motion, drive in zip(MOTIONS, target.targets, strict=True):
+            if motion == "z" or self.case.frictional:
+                name = LOADS[motion][drive.control == "displacement"]
+                # a ramp that takes over from the other control begins where that one ended
+                driven[name] = float(history[name]) if drive.from_start else drive.value
+        return driven
 
     def closing(self, solution: S) -> Array:
         """Return u_1z + u_2z (m), by which the deformation opens the gap; NaN where nothing can touch."""

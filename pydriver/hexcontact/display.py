@@ -75,7 +75,8 @@ def result_header(result: Result) -> str:
     sizes, attributes = result.dataset.sizes, result.dataset.attrs
     steps = f"{len(result)} load step{'s' * (len(result) != 1)}"
     if not result.complete:
-        steps += f" of {attributes['planned_steps']}, unfinished" if attributes.get("planned_steps") else ""
+        planned = attributes.get("planned_steps")
+        steps += f" of {planned}, unfinished" if planned else ", unfinished"
     named = [f"Result of {result.case_title!r}" if result.case_title else "Result", result.path]
     about = f"{steps}, {sizes['row']} x {sizes['col']} nodes"
     spacing = quantity(float(attributes.get("lattice_spacing", np.nan)), "m")

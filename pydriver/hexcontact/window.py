@@ -243,7 +243,7 @@ class Window(ABC, Generic[S]):
             if motion == "z" or self.case.frictional:
                 name = LOADS[motion][drive.control == "displacement"]
                 # a ramp that takes over from the other control begins where that one ended
-                driven[name] = float(history[name]) if drive.from_start else drive.value
+                driven[name] = float(history[name] if drive.from_start else drive.value)
         return driven
 
     def closing(self, solution: S) -> Array:

@@ -76,7 +76,7 @@ def result_header(result: Result) -> str:
     steps = f"{len(result)} load step{'s' * (len(result) != 1)}"
     if not result.complete:
         planned = attributes.get("planned_steps")
-        steps += f" of {planned}, unfinished" if planned else ", unfinished"
+        steps += f"{f' of {planned}' if planned else ''} (unfinished run)"
     named = [f"Result of {result.case_title!r}" if result.case_title else "Result", result.path]
     about = f"{steps}, {sizes['row']} x {sizes['col']} nodes"
     spacing = quantity(float(attributes.get("lattice_spacing", np.nan)), "m")

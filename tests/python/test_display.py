@@ -137,7 +137,7 @@ def test_a_result_without_pictures_is_shown_too(arguments: dict[str, Any], pictu
 
 def test_a_run_that_was_ended_says_so() -> None:
     result = sheared().run(on_step=lambda step: "enough")
-    assert "1 load step of 2, unfinished" in repr(result)
+    assert "1 load step of 2 (unfinished run)" in repr(result)
     assert "stopped by on_step after step 1: enough" in Page(result._repr_html_()).text
 
 

@@ -1,0 +1,108 @@
+"""Run docs/tutorial.md as it stands: decks, commands and programs, in one folder.
+
+``python docs/site/tutorial.py`` says where the page differs from what happens; ``--write`` puts outputs and pictures
+into it. Times, residuals and numbers of iterations may differ.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import runpy
+import shlex
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from hexcontact.cli import app
+
+PAGE = Path(__file__).parents[1] / "tutorial.md"
+WIDTH = "96"
+# Files begin with a comment that names them; other blocks of these languages are there to be read.
+NAME = re.compile(r"# (\w+\.(?:toml|py))\n")
+BLOCK = re.compile(r"^```(console|toml|python)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+PICTURE = re.compile(r"!\[[^\]]*\]\((images/tutorial/(\w+\.png))\)")
+# What differs between machines and runs.
+VOLATILE = re.compile(r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work ).*|-+|─+|\s+")
+
+
+@dataclass
+class Difference:
+    """A block of the page, and what it should be."""
+
+    shown: str
+    found: str
+
+
+def steady(text: str) -> str:
+    """What two runs have in common."""
+    return VOLATILE.sub(" ", text).strip()
+
+
+def output_of(line: str) -> str:
+    """Run a command of the page and return what it prints."""
+    words = shlex.split(line)
+    if words[0] == "python":
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            runpy.run_path(words[1], run_name="__main__")
+        return printed.getvalue()
+    assert words[0] == "hexcontact", line
+    done = CliRunner().invoke(app, words[1:], env={"COLUMNS": WIDTH})
+    assert done.exit_code == 0, f"{line}\n{done.output}"
+    return done.stdout.replace(f"{Path.cwd()}/", "")
+
+
+def played(block: str) -> str:
+    """Return the block with what its commands print."""
+    text = ""
+    for line in block.splitlines():
+        if line.startswith("$ "):
+            printed = [row.rstrip() for row in output_of(line[2:]).splitlines()]
+            text += "\n".join([line, *printed]).rstrip() + "\n"
+    return text
+
+
+def differences(page: str, folder: Path) -> Iterator[Difference]:
+    """Play the page in a folder."""
+    with contextlib.chdir(folder):
+        for language, block in BLOCK.findall(page):
+            if name := NAME.match(block):
+                Path(name[1]).write_text(block, encoding="utf-8")
+            elif language == "console" and steady(found := played(block)) != steady(block):
+                yield Difference(block, found)
+
+
+def main() -> int:
+    os.environ.setdefault("MPLBACKEND", "agg")
+    page = PAGE.read_text(encoding="utf-8")
+    write = sys.argv[1:] == ["--write"]
+    with tempfile.TemporaryDirectory() as folder:
+        found = list(differences(page, Path(folder)))
+        for difference in found:
+            print(f"--- page\n{difference.shown}--- now\n{difference.found}")
+            page = page.replace(f"```console\n{difference.shown}", f"```console\n{difference.found}")
+        if write:
+            PAGE.write_text(page, encoding="utf-8")
+            for target, name in PICTURE.findall(page):
+                keep_picture(Path(folder) / name, PAGE.parent / target)
+    return 0 if write else bool(found)
+
+
+def keep_picture(source: Path, target: Path) -> None:
+    """Keep a picture with as many colors as it needs."""
+    from PIL import Image
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    Image.open(source).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(target, optimize=True)
+    print(f"written: {target}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -22,8 +22,6 @@ extensions = [
     "generated",
 ]
 exclude_patterns = ["ford.md", "site/**"]
-# Patterns of the table of contents for pages that may come.
-suppress_warnings = ["toc.empty_glob"]
 
 # Forges show the same pages: Markdown, $math$, and links between files and to headings.
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
@@ -49,11 +47,17 @@ copybutton_prompt_is_regexp = True
 copybutton_only_copy_prompt_lines = True
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
+# The docstrings say the types, in words.
+autodoc_typehints = "none"
 autodoc_preserve_defaults = True
-python_maximum_signature_line_length = 80
+python_maximum_signature_line_length = 90
 napoleon_google_docstring = False
+napoleon_use_param = False
 napoleon_use_rtype = False
+napoleon_use_ivar = True
+default_role = "py:obj"
 toc_object_entries_show_parents = "hide"
+# -- in options is no dash.
+smartquotes = False
 
 linkcheck_ignore = [r"tcp://.*"]

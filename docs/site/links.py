@@ -8,9 +8,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+# Addresses that a style sheet loads.
+OUTSIDE = re.compile(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^\"')]+)")
 # What a page loads, in contrast to what a reader may go to.
 LOADING = {"link", "script", "img", "iframe", "source", "video", "audio", "embed", "object"}
-ADDRESSES = {"href", "src", "data", "srcset"}
+ADDRESSES = {"href", "src", "data"}
 
 
 class Page(HTMLParser):
@@ -45,7 +47,7 @@ def faults(site: Path) -> list[str]:
         for tag, address in page_of(path).links:
             found += [f"{name}: {fault}" for fault in faults_of(path, tag, address)]
     for path in sorted(site.rglob("*.css")):
-        outside = re.findall(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^\"')]+)", path.read_text(encoding="utf-8"))
+        outside = OUTSIDE.findall(path.read_text(encoding="utf-8"))
         found += [f"{path.relative_to(site)}: loads {address}" for address in outside]
     return found
 
@@ -61,7 +63,6 @@ def faults_of(path: Path, tag: str, address: str) -> list[str]:
         target /= "index.html"
     if not target.exists():
         return [f"{address} is not there"]
-    # FORD numbers anchors in scripts only for pages without sources; all others are in the text.
     if parts.fragment and target.suffix == ".html" and unquote(parts.fragment) not in page_of(target).anchors:
         return [f"{address}: no such place in the page"]
     return []

@@ -173,7 +173,7 @@ def no_slip_constants(beta: float) -> tuple[float, float]:
     Parameters
     ----------
     beta : float
-        Dundurs' constant, |beta| <= 1/2.
+        Dundurs' constant, ``|beta| <= 1/2``.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def no_slip_constants(beta: float) -> tuple[float, float]:
 def goodman_stick_ratio(beta: float, friction_coefficient: float) -> float:
     """Stick ratio c/a of monotone indentation where shear does not move the pressure (Goodman, Spence).
 
-    Solves (a/2c) ln[(a+c)/(a-c)] = (mu/|beta|) K'(c/a) with K'(k) = K(sqrt(1-k^2)).
+    Solves ``(a/2c) ln[(a+c)/(a-c)] = (mu/|beta|) K'(c/a)`` with ``K'(k) = K(sqrt(1-k^2))``.
 
     Parameters
     ----------
@@ -265,9 +265,9 @@ class PlaneCattaneo:
 def goodman_stick_ratio_plane(beta: float, friction_coefficient: float) -> float:
     """Stick ratio c/b of cylinders pressed monotonically where shear does not move the pressure.
 
-    Solves |beta| K(k) = mu K'(k), k = c/b (Spence). It follows from a flat punch, p = P'/(pi sqrt(b^2-x^2)),
-    of which all self-similar contacts are made: a bounded traction in the stick strip needs
-    integral_-c^c [|beta| p(x) - (mu/pi) integral_{c<|t|<b} sgn(t) p(t)/(t-x) dt]/sqrt(c^2-x^2) dx = 0.
+    Solves ``|beta| K(k) = mu K'(k)``, k = c/b (Spence). It follows from a flat punch,
+    ``p = P'/(pi sqrt(b^2-x^2))``, of which all self-similar contacts are made: a bounded traction in the stick strip needs
+    ``integral_-c^c [|beta| p(x) - (mu/pi) integral_{c<|t|<b} sgn(t) p(t)/(t-x) dt]/sqrt(c^2-x^2) dx = 0``.
 
     Parameters
     ----------

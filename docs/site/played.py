@@ -1,7 +1,7 @@
-"""Run docs/tutorial.md as it stands: decks, commands and programs, in one folder.
+"""Run pages as they stand: their decks, commands and programs, those of a page in one folder.
 
-``python docs/site/tutorial.py`` says where the page differs from what happens; ``--write`` puts outputs and pictures
-into it. Times, residuals and numbers of iterations may differ.
+``python docs/site/played.py`` says where pages differ from what happens; ``--write`` puts outputs and
+pictures into them. Times, residuals and numbers of iterations may differ.
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from typer.testing import CliRunner
 
 from hexcontact.cli import app
 
-PAGE = Path(__file__).parents[1] / "tutorial.md"
+DOCS = Path(__file__).parents[1]
+PAGES = ("tutorial", "lattice", "surfaces", "reading")
 WIDTH = "96"
 # Files begin with a comment that names them; other blocks of these languages are there to be read.
 NAME = re.compile(r"# (\w+\.(?:toml|py))\n")
 BLOCK = re.compile(r"^```(console|toml|python)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-PICTURE = re.compile(r"!\[[^\]]*\]\((images/tutorial/(\w+\.png))\)")
+PICTURE = re.compile(r"!\[[^\]]*\]\((images/\w+/(\w+\.png))\)")
 # What differs between machines and runs.
-VOLATILE = re.compile(r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work ).*|-+|─+|\s+")
+VOLATILE = re.compile(r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work ).*|(?<= started )\S+|─+|\s+")
 
 
 @dataclass
@@ -81,18 +82,21 @@ def differences(page: str, folder: Path) -> Iterator[Difference]:
 
 def main() -> int:
     os.environ.setdefault("MPLBACKEND", "agg")
-    page = PAGE.read_text(encoding="utf-8")
     write = sys.argv[1:] == ["--write"]
-    with tempfile.TemporaryDirectory() as folder:
-        found = list(differences(page, Path(folder)))
-        for difference in found:
-            print(f"--- page\n{difference.shown}--- now\n{difference.found}")
-            page = page.replace(f"```console\n{difference.shown}", f"```console\n{difference.found}")
-        if write:
-            PAGE.write_text(page, encoding="utf-8")
-            for target, name in PICTURE.findall(page):
-                keep_picture(Path(folder) / name, PAGE.parent / target)
-    return 0 if write else bool(found)
+    differ = False
+    for name in PAGES:
+        page = DOCS / f"{name}.md"
+        text = page.read_text(encoding="utf-8")
+        with tempfile.TemporaryDirectory() as folder:
+            for difference in differences(text, Path(folder)):
+                differ = True
+                print(f"--- {page.name}\n{difference.shown}--- now\n{difference.found}")
+                text = text.replace(f"```console\n{difference.shown}", f"```console\n{difference.found}")
+            if write:
+                page.write_text(text, encoding="utf-8")
+                for target, picture in PICTURE.findall(text):
+                    keep_picture(Path(folder) / picture, DOCS / target)
+    return 0 if write else differ
 
 
 def keep_picture(source: Path, target: Path) -> None:

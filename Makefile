@@ -35,7 +35,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo test test-fortran test-python debug-test verify bench lint format docs pictures editable clean distclean
+.PHONY: help install demo test test-fortran test-python debug-test verify bench lint format docs docs-links pictures editable clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -117,11 +117,15 @@ format: $(STAMPS)/system $(STAMPS)/extra-lint  ## let ruff mend what it can
 	ruff check --fix
 	ruff format
 
-docs: $(STAMPS)/system $(STAMPS)/extra-docs  ## reference of the Fortran library in build/docs
-	ford docs/ford.md
+docs: install $(STAMPS)/extra-docs  ## this documentation as pages in build/docs; warnings and dead links are errors
+	@$(py) docs/site/build.py
 
-pictures: install  ## draw the pictures of docs/images again
+docs-links: install $(STAMPS)/extra-docs  ## the same, and check the addresses of other sites (needs a network)
+	@$(py) docs/site/build.py --external
+
+pictures: install  ## draw the pictures of docs/images again, with the outputs shown in docs/tutorial.md and others
 	$(py) docs/images/make.py
+	$(py) docs/site/played.py --write
 
 editable: $(STAMPS)/build-tools $(STAMPS)/extra-test $(STAMPS)/extra-lint  ## developers: import from pydriver/, rebuilt when imported
 	@$(pip_build) -C build-dir=build/editable -C setup-args=-Dtests=true --editable .

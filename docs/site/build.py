@@ -51,6 +51,7 @@ def ford() -> int:
         text = ELSEWHERE.sub("", page.read_text(encoding="utf-8"))
         root = "../" * (len(page.relative_to(FORTRAN).parts) - 1)
         text = text.replace("  </head>", BOOTSTRAP.format(root=root) + "  </head>", 1)
+        text = re.sub(r'(navbar-brand" href=)[^<]*', rf'\1"{root}../index.html">hexcontact documentation', text)
         page.write_text(text, encoding="utf-8")
     return 0
 

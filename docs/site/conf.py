@@ -57,7 +57,6 @@ napoleon_use_rtype = False
 napoleon_use_ivar = True
 default_role = "py:obj"
 toc_object_entries_show_parents = "hide"
-# -- in options is no dash.
-smartquotes = False
+smartquotes_action = "D"
 
 linkcheck_ignore = [r"tcp://.*"]

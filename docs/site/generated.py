@@ -1,4 +1,4 @@
-"""Pages that are made from the program: the reference of its commands."""
+"""What Sphinx takes from the program itself: the commands, and docstrings as napoleon can read them."""
 
 from __future__ import annotations
 
@@ -9,15 +9,13 @@ from typing import Any
 
 import typer.cli
 import typer.main
-from docutils import nodes
 from sphinx.application import Sphinx
-from sphinx.util.docutils import SphinxDirective
 
 from hexcontact.cli import app as hexcontact
 
 
 def commands() -> str:
-    """Return what --help says of every command, as Markdown with a heading of level 2 for each."""
+    """Return what --help says, as Markdown with a heading of level 2 for each command."""
     group = typer.main.get_command(hexcontact)
     context = group.make_context("hexcontact", [], resilient_parsing=True)
     text = typer.cli.get_docs_for_click(obj=group, ctx=context, name="hexcontact")
@@ -26,30 +24,41 @@ def commands() -> str:
         f"| [`{name}`](#hexcontact-{name}) | {inspect.cleandoc(command.help).partition(chr(10))[0]} |"
         for name, command in group.commands.items()
     ]
-    table = "\n".join(["| | |", "|---|---|", *rows])
+    text = text.replace("\b", "")  # typer's mark of lines that are not wrapped
+    table = "\n".join(["| command | |", "|---|---|", *rows])
     text = re.sub(r"\*\*Commands\*\*:\n\n(\* .*\n)+", lambda _: f"{table}\n", text)
-    text = re.sub(r"^Example: (.*)$", r"Example:\n\n```sh\n\1\n```", text, flags=re.MULTILINE)
+    text = re.sub(r"^Example: (.*)$", r"Example: `\1`", text, flags=re.MULTILINE)
+    # Lists of words and what they mean stay in columns, as on the terminal.
+    text = re.sub(r"(^[\w-]+ {2,}\S.*\n){2,}", r"\n```text\n\g<0>```\n", text, flags=re.MULTILINE)
+    # Smart quotes would make dashes of options.
+    text = re.sub(r"(?<![`\w-])(--[a-z][\w-]*)(?![^`\n]*`)", r"`\1`", text)
     return text.removeprefix("# `hexcontact`\n")
 
 
-class Commands(SphinxDirective):
-    """The reference of all commands, in place of the directive."""
+def with_joined_names(
+    app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]
+) -> None:
+    """Join attributes that share a line of a docstring, of which Sphinx would take the first for a type."""
+    first = lines.index("Attributes") if "Attributes" in lines else len(lines)
+    for place, line in enumerate(lines[first:], first):
+        if names := re.match(r"(\w+(?:, \w+)+) : ", line):
+            lines[place] = names[1].replace(", ", ",\u200b") + line[names.end(1) :]
 
-    def run(self) -> list[nodes.Node]:
-        return self.parse_text_to_nodes(commands(), allow_section_headings=True)
 
-
-def without_idle_patterns(app: Sphinx, page: str, source: list[str]) -> None:
-    """Drop those patterns of the table of contents that no page matches yet, which Sphinx complains about."""
+def completed(app: Sphinx, page: str, source: list[str]) -> None:
+    """Put the commands into their page, show what only the site has, drop patterns without a page."""
 
     def kept(line: re.Match[str]) -> str:
         return line[0] if any(Path(app.srcdir).glob(f"{line[1]}.md")) else ""
 
+    source[0] = source[0].replace("<!-- commands -->\n", commands() if page == "commands" else "")
+    source[0] = re.sub(r"<!-- site: (.*?) -->", r"\1", source[0], flags=re.DOTALL)
     if page == app.config.root_doc:
         source[0] = re.sub(r"^(\w+\*)\n", kept, source[0], flags=re.MULTILINE)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    app.add_directive("commands", Commands)
-    app.connect("source-read", without_idle_patterns)
+    app.connect("source-read", completed)
+    # Before napoleon reads them.
+    app.connect("autodoc-process-docstring", with_joined_names, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

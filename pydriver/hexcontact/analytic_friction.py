@@ -266,7 +266,8 @@ def goodman_stick_ratio_plane(beta: float, friction_coefficient: float) -> float
     """Stick ratio c/b of cylinders pressed monotonically where shear does not move the pressure.
 
     Solves ``|beta| K(k) = mu K'(k)``, k = c/b (Spence). It follows from a flat punch,
-    ``p = P'/(pi sqrt(b^2-x^2))``, of which all self-similar contacts are made: a bounded traction in the stick strip needs
+    ``p = P'/(pi sqrt(b^2-x^2))``, of which all self-similar contacts are made: a bounded traction in the
+    stick strip needs
     ``integral_-c^c [|beta| p(x) - (mu/pi) integral_{c<|t|<b} sgn(t) p(t)/(t-x) dt]/sqrt(c^2-x^2) dx = 0``.
 
     Parameters

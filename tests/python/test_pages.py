@@ -1,0 +1,91 @@
+"""The documentation: pages with programs do what they show, and none is left out of the contents."""
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import hexcontact
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS / "site"))
+
+import links  # noqa: E402
+import played  # noqa: E402
+
+CHANGED = "\n(if that is right: python docs/site/played.py --write)"
+
+
+@pytest.mark.parametrize("name", played.PAGES)
+def test_page_prints_and_draws_what_it_shows(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    page = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    for difference in played.differences(page, tmp_path):
+        assert played.steady(difference.found) == played.steady(difference.shown), CHANGED
+    pictures = played.PICTURE.findall(page)
+    assert [target for target, picture in pictures if not (tmp_path / picture).exists()] == []
+    assert [target for target, _ in pictures if not (DOCS / target).exists()] == []
+
+
+def test_steady_text_leaves_numbers_and_signs_alone() -> None:
+    one = " step 3  -1.330 µm  28.3 %  1.9e-09  41.4 ms\n work   8 iterations, 36.0 ms"
+    assert played.steady(one) == played.steady(one.replace("1.9e-09  41.4 ms", "7.2e-10  1.2 s"))
+    assert played.steady(one) == played.steady(one.replace("8 iterations, 36.0", "9 iterations, 8.1"))
+    assert played.steady(one) != played.steady(one.replace("-1.330", "1.330"))
+    assert played.steady(one) != played.steady(one.replace("28.3", "28.4"))
+
+
+def test_commands_of_pages_may_not_fail(tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match="nothing.toml"):
+        list(played.differences("```console\n$ hexcontact run nothing.toml\n```\n", tmp_path))
+
+
+def test_excerpt_of_the_tutorial_is_the_starter_deck(tmp_path: Path) -> None:
+    page = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    excerpts = [text for language, text in played.BLOCK.findall(page) if language == "toml"]
+    [excerpt] = [text for text in excerpts if not played.NAME.match(text)]
+    list(played.differences(f"```console\n$ hexcontact new fretting -o {tmp_path}/new.toml\n```\n", tmp_path))
+    deck = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
+    assert {key: deck[key] for key in ("friction", "load")} == tomllib.loads(excerpt)
+
+
+def test_every_page_is_in_the_contents() -> None:
+    entries = re.findall(
+        r"^(?:.*<)?([\w*]+)>?$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    pages = {page.stem for page in DOCS.glob("*.md")} - {"index", "ford"}
+    assert {page for page in pages if not any(Path(page).match(entry) for entry in entries)} == set()
+
+
+def test_every_public_name_is_in_the_python_reference() -> None:
+    page = (DOCS / "api.md").read_text(encoding="utf-8")
+    documented = set(re.findall(r"^\.\. auto\w+:: hexcontact\.([\w.]+)$", page, re.MULTILINE))
+    errors = {name for name in hexcontact.__all__ if name.endswith("Error")}
+    assert "errors" in documented
+    assert set(hexcontact.__all__) - errors - documented == set()
+
+
+def test_faults_of_finished_pages_are_found(tmp_path: Path) -> None:
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more/there.html").write_text('<h2 id="place">There</h2><a href="../index.html#top">up</a>')
+    (tmp_path / "index.html").write_text(
+        """
+        <script src="https://cdn.example/a.js"></script> <img src="missing.png"> <a href="https://example">out</a>
+        <a href="more/there.html#place">good</a> <a href="more/there.html#nowhere">bad</a>
+        <a href="gone.html">bad</a>
+        <a href="mailto:someone@example">good</a> <a href="#own" id="own">good</a> <img src="data:,">
+        """
+    )
+    (tmp_path / "style.css").write_text("@import url(//fonts.example/x.css); a { background: url(near.png) }")
+    assert links.faults(tmp_path) == [
+        "index.html: <script> loads https://cdn.example/a.js",
+        "index.html: missing.png is not there",
+        "index.html: more/there.html#nowhere: no such place in the page",
+        "index.html: gone.html is not there",
+        "style.css: loads //fonts.example/x.css",
+    ]

@@ -24,7 +24,7 @@ extensions = [
 exclude_patterns = ["ford.md", "site/**"]
 
 # Forges show the same pages: Markdown, $math$, and links between files and to headings.
-myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
+myst_enable_extensions = ["amsmath", "dollarmath"]
 myst_heading_anchors = 4
 myst_links_external_new_tab = False
 

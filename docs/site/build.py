@@ -60,8 +60,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--external", action="store_true", help="check the addresses of other sites, too")
     external = parser.parse_args().external
-    # What is no longer made must not satisfy a link.
-    shutil.rmtree(SITE, ignore_errors=True)
+    # Nothing is left over: a page that is gone must not satisfy a link, and one that was read must warn again.
+    for folder in (SITE, DOCTREES):
+        shutil.rmtree(folder, ignore_errors=True)
     code = sphinx("html", SITE) | ford()
     found = faults(SITE)
     for fault in found:

@@ -60,3 +60,5 @@ toc_object_entries_show_parents = "hide"
 smartquotes_action = "D"
 
 linkcheck_ignore = [r"tcp://.*"]
+linkcheck_timeout = 20
+linkcheck_retries = 2

@@ -30,7 +30,11 @@ NAME = re.compile(r"# (\w+\.(?:toml|py))\n")
 BLOCK = re.compile(r"^```(console|toml|python)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 PICTURE = re.compile(r"!\[[^\]]*\]\((images/\w+/(\w+\.png))\)")
 # What differs between machines and runs.
-VOLATILE = re.compile(r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work)\s.*|(?<= started )\S+|─+|\s+")
+VOLATILE = re.compile(
+    r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work)\s.*|(?<= memory)\s.*|(?<= started )\S+|─+|\s+"
+)
+    r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work)\s.*|(?<= memory)\s.*|(?<= started )\S+|─+|\s+"
+)
 
 
 @dataclass

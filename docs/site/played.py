@@ -33,8 +33,6 @@ PICTURE = re.compile(r"!\[[^\]]*\]\((images/\w+/(\w+\.png))\)")
 VOLATILE = re.compile(
     r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work)\s.*|(?<= memory)\s.*|(?<= started )\S+|─+|\s+"
 )
-    r"\b\d\.\de[+-]\d+|\b[\d.]+ (?:ms|µs|s)\b|(?<= work)\s.*|(?<= memory)\s.*|(?<= started )\S+|─+|\s+"
-)
 
 
 @dataclass

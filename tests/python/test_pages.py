@@ -65,7 +65,7 @@ def test_every_page_is_in_the_contents() -> None:
 def test_every_public_name_is_in_the_python_reference() -> None:
     page = (DOCS / "api.md").read_text(encoding="utf-8")
     documented = set(re.findall(r"^\.\. auto\w+:: hexcontact\.([\w.]+)$", page, re.MULTILINE))
-    errors = {name for name in hexcontact.__all__ if name.endswith("Error")}
+    errors = {name for name in hexcontact.__all__ if hasattr(hexcontact.errors, name)}
     assert "errors" in documented
     assert set(hexcontact.__all__) - errors - documented == set()
 

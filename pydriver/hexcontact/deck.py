@@ -19,7 +19,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from .errors import DeckError
 from .load_series import LOADS, QUANTITIES, Series
-from .messages import Problem, Source, deck_error
+from .messages import Problem
 from .surfaces import Flat, Point, Surface, SurfaceKind
 from .units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE
 from .validation import Flag, Quantity, Several, Table, Text, Whole, Word, WordOr, problems_of, refuse
@@ -292,20 +292,6 @@ class Deck(Table):
     solver: Solver = Field(default_factory=Solver)
     load: list[Load] = Field(min_length=1)
     output: Output = Field(default_factory=Output)
-
-    @classmethod
-    def parse(cls, data: Mapping[str, Any], source: Source) -> Deck:
-        """Check a deck that was read into dictionaries.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each thing that is wrong.
-        """
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise deck_error(problems_of(error), source) from None
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:

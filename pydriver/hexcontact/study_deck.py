@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from .messages import Source, deck_error
-from .validation import Kind, Several, Table, Text, Whole, Word, problems_of, refuse
+from .validation import Kind, Several, Table, Text, Whole, Word, refuse
 
 MOST_CASES = 100_000
 
@@ -154,20 +153,6 @@ class StudyFile(Table):
                     "parameter",
                     f"zip needs as many values of each; they have {', '.join(map(str, lengths))}",
                 )
-
-    @classmethod
-    def parse(cls, data: Mapping[str, Any], source: Source) -> StudyFile:
-        """Check a study file that was read into dictionaries.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each thing that is wrong.
-        """
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise deck_error(problems_of(error), source) from None
 
 
 def _length(values: object) -> int:

@@ -11,12 +11,12 @@ import math
 import operator
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
-from .messages import MISSING, Problem, did_you_mean, listed, shown
+from .messages import MISSING, Problem, Source, deck_error, did_you_mean, listed, shown
 from .units import NUMBER, Dimension, UnitError, to_si
 
 
@@ -238,6 +238,20 @@ class Table(BaseModel):
     def known_keys(cls) -> dict[str, Any]:
         """Return the fields of the table by the keys that decks use."""
         return {info.alias or name: info for name, info in cls.model_fields.items()}
+
+    @classmethod
+    def parse(cls, data: Mapping[str, Any], source: Source) -> Self:
+        """Check a file that was read into dictionaries.
+
+        Raises
+        ------
+        DeckError
+            With a sentence for each thing that is wrong.
+        """
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise deck_error(problems_of(error), source) from None
 
     @model_validator(mode="wrap")
     @classmethod

@@ -1,0 +1,80 @@
+"""Commands about decks: check, schema, new."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_guard import guarded
+from .cli_options import DeckFile, Settings
+from .errors import DeckError
+
+
+@guarded
+def check(deck: DeckFile, settings: Settings = None) -> None:
+    """Read a deck, report everything that is wrong with it, and say what would be run."""
+    from . import run_command, summary
+    from .window import require_memory
+
+    case = run_command.case_of(deck, settings)
+    console = summary.console()
+    console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
+    require_memory(case, case.lattice)
+    run_command.target_of(case, deck)
+    console.print(f"{deck} is ready to run", soft_wrap=True)
+
+
+@guarded
+def schema(
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; default: print it.")
+    ] = None,
+) -> None:
+    """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
+    from .schema import deck_schema
+
+    text = json.dumps(deck_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None or str(output) == "-":
+        print(text, end="")
+        return
+    output.write_text(text, encoding="utf-8")
+    print(f'written: {output}; first line of a deck that uses it: "#:schema {output}"')
+
+
+@guarded
+def new(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Which starter deck.", show_default=False)
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the starter decks.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; default: NAME.toml; - prints it."),
+    ] = None,
+) -> None:
+    """Write a commented deck to start from."""
+    from . import starters
+
+    names = starters.names()
+    if listing or name is None:
+        print("\n".join(names))
+        if not listing:
+            raise DeckError("NAME is missing; expected one of the names above")
+        return
+    if name not in names:
+        from .messages import did_you_mean, listed
+
+        raise DeckError(f"NAME = {name}: expected {listed(names, 'or')}{did_you_mean(name, names)}")
+    if str(output) == "-":
+        print(starters.text(name), end="")
+        return
+    target = output or Path(f"{name}.toml")
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(starters.text(name))
+    except FileExistsError:
+        raise DeckError(f"{target} exists already; choose another name with --output") from None
+    print(f"written: {target}; now: hexcontact run {target}")

@@ -1,0 +1,158 @@
+"""Commands that solve: run, resume, study, verify."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_guard import fail, guarded
+from .cli_options import DeckFile, Plot, Quiet, Settings, setting
+from .errors import DeckError
+from .interruption import Interrupted, in_background, news
+
+
+@guarded
+def run(
+    deck: DeckFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="File to write; default: the deck's output.file, or DECK.nc here."
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an output that is there.")] = False,
+    plot: Plot = False,
+    quiet: Quiet = False,
+    settings: Settings = None,
+) -> None:
+    """Solve a deck; each load step is safe on the disk before the next begins."""
+    from . import run_command as command
+    from .solve import metadata_of
+    from .store import Store
+
+    case = command.case_of(deck, settings)
+    target = command.target_of(case, deck, output)
+    with news() as heard, Store(target, metadata_of(case), overwrite) as store:
+        histories = command.solved(case, store, heard, deck.stem, quiet)
+    picture = command.overview(store.path) if plot else None
+    if not quiet:
+        command.summarize(case, histories, target, picture)
+
+
+@guarded
+def resume(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The output of the run.", show_default=False)],
+    plot: Plot = False,
+    quiet: Quiet = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Change how the further steps are solved, as solver.tolerance=1e-7. Repeatable.",
+        ),
+    ] = None,
+) -> None:
+    """Go on with a run that was interrupted or killed, met a full disk or did not converge.
+
+    The result is to the bit that of a run in one go, on the same machine with as many threads.
+    """
+    from . import restart
+    from . import run_command as command
+
+    overrides = dict(map(setting, settings or ()))
+    with news() as heard, restart.reopened(file, overrides=overrides) as again:
+        if again is not None:
+            if again.warning:
+                print(f"hexcontact: warning: {again.warning}", file=sys.stderr)
+            histories = command.solved(again.case, again.store, heard, file.stem, quiet, again.before)
+    path = file if again is None else again.store.path
+    picture = command.overview(path) if plot else None
+    if quiet:
+        return
+    if again is not None:
+        command.summarize(again.case, histories, path, picture)
+    else:
+        print(
+            f"{file} is finished, all its load steps are there" + (f"; written: {picture}" if picture else "")
+        )
+
+
+@guarded
+def study(
+    file: Annotated[
+        Path, typer.Argument(metavar="STUDY", help="The study, a TOML file.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="Result; default: the study's output, or STUDY.nc here. Cases go beside it.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786.")
+    ] = None,
+    slurm: Annotated[bool, typer.Option("--slurm", help="Print a job array for sbatch instead.")] = False,
+    case: Annotated[
+        int | None, typer.Option(metavar="N", help="Run only case N (what a job array does).")
+    ] = None,
+    collect: Annotated[
+        bool, typer.Option("--collect", help="Run nothing, put together what is there.")
+    ] = False,
+    retry: Annotated[bool, typer.Option("--retry", help="Run cases that failed again.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    from . import study_command as command
+    from .study import Study
+
+    if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:
+        raise DeckError("expected only one of --jobs, --dask, --slurm, --case and --collect")
+    planned = Study.from_toml(file, output, check=case is None and not collect)
+    if slurm:
+        print(command.slurm_script(planned, file, retry) or "# no case is missing")
+        return
+    if case is not None:
+        outcome = planned.run_case(case, retry)
+        if outcome.exit_code:
+            fail(outcome.message, outcome.exit_code)
+        return
+    if collect:
+        planned.collect()
+    else:
+        cancel = threading.Event()
+        options = {"jobs": jobs, "dask": dask, "retry": retry, "watcher": command.watcher(quiet)}
+        work, over = command.run_in_background(planned, cancel, options)
+        with news() as heard:
+            try:
+                in_background(work, heard)
+            except Interrupted as signaled:
+                cancel.set()
+                over.wait()
+                fail(f"interrupted; {command.interrupted(planned)}", signaled.exit_code)
+    if code := command.report(planned, quiet):
+        raise typer.Exit(code)
+
+
+@guarded
+def verify(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Which comparisons; default: all.", show_default=False),
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
+    table: Annotated[bool, typer.Option("--table", help="Print Markdown tables.")] = False,
+) -> None:
+    """Compare with published, analytic and converged solutions; exit code 1 if a comparison fails."""
+    from . import verify as comparisons
+
+    raise typer.Exit(comparisons.main(names or [], table=table, listing=listing))

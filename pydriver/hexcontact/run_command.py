@@ -1,0 +1,95 @@
+"""What ``hexcontact run``, ``resume`` and ``check`` do: read a case, find its place, solve it, tell of it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from . import solve, summary
+from .cli_options import setting
+from .errors import DeckError
+from .interruption import Interrupted, in_background
+from .progress import reporter
+
+if TYPE_CHECKING:
+    from .case import Case
+    from .result import Step
+    from .store import Store
+
+_PICTURES = (".png", ".pdf", ".svg")
+
+
+def case_of(deck: Path, settings: list[str] | None) -> Case:
+    """Read a deck with the keys that ``--set`` replaces."""
+    from .case import Case
+
+    return Case.from_toml(deck, overrides=dict(map(setting, settings or ())))
+
+
+def target_of(case: Case, deck: Path, output: Path | None = None) -> Path:
+    """Return the file that a run writes: what the user, else the deck, else the deck's name says."""
+    target = output or case.output.file or Path(f"{deck.stem}.nc")
+    if target.suffix in _PICTURES:
+        raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
+    if not target.parent.is_dir():
+        there = target.parent.exists()
+        fault = f"{target.parent} is not a folder" if there else f"the folder {target.parent} does not exist"
+        raise DeckError(f"cannot write {target}: {fault}")
+    return target
+
+
+def solved(
+    case: Case,
+    store: Store,
+    heard: tuple[int, int],
+    name: str,
+    quiet: bool,
+    before: Sequence[Step] = (),
+) -> list[Any]:
+    """Solve a case into a store and return the histories of all its steps; signals end the process."""
+    shown, histories = reporter(quiet), [step.history for step in before]
+    title = (case.title or name) + (f", after step {len(before)}" if before else "")
+    try:
+        with shown.watching(title, len(case.load_steps)):
+            in_background(
+                lambda: solve.record(case, store, shown, lambda step: histories.append(step.history), before),
+                heard,
+            )
+    except Interrupted as signaled:
+        _leave(store, signaled)
+    return histories
+
+
+def _leave(store: Store, signaled: Interrupted) -> NoReturn:
+    """Say what is kept after an interruption and end the process, whatever the core is doing."""
+    store.close(f"interrupted ({signaled.name})")
+    kept = store.kept if store.heads else "no load step was finished"
+    with contextlib.suppress(OSError):  # nobody listens any more
+        print(f"hexcontact: interrupted; {kept}", file=sys.stderr)
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(signaled.exit_code)
+
+
+def overview(path: Path) -> Path:
+    """Draw a result beside its file."""
+    from .plot_command import picture_of
+    from .store import open_result
+
+    return picture_of([open_result(path)], "overview", path.with_suffix(".png"), {})
+
+
+def summarize(case: Case, histories: list[Any], target: Path, picture: Path | None) -> None:
+    """Print what came out: the history, the last step, and how it compares with Hertz."""
+    console, last = summary.console(), histories[-1]
+    if len(histories) > 1:
+        console.print(summary.history_table(histories, console))
+    console.print(summary.pairs(f"Last load step of {case.title!r}" if case.title else "Last load step",
+                                summary.step_rows(last)))  # fmt: skip
+    if rows := summary.hertz_rows(case, last):
+        console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+    console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)

@@ -13,9 +13,11 @@ from typing import Annotated
 import typer
 
 from . import __version__, cli_deck, cli_show, cli_solve, plot_choices
+from .cli_guard import Commands
 
 app = typer.Typer(
     name="hexcontact",
+    cls=Commands,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},

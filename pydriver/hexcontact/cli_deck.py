@@ -8,23 +8,27 @@ from typing import Annotated
 
 import typer
 
-from .cli_guard import guarded
-from .cli_options import DeckFile, Settings
+from .cli_guard import Content, guarded
+from .cli_options import AsJson, DeckFile, Settings
 from .errors import DeckError
 
 
 @guarded
-def check(deck: DeckFile, settings: Settings = None) -> None:
+def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Read a deck, report everything that is wrong with it, and say what would be run."""
-    from . import run_command, summary
+    from . import json_output, run_command, summary
     from .window import require_memory
 
     case = run_command.case_of(deck, settings)
-    console = summary.console()
-    console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
+    if not as_json:
+        console = summary.console()
+        console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
     require_memory(case, case.lattice)
-    run_command.target_of(case, deck)
+    target = run_command.target_of(case, deck)
+    if as_json:
+        return json_output.of_case(case, target)
     console.print(f"{deck} is ready to run", soft_wrap=True)
+    return None
 
 
 @guarded

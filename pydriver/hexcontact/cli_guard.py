@@ -1,51 +1,121 @@
-"""What the command line says and returns when something goes wrong."""
+"""What the command line says and returns in the end, above all when something goes wrong."""
 
 from __future__ import annotations
 
 import functools
 import os
 import sys
-from collections.abc import Callable
-from typing import NoReturn, ParamSpec, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
 
 import typer
+from typer.core import TyperGroup
 
 from .errors import DeckError, HexcontactError, ResourceError
 
+if TYPE_CHECKING:
+    from .errors import Fault
+
 P = ParamSpec("P")
-R = TypeVar("R")
+Content = Mapping[str, Any] | None
+"""What a command has to say to a program; None if it was not asked by ``--json``."""
 
 
-def fail(message: str, code: int) -> NoReturn:
-    """Print a message on standard error, each line marked as ours, and exit."""
-    for line in message.splitlines() or [""]:
-        print(f"hexcontact: {line}", file=sys.stderr)
-    raise typer.Exit(code)
+class Failure(HexcontactError):
+    """A failure whose exit code is known from elsewhere: of a case of a study, of a signal."""
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code
 
 
-def guarded(command: Callable[P, R]) -> Callable[P, R]:
-    """Turn what goes wrong into a sentence and an exit code; HEXCONTACT_DEBUG=1 shows tracebacks instead."""
+class _Told(NamedTuple):
+    """What is said of an error."""
+
+    message: str
+    exit_code: int
+    faults: Sequence[Fault] = ()
+    details: Mapping[str, Any] | None = None
+
+
+def guarded(command: Callable[P, Content]) -> Callable[P, None]:
+    """Turn what goes wrong into a sentence and an exit code; HEXCONTACT_DEBUG=1 shows tracebacks instead.
+
+    With ``--json`` the command returns what it has to say instead of printing it, and an object is printed
+    whatever happens.
+    """
 
     @functools.wraps(command)
-    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
+        name = command.__name__ if kwargs.get("as_json") else ""
         try:
-            return command(*args, **kwargs)
-        except BrokenPipeError:
+            content = command(*args, **kwargs)
+            if name:
+                _print_json(name, content or {})
+        except (BrokenPipeError, typer.Exit):
             raise
-        except KeyboardInterrupt:
-            fail("interrupted", 130)
-        except Exception as error:
-            if os.environ.get("HEXCONTACT_DEBUG"):
+        except (Exception, KeyboardInterrupt) as error:
+            told = None if os.environ.get("HEXCONTACT_DEBUG") else _told(error)
+            if told is None:
+                if name:
+                    _print_error(name, _Told(f"{type(error).__name__}: {error}", HexcontactError.exit_code))
                 raise
-            if isinstance(error, HexcontactError):
-                fail("\n".join([str(error), *getattr(error, "__notes__", ())]), error.exit_code)
-            if isinstance(error, MemoryError):
-                fail("the machine has not enough memory for this", ResourceError.exit_code)
-            if isinstance(error, OSError) and error.strerror:
-                named = f"{error.filename}: " if error.filename else ""
-                fail(named + error.strerror, DeckError.exit_code)
-            if isinstance(error, RuntimeError | OSError) and "NetCDF" in str(error):
-                fail(f"the result file is damaged ({error})", DeckError.exit_code)
-            raise
+            complain(told.message)
+            if name:
+                _print_error(name, told)
+            raise typer.Exit(told.exit_code) from None
+        if content and content.get("exit_code"):
+            raise typer.Exit(content["exit_code"])
 
     return wrapped
+
+
+def _told(error: BaseException) -> _Told | None:
+    """Return what is said of an error; None of one that nobody foresaw."""
+    if isinstance(error, KeyboardInterrupt):
+        return _Told("interrupted", 130)
+    if isinstance(error, HexcontactError):
+        message = "\n".join([str(error), *getattr(error, "__notes__", ())])
+        return _Told(message, error.exit_code, getattr(error, "faults", ()), getattr(error, "details", None))
+    if isinstance(error, MemoryError):
+        return _Told("the machine has not enough memory for this", ResourceError.exit_code)
+    if isinstance(error, OSError) and error.strerror:
+        named = f"{error.filename}: " if error.filename else ""
+        return _Told(named + error.strerror, DeckError.exit_code)
+    if isinstance(error, RuntimeError | OSError) and "NetCDF" in str(error):
+        return _Told(f"the result file is damaged ({error})", DeckError.exit_code)
+    return None
+
+
+def complain(message: str) -> None:
+    """Print a message on standard error, each line marked as ours."""
+    for line in message.splitlines() or [""]:
+        print(f"hexcontact: {line}", file=sys.stderr)
+
+
+def _print_json(name: str, content: Mapping[str, Any]) -> None:
+    from . import json_output
+
+    json_output.write(name, content)
+
+
+def _print_error(name: str, told: _Told) -> None:
+    from . import json_output
+
+    json_output.write(name, json_output.error(*told))
+
+
+class Commands(TyperGroup):
+    """The sub-commands; wrong options and arguments are told to programs, too."""
+
+    def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
+        """Run the command that the arguments name."""
+        given = sys.argv[1:] if args is None else list(args)
+        try:
+            return super().main(args, *more, **options)
+        except SystemExit as ending:
+            usage = getattr(ending.__context__, "format_message", None)  # what typer has shown before
+            if "--json" in given and usage is not None:
+                name = next((word for word in given if word in self.commands), "")
+                _print_error(name, _Told(usage(), DeckError.exit_code))
+            raise

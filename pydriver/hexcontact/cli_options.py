@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,6 +23,28 @@ Settings = Annotated[
 ]
 Plot = Annotated[bool, typer.Option("--plot", help="Draw the result beside the output (.png).")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object for programs, errors too; docs/running.md.")
+]
+
+
+class LogLevel(enum.StrEnum):
+    """What a log holds."""
+
+    debug = "debug"
+    info = "info"
+    warning = "warning"
+    error = "error"
+
+
+LogFile = Annotated[
+    Path | None,
+    typer.Option("--log-file", metavar="LOG", help="Append a line for each load step, with time and work."),
+]
+Level = Annotated[
+    LogLevel | None,
+    typer.Option("--log-level", help="What the log holds; without LOG it goes to standard error."),
+]
 
 
 def setting(text: str) -> tuple[str, Any]:

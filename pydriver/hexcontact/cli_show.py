@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_guard import guarded
-from .cli_options import ResultFile
+from .cli_guard import Content, guarded
+from .cli_options import AsJson, ResultFile
 from .errors import DeckError
 
 if TYPE_CHECKING:
@@ -33,11 +33,13 @@ class Arrows(enum.StrEnum):
 
 
 @guarded
-def info(file: ResultFile) -> None:
+def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Say what a result holds: origin, history, residuals, the last load step against Hertz."""
-    from . import summary
+    from . import json_output, summary
 
     result = _open(file)
+    if as_json:
+        return json_output.of_result(result)
     case, console = summary.case_of(result), summary.console()
     histories = result.history.to_dict("records")
     console.print(summary.pairs(result.case_title, summary.file_rows(result)))
@@ -45,6 +47,7 @@ def info(file: ResultFile) -> None:
     console.print(summary.pairs("Last load step", summary.step_rows(histories[-1])))
     if case is not None and (rows := summary.hertz_rows(case, histories[-1])):
         console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+    return None
 
 
 def _open(path: Path) -> Result:

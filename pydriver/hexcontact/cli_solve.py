@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .cli_guard import fail, guarded
-from .cli_options import DeckFile, Plot, Quiet, Settings, setting
+from .cli_guard import Content, Failure, complain, guarded
+from .cli_options import AsJson, DeckFile, Level, LogFile, Plot, Quiet, Settings, setting
 from .errors import DeckError
 from .interruption import Interrupted, in_background, news
 
@@ -27,20 +26,27 @@ def run(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an output that is there.")] = False,
     plot: Plot = False,
     quiet: Quiet = False,
+    as_json: AsJson = False,
+    log_file: LogFile = None,
+    log_level: Level = None,
     settings: Settings = None,
-) -> None:
+) -> Content:
     """Solve a deck; each load step is safe on the disk before the next begins."""
     from . import run_command as command
     from .solve import metadata_of
     from .store import Store
 
+    listeners = command.Listeners("run", quiet, as_json, log_file, log_level)
     case = command.case_of(deck, settings)
     target = command.target_of(case, deck, output)
-    with news() as heard, Store(target, metadata_of(case), overwrite) as store:
-        histories = command.solved(case, store, heard, deck.stem, quiet)
+    with (
+        listeners.logging(deck, target),
+        news() as heard,
+        Store(target, metadata_of(case), overwrite) as store,
+    ):
+        histories = command.solved(case, store, heard, deck.stem, listeners)
     picture = command.overview(store.path) if plot else None
-    if not quiet:
-        command.summarize(case, histories, target, picture)
+    return listeners.tell(case, histories, target, picture)
 
 
 @guarded
@@ -48,6 +54,9 @@ def resume(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The output of the run.", show_default=False)],
     plot: Plot = False,
     quiet: Quiet = False,
+    as_json: AsJson = False,
+    log_file: LogFile = None,
+    log_level: Level = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -56,7 +65,7 @@ def resume(
             help="Change how the further steps are solved, as solver.tolerance=1e-7. Repeatable.",
         ),
     ] = None,
-) -> None:
+) -> Content:
     """Go on with a run that was interrupted or killed, met a full disk or did not converge.
 
     The result is to the bit that of a run in one go, on the same machine with as many threads.
@@ -64,22 +73,22 @@ def resume(
     from . import restart
     from . import run_command as command
 
+    listeners = command.Listeners("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))
-    with news() as heard, restart.reopened(file, overrides=overrides) as again:
+    with (
+        listeners.logging(file),
+        news() as heard,
+        restart.reopened(file, overrides=overrides) as again,
+    ):
         if again is not None:
             if again.warning:
-                print(f"hexcontact: warning: {again.warning}", file=sys.stderr)
-            histories = command.solved(again.case, again.store, heard, file.stem, quiet, again.before)
-    path = file if again is None else again.store.path
-    picture = command.overview(path) if plot else None
-    if quiet:
-        return
+                complain(f"warning: {again.warning}")
+            histories = command.solved(again.case, again.store, heard, file.stem, listeners, again.before)
     if again is not None:
-        command.summarize(again.case, histories, path, picture)
-    else:
-        print(
-            f"{file} is finished, all its load steps are there" + (f"; written: {picture}" if picture else "")
-        )
+        path = again.store.path
+        picture = command.overview(path) if plot else None
+        return listeners.tell(again.case, histories, path, picture, [again.warning] * bool(again.warning))
+    return command.was_finished(file, command.overview(file) if plot else None, listeners)
 
 
 @guarded
@@ -110,37 +119,60 @@ def study(
     ] = False,
     retry: Annotated[bool, typer.Option("--retry", help="Run cases that failed again.")] = False,
     quiet: Quiet = False,
-) -> None:
+    as_json: AsJson = False,
+    log_file: LogFile = None,
+    log_level: Level = None,
+) -> Content:
     """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    from . import json_output
     from . import study_command as command
+    from .run_command import Listeners
     from .study import Study
 
     if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case and --collect")
+    if slurm and as_json:
+        raise DeckError("--json: expected no --slurm, which prints a script")
+    listeners = Listeners("study", quiet, as_json, log_file, log_level)
     planned = Study.from_toml(file, output, check=case is None and not collect)
     if slurm:
         print(command.slurm_script(planned, file, retry) or "# no case is missing")
-        return
-    if case is not None:
-        outcome = planned.run_case(case, retry)
-        if outcome.exit_code:
-            fail(outcome.message, outcome.exit_code)
-        return
-    if collect:
-        planned.collect()
-    else:
-        cancel = threading.Event()
-        options = {"jobs": jobs, "dask": dask, "retry": retry, "watcher": command.watcher(quiet)}
-        work, over = command.run_in_background(planned, cancel, options)
-        with news() as heard:
-            try:
-                in_background(work, heard)
-            except Interrupted as signaled:
-                cancel.set()
-                over.wait()
-                fail(f"interrupted; {command.interrupted(planned)}", signaled.exit_code)
-    if code := command.report(planned, quiet):
+        return None
+    with listeners.logging(file, planned.output):
+        if case is not None:
+            outcome = planned.run_case(case, retry)
+            if outcome.exit_code:
+                raise Failure(outcome.message, outcome.exit_code)
+            return {
+                "case": case,
+                "output": planned.folder.folder / f"{case:04d}.nc",
+                "seconds": outcome.seconds,
+            }
+        if collect:
+            planned.collect()
+        else:
+            cancel = threading.Event()
+            options = {
+                "jobs": jobs,
+                "dask": dask,
+                "retry": retry,
+                "watcher": command.watcher(listeners.silent),
+            }
+            work, over = command.run_in_background(planned, cancel, options)
+            with news() as heard:
+                try:
+                    in_background(work, heard)
+                except Interrupted as signaled:
+                    cancel.set()
+                    over.wait()
+                    message = f"interrupted; {command.interrupted(planned)}"
+                    raise Failure(message, signaled.exit_code) from None
+    code = command.report(planned, quiet or as_json)
+    if as_json:
+        return {"exit_code": code, **json_output.of_study(planned)}
+    if code:
         raise typer.Exit(code)
+    return None
 
 
 @guarded
@@ -151,8 +183,13 @@ def verify(
     ] = None,
     listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
     table: Annotated[bool, typer.Option("--table", help="Print Markdown tables.")] = False,
-) -> None:
+    as_json: AsJson = False,
+) -> Content:
     """Compare with published, analytic and converged solutions; exit code 1 if a comparison fails."""
     from . import verify as comparisons
 
+    if as_json:
+        if table:
+            raise DeckError("expected --table or --json, not both")
+        return comparisons.for_programs(names or [], listing=listing)
     raise typer.Exit(comparisons.main(names or [], table=table, listing=listing))

@@ -17,7 +17,7 @@ from typing import Annotated, Any, cast
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from .errors import DeckError
+from .errors import DeckError, Fault
 from .load_series import LOADS, QUANTITIES, Series
 from .messages import Problem
 from .surfaces import Flat, Point, Surface, SurfaceKind
@@ -371,8 +371,8 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         place = re.search(r" \(at line (\d+), column (\d+)\)$", message)
         if place is None:
             raise DeckError(f"{name}: is not TOML: {message}") from None
-        where, what = f"{name}:{place[1]}:{place[2]}", message[: place.start()]
-        raise DeckError(f"{where}: is not TOML: {what}") from None
+        sentence = f"{name}:{place[1]}:{place[2]}: is not TOML: {message[: place.start()]}"
+        raise DeckError(sentence, [Fault(sentence, "", "", name, int(place[1]), int(place[2]))]) from None
 
 
 def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:

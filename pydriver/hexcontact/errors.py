@@ -2,6 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+
+class Fault(NamedTuple):
+    """One thing that is wrong with the input, in parts.
+
+    Attributes
+    ----------
+    message : str
+        The whole sentence, with the place in front.
+    key : str
+        Dotted key of the deck; empty where none is to blame.
+    value : str
+        What the deck says there, shortened; empty if nothing.
+    file : str
+        File that says it; empty for an override, or a case that was built in Python.
+    line, column : int or None
+        Where in the file, from 1.
+    """
+
+    message: str
+    key: str = ""
+    value: str = ""
+    file: str = ""
+    line: int | None = None
+    column: int | None = None
+
 
 class HexcontactError(Exception):
     """Base of every error this package raises on purpose."""
@@ -10,15 +38,35 @@ class HexcontactError(Exception):
 
 
 class DeckError(HexcontactError, ValueError):
-    """The input is wrong: a deck key, an argument, a file that cannot be read or written."""
+    """The input is wrong: a deck key, an argument, a file that cannot be read or written.
+
+    Attributes
+    ----------
+    faults : tuple of Fault
+        Each thing that is wrong with a deck; empty for what is no deck.
+    """
 
     exit_code = 2
 
+    def __init__(self, message: str, faults: Sequence[Fault] = ()) -> None:
+        super().__init__(message)
+        self.faults = tuple(faults)
+
 
 class ConvergenceError(HexcontactError, RuntimeError):
-    """A load step did not meet its tolerance; the last good step is kept."""
+    """A load step did not meet its tolerance; the last good step is kept.
+
+    Attributes
+    ----------
+    details : mapping
+        The step, its residuals and where they are largest, by name; SI.
+    """
 
     exit_code = 3
+
+    def __init__(self, message: str, details: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.details = dict(details or {})
 
 
 class ResourceError(HexcontactError, MemoryError):

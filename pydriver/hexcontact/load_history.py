@@ -61,6 +61,8 @@ class LoadStep:
         Name of the segment, may be empty.
     z, x, y, twist : Target
         What drives the normal motion, the two tangential ones and the rotation about z.
+    fraction : float
+        How much of the segment is done at the end of the step.
     """
 
     index: int
@@ -70,6 +72,7 @@ class LoadStep:
     x: Target
     y: Target
     twist: Target
+    fraction: float = 1.0
 
     @property
     def targets(self) -> tuple[Target, Target, Target, Target]:
@@ -144,7 +147,7 @@ def load_steps(
             problems.append(Problem((*key, "ramp"), "cubic", sentence))
         for fraction in _fractions(segment):
             now = {motion: _ramp(segment, motion, start[motion], fraction, virgin) for motion in MOTIONS}
-            steps.append(LoadStep(len(steps), number, label, **now))
+            steps.append(LoadStep(len(steps), number, label, **now, fraction=fraction))
             problems += _overload(key, segment, steps[-1], friction_coefficient)
 
     if all(step.z.value < SMALLEST for step in steps):

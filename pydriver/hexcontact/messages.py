@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from .deck_location import Place, place_of, places
-from .errors import DeckError
+from .errors import DeckError, Fault
 
 MISSING: Any = object()
 """The value of a problem with a key that is not there, or not worth repeating."""
@@ -55,6 +55,12 @@ class Source:
     overrides: frozenset[str] = field(default_factory=frozenset)
     included: tuple[tuple[str, str], ...] = ()
 
+    def found(self, key: str) -> tuple[str, Place | None]:
+        """Return the file that a dotted key stands in, and where in it; no file for overrides and cases."""
+        if self._overridden(key) or not self.name:
+            return "", None
+        return self._place(key)
+
     def locate(self, key: str) -> str:
         """Return "file:line:column: ", "override: " or "" for a dotted key."""
         if self._overridden(key):
@@ -86,12 +92,15 @@ class Source:
 
 def deck_error(problems: Iterable[Problem], source: Source) -> DeckError:
     """Put all problems into one exception, a line for each."""
-    lines = []
+    faults = []
     for problem in sorted(problems, key=lambda problem: source.order(dotted(problem.key))):
         key = dotted(problem.key)
-        value = "" if problem.value is MISSING else f" = {shown(problem.value)}"
-        lines.append(f"{source.locate(key)}{key}{value}: {problem.sentence}")
-    return DeckError("\n".join(dict.fromkeys(lines)))
+        value = "" if problem.value is MISSING else shown(problem.value)
+        message = f"{source.locate(key)}{key}{value and ' = '}{value}: {problem.sentence}"
+        file, place = source.found(key)
+        faults.append(Fault(message, key, value, file, *(place or (None, None))))
+    faults = list(dict.fromkeys(faults))
+    return DeckError("\n".join(dict.fromkeys(fault.message for fault in faults)), faults)
 
 
 def dotted(key: Sequence[str | int]) -> str:

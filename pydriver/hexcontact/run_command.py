@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from . import solve, summary
-from .cli_options import setting
+from . import json_output, log, solve, summary
+from .cli_guard import complain
+from .cli_options import LogLevel, setting
 from .errors import DeckError
 from .interruption import Interrupted, in_background
 from .progress import reporter
@@ -42,16 +44,66 @@ def target_of(case: Case, deck: Path, output: Path | None = None) -> Path:
     return target
 
 
+@dataclasses.dataclass(frozen=True)
+class Listeners:
+    """Who is told about a run, and how.
+
+    Attributes
+    ----------
+    command : str
+        Name of the command.
+    quiet, as_json : bool
+        Print nothing but errors; print an object in the end instead of tables.
+    log_file, log_level : Path, LogLevel or None
+        Options of the log.
+    """
+
+    command: str
+    quiet: bool = False
+    as_json: bool = False
+    log_file: Path | None = None
+    log_level: LogLevel | None = None
+
+    def __post_init__(self) -> None:
+        if self.quiet and self.log_level and self.log_file is None:
+            raise DeckError("--log-level: expected --log-file with it, since --quiet prints nothing")
+
+    def logging(self, *spare: Path) -> contextlib.AbstractContextManager[None]:
+        """Keep the log, never in one of the files that the command reads or writes."""
+        return log.kept(self.log_file, self.log_level, spare)
+
+    @property
+    def silent(self) -> bool:
+        """Whether no progress is shown: if quiet, or where the log is shown instead."""
+        return self.quiet or (self.log_level is not None and self.log_file is None)
+
+    def tell(
+        self,
+        case: Case,
+        histories: list[Any],
+        target: Path,
+        picture: Path | None,
+        warnings: Sequence[str] = (),
+    ) -> dict[str, Any] | None:
+        """Print, or return, what came out."""
+        if self.as_json:
+            written = {"output": target, "picture": picture, "warnings": list(warnings)}
+            return written | json_output.of_run(case, case.title, histories)
+        if not self.quiet:
+            summarize(case, histories, target, picture)
+        return None
+
+
 def solved(
     case: Case,
     store: Store,
     heard: tuple[int, int],
     name: str,
-    quiet: bool,
+    listeners: Listeners,
     before: Sequence[Step] = (),
 ) -> list[Any]:
     """Solve a case into a store and return the histories of all its steps; signals end the process."""
-    shown, histories = reporter(quiet), [step.history for step in before]
+    shown, histories = reporter(listeners.silent), [step.history for step in before]
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
         with shown.watching(title, len(case.load_steps)):
@@ -60,16 +112,20 @@ def solved(
                 heard,
             )
     except Interrupted as signaled:
-        _leave(store, signaled)
+        _leave(store, signaled, listeners)
     return histories
 
 
-def _leave(store: Store, signaled: Interrupted) -> NoReturn:
+def _leave(store: Store, signaled: Interrupted, listeners: Listeners) -> NoReturn:
     """Say what is kept after an interruption and end the process, whatever the core is doing."""
     store.close(f"interrupted ({signaled.name})")
     kept = store.kept if store.heads else "no load step was finished"
+    message = f"interrupted; {kept}"
     with contextlib.suppress(OSError):  # nobody listens any more
-        print(f"hexcontact: interrupted; {kept}", file=sys.stderr)
+        log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", done=len(store.heads)))
+        complain(message)
+        if listeners.as_json:
+            json_output.write(listeners.command, json_output.error(message, signaled.exit_code))
         sys.stdout.flush()
         sys.stderr.flush()
     os._exit(signaled.exit_code)
@@ -93,3 +149,18 @@ def summarize(case: Case, histories: list[Any], target: Path, picture: Path | No
     if rows := summary.hertz_rows(case, last):
         console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
     console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)
+
+
+def was_finished(file: Path, picture: Path | None, listeners: Listeners) -> dict[str, Any] | None:
+    """Say that there was nothing to go on with."""
+    if listeners.as_json:
+        from .store import open_result
+
+        result = open_result(file)
+        histories, case = json_output.histories_of(result), summary.case_of(result)
+        written: dict[str, Any] = {"output": file, "picture": picture, "warnings": []}
+        return written | json_output.of_run(case, result.case_title, histories)
+    if not listeners.quiet:
+        drawn = f"; written: {picture}" if picture else ""
+        print(f"{file} is finished, all its load steps are there{drawn}")
+    return None

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import log
 from .errors import ConvergenceError, HexcontactError, StopRun
 from .load_series import LOADS
 from .progress import Reporter, reporter
@@ -17,6 +18,7 @@ from .window import kind_of
 
 if TYPE_CHECKING:
     from .case import Case
+    from .lattice import Lattice
     from .load_history import LoadStep
     from .store import Store
 
@@ -30,18 +32,23 @@ def metadata_of(case: Case) -> Metadata:
         fields=tuple(case.output.fields),
         every=case.output.every,
         planned_steps=len(case.load_steps),
-        parameters={
-            "effective_modulus": case.pair.effective_modulus,
-            "dundurs_beta": case.pair.beta,
-            "tangential_compliance_ratio": case.pair.gamma,
-            "friction_coefficient": case.friction_coefficient,
-            "algorithm": case.solver.algorithm,
-            "coupling": case.solver.coupling,
-            "entry": case.solver.entry,
-            "tolerance": case.solver.tolerance,
-            "machine": _machine(),
-        },
+        parameters=parameters_of(case),
     )
+
+
+def parameters_of(case: Case) -> dict[str, Any]:
+    """Return what describes a case and how it is solved, and the machine that does it."""
+    return {
+        "effective_modulus": case.pair.effective_modulus,
+        "dundurs_beta": case.pair.beta,
+        "tangential_compliance_ratio": case.pair.gamma,
+        "friction_coefficient": case.friction_coefficient,
+        "algorithm": case.solver.algorithm,
+        "coupling": case.solver.coupling,
+        "entry": case.solver.entry,
+        "tolerance": case.solver.tolerance,
+        "machine": _machine(),
+    }
 
 
 def _machine() -> str:
@@ -95,7 +102,7 @@ def run(
     if output is None:
         finished: list[Step] = []
         stopped = ""
-        with shown.watching(case.title, len(case.load_steps)):
+        with log.ending(), shown.watching(case.title, len(case.load_steps)):
             for step in steps(case, kept_in_memory=True):
                 finished.append(step)
                 shown.finished(step)
@@ -141,20 +148,22 @@ def record(
     DeckError, ConvergenceError, ResourceError
         As `run`.
     """
-    for step in steps(case, before=before):
-        store.append(step)
-        shown.finished(step)
-        try:
-            stopped = stops(on_step, step)
-        except Exception as error:
-            store.close(f"on_step raised {type(error).__name__} after step {step.number}: {error}")
-            if not isinstance(error, HexcontactError):  # to which the store adds it
-                error.add_note(store.kept)
-            raise
-        if stopped:
-            store.close(stopped)
-            return
-    store.finish()
+    with log.ending():
+        for step in steps(case, before=before):
+            store.append(step)
+            shown.finished(step)
+            try:
+                stopped = stops(on_step, step)
+            except Exception as error:
+                store.close(f"on_step raised {type(error).__name__} after step {step.number}: {error}")
+                if not isinstance(error, HexcontactError):  # to which the store adds it
+                    error.add_note(store.kept)
+                raise
+            if stopped:
+                store.close(stopped)
+                return
+        store.finish()
+    log.logger.info(log.words("written", file=store.path))
 
 
 def stops(on_step: Callable[[Step], object] | None, step: Step) -> str:
@@ -212,6 +221,16 @@ def steps(
         If there is not enough memory.
     """
     lattice = before[-1].lattice if before else case.lattice
+    log.begun(case, lattice, len(before))
+    started = time.perf_counter()
+    for step in _solved(case, lattice, kept_in_memory, before):
+        log.finished(step, case.load_steps[step.index], len(case.load_steps))
+        yield step
+    log.logger.info(log.words("finished", steps=len(case.load_steps), seconds=time.perf_counter() - started))
+
+
+def _solved(case: Case, lattice: Lattice, kept_in_memory: bool, before: Sequence[Step]) -> Iterator[Step]:
+    """Solve step by step, from a window on; see `steps`."""
     window = kind_of(case)(case, lattice, len(case.load_steps) if kept_in_memory else 0)
     state: Any = window.restored(before[-1]) if before else None
     segment, begun, reached_by_now = -1, _standing({}), _standing({})
@@ -227,6 +246,7 @@ def steps(
         # a step that reached the rim is solved again on a larger window, from where it began
         while window.outgrown(reached := window.advance(state, target, values)):
             smaller, window = window.lattice, window.grown(reached, target)
+            log.grown(target.index + 1, smaller, window.lattice)
             state = window.carried(state, smaller)
         if not reached.converged:
             raise ConvergenceError(window.complaint(reached, target, values))

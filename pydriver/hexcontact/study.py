@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from . import study_plan
+from . import log, study_plan
 from .deck import read_toml
 from .deck_assembly import assemble
 from .errors import DeckError
@@ -218,6 +218,11 @@ class Study:
             by_hash = {case.hash: case for case in missing}
             work = [Job(case.hash, case.deck, os.path.realpath(self.folder.path(case))) for case in missing]
             pool = self._pool(jobs, dask, len(work)) if work else None
+            log.logger.info(
+                log.words(
+                    "study", title=self.title, cases=len(self), missing=len(missing), output=self.output
+                )
+            )
             with watcher.watching(self, len(missing)):
                 if pool is not None:
                     self._work(work, by_hash, pool, watcher, cancel)
@@ -237,9 +242,18 @@ class Study:
             for outcome in pool.outcomes(work, cancel):
                 case = by_hash[outcome.hash]
                 self.folder.note(case, outcome)
+                self._log(case, outcome)
                 watcher.finished(case, outcome)
         finally:
             pool.stop()
+
+    def _log(self, case: PlannedCase, outcome: Outcome) -> None:
+        place = f"case={self.folder.number(case)}/{len(self)}"
+        about = {"parameters": str(case), "seconds": outcome.seconds}
+        if outcome.exit_code:
+            log.logger.error(log.words(place, **about, exit_code=outcome.exit_code, reason=outcome.message))
+        else:
+            log.logger.info(log.words(place, **about))
 
     def _pool(self, jobs: int | None, dask: str | None, work: int) -> LocalPool | DaskPool:
         if (where := self.cluster(jobs, dask)) is not None:

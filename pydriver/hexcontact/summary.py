@@ -228,7 +228,7 @@ def history_table(histories: Sequence[History], console: Console) -> Table:
 # --- against Hertz --------------------------------------------------------------------------------
 
 
-def hertz_rows(case: Case, history: History) -> list[Row]:
+def against_hertz(case: Case, history: History) -> list[tuple[str, float, float, str]]:
     """Compare a load step with Hertz's solution.
 
     Parameters
@@ -240,9 +240,9 @@ def hertz_rows(case: Case, history: History) -> list[Row]:
 
     Returns
     -------
-    list of rows
-        Quantity, Hertz, computed, difference; empty where Hertz does not apply: with friction, with surfaces
-        that are not quadratic or touch along a line, without load.
+    list of (str, float, float, str)
+        Quantity as in histories, Hertz, computed, unit; empty where Hertz does not apply: with friction, with
+        surfaces that are not quadratic or touch along a line, without load.
     """
     load = float(history["normal_load"])
     surfaces = [body.surface for body in (case.body_1, case.body_2) if body.surface is not None]
@@ -260,17 +260,30 @@ def hertz_rows(case: Case, history: History) -> list[Row]:
     except ValueError:  # contact along a line or all over, or a gap given in Python
         return []
     radius = math.sqrt(hertz.semi_major * hertz.semi_minor)
-    compared = [
-        ("max pressure", hertz.max_pressure, history["max_pressure"], "Pa"),
-        ("approach", hertz.approach, history["approach"], "m"),
-        ("contact radius (to the edge)", radius, history.get("contact_radius_fit", math.nan), "m"),
-        ("contact radius (area of the nodes)", radius, history["contact_radius"], "m"),
-    ]
+    known = {
+        "max_pressure": (hertz.max_pressure, "Pa"),
+        "approach": (hertz.approach, "m"),
+        "contact_radius_fit": (radius, "m"),
+        "contact_radius": (radius, "m"),
+    }
     return [
-        (name, quantity(exact, unit, 6), quantity(value, unit, 6), f"{100 * (value / exact - 1):+.3f} %")
-        for name, exact, value, unit in compared
-        if not math.isnan(value)
+        (name, exact, float(history[name]), unit)
+        for name, (exact, unit) in known.items()
+        if not math.isnan(history.get(name, math.nan))
     ]
+
+
+def hertz_rows(case: Case, history: History) -> list[Row]:
+    """Return the rows of `against_hertz`: quantity, Hertz, computed, difference."""
+    named = {
+        "contact_radius_fit": "contact radius (to the edge)",
+        "contact_radius": "contact radius (area of the nodes)",
+    }
+    return [
+        (named.get(name, _words(name)), quantity(exact, unit, 6), quantity(value, unit, 6),
+         f"{100 * (value / exact - 1):+.3f} %")
+        for name, exact, value, unit in against_hertz(case, history)
+    ]  # fmt: skip
 
 
 HERTZ_HEADERS = ("", "Hertz", "computed", "difference")

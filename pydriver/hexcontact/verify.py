@@ -13,6 +13,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from .errors import DeckError
 
@@ -319,9 +320,7 @@ def main(names: Sequence[str] = (), *, table: bool = False, listing: bool = Fals
         for check in CHECKS.values():
             print(f"{check.name:<{width}}  {check.title}")
         return 0
-    if unknown := [name for name in names if name not in CHECKS]:
-        raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(CHECKS)}")
-    chosen = [CHECKS[name] for name in names] if names else list(CHECKS.values())
+    chosen = _chosen(names)
     if table:
         print(_PREAMBLE)
     failed = []
@@ -336,3 +335,24 @@ def main(names: Sequence[str] = (), *, table: bool = False, listing: bool = Fals
     if failed:
         print(f"hexcontact: verify failed: {', '.join(failed)}", file=sys.stderr)
     return 1 if failed else 0
+
+
+def _chosen(names: Sequence[str]) -> list[Check]:
+    """Return the checks of these names, all if there are none."""
+    from .verify_cases import CHECKS
+
+    if unknown := [name for name in names if name not in CHECKS]:
+        raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(CHECKS)}")
+    return [CHECKS[name] for name in names] if names else list(CHECKS.values())
+
+
+def for_programs(names: Sequence[str] = (), *, listing: bool = False) -> dict[str, Any]:
+    """Run checks and return what they find, with the exit code; arguments and errors as `main`."""
+    from .json_output import of_comparison
+
+    chosen = _chosen(names)
+    if listing:
+        return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
+    found = [of_comparison(check, check.run()) for check in chosen]
+    passed = all(check["passed"] for check in found)
+    return {"exit_code": int(not passed), "passed": passed, "checks": found}

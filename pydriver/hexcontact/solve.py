@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import log
-from .errors import ConvergenceError, HexcontactError, StopRun
+from . import log, nonconvergence
+from .errors import HexcontactError, StopRun
 from .load_series import LOADS
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
@@ -160,6 +160,7 @@ def record(
                     error.add_note(store.kept)
                 raise
             if stopped:
+                log.logger.warning(log.words("stopped", reason=stopped))
                 store.close(stopped)
                 return
         store.finish()
@@ -249,7 +250,7 @@ def _solved(case: Case, lattice: Lattice, kept_in_memory: bool, before: Sequence
             log.grown(target.index + 1, smaller, window.lattice)
             state = window.carried(state, smaller)
         if not reached.converged:
-            raise ConvergenceError(window.complaint(reached, target, values))
+            raise nonconvergence.error(case, window.lattice, reached, target, values)
         step = window.step(target, reached, state, started)
         yield step
         state, reached_by_now = reached, _standing(step.history)

@@ -160,10 +160,6 @@ class Window(ABC, Generic[S]):
         """Return the state at the end of a step that was solved on this window, as the next one needs it."""
 
     @abstractmethod
-    def complaint(self, solution: S, target: LoadStep, values: tuple[float, ...]) -> str:
-        """Say why a load step with these values was not solved, and what may help."""
-
-    @abstractmethod
     def _more_fields(self, solution: S) -> dict[str, NDArray[Any]]:
         """Return the fields of a step beyond initial gap, pressure, gap and zone."""
 
@@ -321,15 +317,6 @@ class NormalWindow(Window["NormalSolution"]):
     def restored(self, step: Step) -> NormalSolution | None:
         """Return nothing: every step stands for itself."""
         return None
-
-    def complaint(self, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]) -> str:
-        """Say how far the solver came."""
-        return (
-            f"step {target.index + 1} of {len(self.case.load_steps)} did not converge: after "
-            f"{solution.sweeps} iterations the residuals are R_n = {solution.residual_normal:.2e} and "
-            f"R_P = {solution.residual_force:.2e}; solver.tolerance = {self.case.solver.tolerance:g} was "
-            "expected"
-        )
 
     def _more_fields(self, solution: NormalSolution) -> dict[str, NDArray[Any]]:
         return {}

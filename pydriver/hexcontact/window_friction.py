@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from .edges import ContactEdges
 from .estimators import area_radius
 from .load_history import LoadStep
-from .messages import listed
-from .progress import RESIDUALS, quantity
+from .progress import RESIDUALS
 from .result import Step
 from .window import Array, Window
 
@@ -24,8 +23,6 @@ _SCALARS = (  # of a state, besides the residuals, that have the names of the hi
     *("normal_load", "tangential_load_x", "tangential_load_y", "torque"),
     *("approach", "shift_x", "shift_y", "twist", "dissipated_energy", "operator_applications"),
 )
-_NEAR_SLIDING = 0.99  # share of mu P from which full slip may carry a tangential load
-_SLIDING = 1.0 - 1e-6  # ... from which it has to
 
 
 class FrictionWindow(Window["ContactState"]):
@@ -137,46 +134,6 @@ class FrictionWindow(Window["ContactState"]):
             + solution.traction_y[inside] @ moved_y
         )
         return 0.5 * self.lattice.cell_area * float(work)
-
-    # --- what stops a run ---------------------------------------------------------------------------------
-
-    def complaint(self, solution: ContactState, target: LoadStep, values: tuple[float, ...]) -> str:
-        """Name gross sliding as such, else what was tried; and the residuals."""
-        segment = f" ({target.label})" if target.label else ""
-        step = f"step {target.index + 1} of {len(self.case.load_steps)}{segment}"
-        tried = [f"{solution.sweeps} iterations"]
-        if solution.cuts:
-            tried.append(f"halving the step {solution.cuts} time{'s' * (solution.cuts > 1)}")
-        z, x, y, twist = (motion.control == "force" for motion in target.targets)
-        shown = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
-        residuals = listed([
-            f"{sign} = {getattr(solution, name):.2e}" for sign, name in RESIDUALS.items() if shown[sign]
-        ], "and")  # fmt: skip
-        after = f"after {listed(tried, 'and')} the residuals are {residuals}"
-        shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
-        bound = self.case.friction_coefficient * values[0] if z else math.nan
-        # below the bound a force alone always finds a balance, whatever an attempt that failed looks like
-        doubtful = torque or shear > _NEAR_SLIDING * bound or (shear and not z)
-        if (solution.sliding and doubtful) or (shear and shear >= _SLIDING * bound):
-            wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
-            wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
-            known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})" if z else ""
-            seen = "no sticking node is left and " * solution.sliding
-            return (
-                f"{step}: gross sliding: {seen}friction cannot carry the "
-                f"{listed(wanted, 'and the')}{known}; {after}; expected a smaller load, or a prescribed "
-                "motion in its place (shift_x, shift_y, twist)"
-            )
-        hint = "more steps in this segment may help, or a larger tolerance"
-        if doubtful and math.isfinite(self.case.friction_coefficient):
-            hint += (
-                "; or the load is more than friction can carry, which a prescribed motion in its place "
-                "(shift_x, shift_y, twist) would show"
-            )
-        return (
-            f"{step} did not converge: {after}; solver.tolerance = {self.case.solver.tolerance:g} was "
-            f"expected; {hint}"
-        )
 
 
 def state_of(step: Step) -> ContactState:

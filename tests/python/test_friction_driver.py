@@ -422,13 +422,16 @@ def test_a_torque_beyond_friction_is_gross_sliding_too() -> None:
         ),
         (
             {"tangential_load_x": 2.0, "torque": 1e-5},
-            r"did not converge: .*; or the load is more than friction ",
+            r"did not converge: .*to try: a prescribed motion in place of the load ",
         ),
-        ({"tangential_load_x": 2.0}, r"did not converge: .* may help, or a larger tolerance$"),
+        (
+            {"tangential_load_x": 2.0},
+            r"did not converge: .*to try: more steps in this segment; or a larger solver.tolerance$",
+        ),
     ],
 )
 def test_a_load_that_may_be_too_much_is_called_so(load: dict[str, float], sentence: str) -> None:
-    with pytest.raises(ConvergenceError, match=rf"step 2 of 2:? {sentence}"):
+    with pytest.raises(ConvergenceError, match=rf"(?s)step 2 of 2:? {sentence}"):
         sphere(loads=[{"normal_load": 31.5}, load]).run()
 
 
@@ -458,7 +461,7 @@ def test_no_convergence_is_told_with_residuals_and_keeps_the_steps_before(tmp_pa
         ConvergenceError,
         match=r"step 3 of 5 \(shear\) did not converge: after \d+ iterations and halving the step \d times? "
         r"the residuals are R_n = \S+, R_t = \S+, R_P = \S+ and R_Q = \S+; solver.tolerance = 1e-08 was "
-        r"expected; more steps",
+        r"expected\nworst is R_",
     ):
         sphere().run(tmp_path / "out.nc")
     assert len(open_result(tmp_path / "out.nc")) == 2

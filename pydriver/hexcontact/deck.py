@@ -29,6 +29,7 @@ ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
 
 MOST_STEPS = 100_000
+DEEPEST = 50  # levels of tables and arrays; no key needs more than six
 
 YoungModulus = Annotated[float, Quantity(PRESSURE, above=0)]
 PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1, at_most=0.5)]
@@ -365,7 +366,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         With the line and what is wrong there.
     """
     try:
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         message = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         place = re.search(r" \(at line (\d+), column (\d+)\)$", message)
@@ -373,6 +374,34 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
             raise DeckError(f"{name}: is not TOML: {message}") from None
         sentence = f"{name}:{place[1]}:{place[2]}: is not TOML: {message[: place.start()]}"
         raise DeckError(sentence, [Fault(sentence, "", "", name, int(place[1]), int(place[2]))]) from None
+    refuse_deep(tables, name)
+    return tables
+
+
+def refuse_deep(data: Mapping[str, Any], name: str) -> None:
+    """Refuse tables in tables in tables, which to copy or to show may need more stack than there is.
+
+    Parameters
+    ----------
+    data : mapping
+        The deck as dictionaries; may hold itself.
+    name : str
+        What an error message calls it; may be empty.
+
+    Raises
+    ------
+    DeckError
+        If there are more than `DEEPEST` levels.
+    """
+    level: list[Any] = [data]
+    for _ in range(DEEPEST):
+        entries = [e for table in level for e in (table.values() if isinstance(table, Mapping) else table)]
+        level = list(
+            {id(entry): entry for entry in entries if isinstance(entry, Mapping | list | tuple)}.values()
+        )
+        if not level:
+            return
+    raise DeckError(f"{name and name + ': '}nested too deeply; expected at most {DEEPEST} levels")
 
 
 def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from .deck import read_toml, with_overrides
+from .deck import read_toml, refuse_deep, with_overrides
 from .errors import DeckError
 from .load_series import Columns, read_series
 from .messages import MISSING, Problem, Source, listed
@@ -76,6 +76,7 @@ def assemble(
     DeckError
         If an included file is missing, is no TOML or includes itself, or a key cannot be replaced.
     """
+    refuse_deep(data, source.name)
     if not ("include" in data or overrides or any(True for _ in _series_with_files(data))):
         return Assembled(dict(data), text, source, [])
     name = Path(source.name) if source.name else None
@@ -83,7 +84,9 @@ def assemble(
     if overrides:
         if "include" in overrides:
             raise DeckError("include: cannot be replaced; expected in the deck")
+        refuse_deep(overrides, "")
         merged = with_overrides(merged, overrides)
+        refuse_deep(merged, source.name)
     source = replace(source, overrides=frozenset(overrides or ()), included=tuple(included))
     merged = copy.deepcopy(merged)
     return Assembled(merged, None, source, list(_read_series(merged, folder)))

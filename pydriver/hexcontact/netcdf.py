@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from . import mesh
 from .errors import DeckError, HexcontactError
 from .result import Layout, Metadata, Result, Step
+from .result_check import fault_of_dimensions, fault_of_result
 from .variables import SCHEMA_VERSION, VARIABLES
 
 if TYPE_CHECKING:
@@ -191,8 +192,11 @@ def read_output(path: Path) -> Result:
         attributes = _attributes(file)
         _check_ours(attributes, path)
         for name in ("step", "row", "col", "x", "y"):
-            if file[name].dimensions != VARIABLES[name].dims or 0 in file[name].shape:
+            if 0 in file[name].shape:
                 raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
+        for name, column in file.variables.items():
+            if fault := fault_of_dimensions(name, column.dimensions):
+                raise DeckError(f"{path} is damaged: {fault}")
     with reading(path):
         import xarray
 
@@ -202,5 +206,8 @@ def read_output(path: Path) -> Result:
         for variable in result.dataset.variables.values():
             if variable.ndim < 2:
                 variable.load()
+        if fault := fault_of_result(result.dataset):
+            result.close()
+            raise DeckError(f"{path} is damaged: {fault}")
         _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)
         return result

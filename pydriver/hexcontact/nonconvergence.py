@@ -29,6 +29,7 @@ _SLIDING = 1.0 - 1e-6  # ... from which it has to
 _ROUNDING = 1e-11  # tolerance below which rounding errors may decide
 _LEAST_TRACTION = 1e-3  # without slip: the least traction that R_t refers to, over the largest pressure
 _SAME = 1e-3  # relative difference of a residual from that of the solver that still means the same state
+_LOST = "the last attempt lost all contact"
 _INFINITE = 1e100  # the core says so for an error relative to nothing
 
 
@@ -86,7 +87,9 @@ def error(
         expected = "expected a smaller load, or a prescribed motion in its place (shift_x, shift_y, twist)"
         return ConvergenceError(f"{step}: gross sliding: {excess}; {after}; {expected}", details)
     lines = [f"{step} did not converge: {after}; solver.tolerance = {case.solver.tolerance:g} was expected"]
-    if worst.what:
+    if worst.what == _LOST:
+        lines.append(_LOST)
+    elif worst.what:
         times = worst.value / case.solver.tolerance
         lines.append(f"worst is {worst.residual}, {_number(times)} times its bound: {worst.what}")
     lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful))}")
@@ -166,7 +169,7 @@ def _worst(
     sign = max(residuals, key=lambda name: residuals[name])
     value = residuals[sign]
     if not (solution.pressure > 0).any():
-        return Worst(sign, value, what="the last attempt lost all contact")
+        return Worst(sign, value, what=_LOST)
     if sign not in ("R_n", "R_t"):
         return Worst(sign, value, what=_missed(sign, solution, values))
     field = (_normal if sign == "R_n" else _tangential)(case, lattice, solution)

@@ -18,6 +18,7 @@ from .errors import DeckError
 from .lattice import Lattice
 from .netcdf import reading
 from .result import Layout, Metadata, Step
+from .result_check import fault_of_record
 
 SUFFIX = ".npz"
 VERSION = 1
@@ -84,4 +85,7 @@ def read_record(path: Path) -> tuple[Metadata, Step]:
         lattice = Lattice(**about["lattice"], origin=origin)
         chosen, resumed = (tuple(about["metadata"].pop(name)) for name in ("fields", "resumed"))
         metadata = Metadata(**about["metadata"], fields=chosen, resumed=resumed)
-        return metadata, Step(about["index"], lattice, fields, about["history"])
+        step = Step(about["index"], lattice, fields, about["history"])
+        if fault := fault_of_record(metadata, step):
+            raise DeckError(f"{path} is damaged: {fault}")
+        return metadata, step

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .pressure_field import PressureField, linear
 from .result import Result
-from .variables import NOT_KEPT
+from .variables import LARGEST, NOT_KEPT
 
 if TYPE_CHECKING:
     import xarray
@@ -109,6 +109,7 @@ class StepView:
         pressure = one["pressure"].values
         if not np.isfinite(pressure).any():
             raise ValueError(f"the pressure of step {int(one['step'])} was not kept (output.every)")
+        _refuse_nonsense("pressure", pressure)
         x, y = dataset["x"].values, dataset["y"].values
         gap, load = QuadraticGap.of(dataset), float(one["normal_load"])
         if gap is None:
@@ -169,6 +170,7 @@ class StepView:
         values = self.data[name].values
         if (values == NOT_KEPT).all() if name == "zone" else not np.isfinite(values).any():
             raise ValueError(f"the {words} of step {self.number} was not kept (output.every)")
+        _refuse_nonsense(words, values)
         return np.asarray(values, dtype=float)
 
     @property
@@ -212,6 +214,12 @@ class StepView:
         half_x = max(0.5 * margin * (x.max() - x.min()), 2 * self.spacing)
         half_y = max(0.5 * margin * (y.max() - y.min()), 2 * self.spacing)
         return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
+
+
+def _refuse_nonsense(words: str, values: Array) -> None:
+    """Refuse a field of a file that somebody has changed: what is computed with it would overflow."""
+    if (abs(values) > LARGEST).any():
+        raise ValueError(f"the {words} holds numbers that no contact has")
 
 
 def _loads(one: xarray.Dataset) -> str:

@@ -23,7 +23,7 @@ from typing import Self
 
 from .errors import DeckError, HexcontactError, ResourceError
 from .lock import Lock
-from .netcdf import flush, read_output, write
+from .netcdf import flush, read_output, reading, write
 from .record import SUFFIX, read_record, write_record
 from .result import Layout, Metadata, Result, Step, assemble
 
@@ -61,7 +61,10 @@ class Journal:
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
                 raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
-            yield read_record(record)[1]
+            step = read_record(record)[1]
+            if step.number != number:
+                raise DeckError(f"{record} is damaged: it holds step {step.number}")
+            yield step
 
     @property
     def metadata(self) -> Metadata:
@@ -82,7 +85,8 @@ class Journal:
 
     def result(self, path: Path) -> Result:
         """All finished steps as a result in memory; `path` is what the user calls it."""
-        dataset = assemble(self.metadata, self, self.complete)
+        with reading(self.folder, "a journal"):
+            dataset = assemble(self.metadata, self, self.complete)
         if self.stopped:
             dataset.attrs["stopped"] = self.stopped
         return Result(dataset, str(path))
@@ -271,6 +275,8 @@ class Store:
             )
             raise
         self.metadata = journal.metadata
+        with reading(self.folder, "a journal"):
+            Layout(self.metadata, self.heads)  # fails if the steps do not belong together
         self._in_the_way = self.path.exists() and not ours
         if self._in_the_way and self.path.stat().st_mtime > journal.records[0].stat().st_mtime:
             raise DeckError(

@@ -18,6 +18,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from .messages import MISSING, Problem, Source, deck_error, did_you_mean, listed, shown
 from .units import NUMBER, Dimension, UnitError, to_si
+from .variables import LARGEST
 
 
 def refuse(sentence: str) -> NoReturn:
@@ -30,8 +31,7 @@ def refuse_key(key: str, value: object, sentence: str) -> NoReturn:
     raise ValidationError.from_exception_data("", [_details(Problem((key,), value, sentence))])
 
 
-# Products of a few such numbers neither overflow nor vanish, and no contact is outside.
-SMALLEST, LARGEST = 1e-30, 1e30
+SMALLEST = 1.0 / LARGEST
 
 # --- kinds of values ----------------------------------------------------------------------------------------
 

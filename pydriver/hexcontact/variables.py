@@ -11,6 +11,9 @@ import numpy as np
 SCHEMA_VERSION = 1
 CONVENTIONS = "CF-1.11 UGRID-1.0"
 
+# Products of a few numbers between it and its inverse neither overflow nor vanish, and no contact is outside.
+LARGEST = 1e30
+
 NAN = float("nan")
 NOT_KEPT = -1  # zone of a step whose fields the deck chose not to keep (output.every)
 

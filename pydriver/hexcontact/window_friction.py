@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .edges import ContactEdges
+from .errors import DeckError
 from .estimators import area_radius
 from .load_history import LoadStep
 from .progress import RESIDUALS
@@ -146,14 +147,14 @@ def state_of(step: Step) -> ContactState:
 
     Raises
     ------
-    ValueError
+    DeckError
         If a field or a value is missing, as in a frictionless run.
     """
     from .native_friction import ContactState
 
     needed = {*FrictionWindow.state, *_SCALARS, *RESIDUALS.values(), "sweeps", "cuts"}
     if missing := needed - step.fields.keys() - step.history.keys():
-        raise ValueError(
+        raise DeckError(
             f"step {step.number} holds no state of a contact with friction: it lacks "
             f"{', '.join(sorted(missing))}"
         )

@@ -1,0 +1,85 @@
+"""Runs commands in this process and judges how they end: a clean result or a sentence, never anything else."""
+
+import contextlib
+import hashlib
+import io
+import json
+import re
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import typer
+
+CLEAN = {0, 2, 3, 4}  # exit codes of the documentation: done, input, no convergence, resources
+LONGEST = 20.0  # s of processor time, of which a command that hangs takes more
+_MARKED = re.compile(r"hexcontact: |step +\d+/|.*: \d+ load steps?(, after step \d+)?$")
+
+
+class Hang(BaseException):
+    """A command took too long."""
+
+
+class Ending(NamedTuple):
+    """How a command has ended."""
+
+    exit_code: int
+    out: str
+    error: str
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float = LONGEST) -> Iterator[None]:
+    """Raise `Hang` after some processor time."""
+
+    def ring(number: int, frame: Any) -> None:
+        raise Hang(f"more than {seconds} s")
+
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def ending(command: Callable[..., Any], **options: Any) -> Ending:
+    """Run a command as the command line would, but for reading the arguments."""
+    out, error, code = io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), time_limit():
+        try:
+            command(**options)
+        except typer.Exit as exit_:
+            code = exit_.exit_code
+    return Ending(code, out.getvalue(), error.getvalue())
+
+
+def complaints(end: Ending, as_json: bool = True) -> list[str]:
+    """Return what is wrong with the way in which a command has ended."""
+    found = []
+    if end.exit_code not in CLEAN:
+        found.append(f"exit code {end.exit_code}")
+    if bool(end.exit_code) != any(line.startswith("hexcontact: ") for line in end.error.splitlines()):
+        found.append("an error without a sentence, or a sentence without an error")
+    if "Traceback" in end.error:
+        found.append("traceback")
+    found += [f"not marked as ours: {line!r}" for line in end.error.splitlines() if not _MARKED.match(line)]
+    if as_json:
+        try:
+            told = json.loads(end.out, parse_constant=lambda word: found.append(f"{word} in JSON"))
+            if told["exit_code"] != end.exit_code or ("error" in told) != bool(end.exit_code):
+                found.append("the object does not say how the command has ended")
+        except (ValueError, KeyError, TypeError) as error:
+            found.append(f"standard output is not JSON: {error!r}")
+    return found
+
+
+def contents(folder: Path, *passed_over: str) -> dict[str, str]:
+    """Return what is in a folder, by name: the hash of every file."""
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in passed_over
+    }

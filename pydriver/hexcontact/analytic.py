@@ -15,11 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypedDict, Unpack, cast
+from typing import TypedDict, Unpack
 
 import numpy as np
 import scipy  # its parts are loaded when they are first used: a fifth of a second
 from numpy.typing import ArrayLike, NDArray
+
+from .arguments import number, reals
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array], Array]
@@ -60,7 +62,7 @@ class AxisymmetricContact:
 
     def pressure(self, r: ArrayLike) -> Array:
         """Contact pressure (Pa) at distance ``r`` (m, any shape) from the axis; 0 outside the contact."""
-        radius: Array = np.abs(np.asarray(r, dtype=np.float64))
+        radius: Array = np.abs(reals(r, "r"))
         inside = radius <= self.contact_radius
         p = np.zeros(radius.shape)
         p[inside] = self._pressure(radius[inside])
@@ -93,7 +95,7 @@ class EllipticContact:
 
     def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Contact pressure (Pa) at the points (x, y) (m, broadcast); 0 outside the contact."""
-        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        x, y = reals(x, "x"), reals(y, "y")
         along = x * np.cos(self.angle) + y * np.sin(self.angle)
         across = y * np.cos(self.angle) - x * np.sin(self.angle)
         inside = 1.0 - (along / self.semi_major) ** 2 - (across / self.semi_minor) ** 2
@@ -112,9 +114,9 @@ def _one_of(given: Given, with_radius: bool = True) -> tuple[str, float]:
     if len(given) != 1 or not set(given) <= set(names):
         raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
     [(name, value)] = given.items()
-    number = float(cast(float, value))
-    _positive(**{name: number})
-    return name, number
+    found = number(value, name, "a positive number")
+    _positive(**{name: found})
+    return name, found
 
 
 # ----------------------------------------------------------------------------------- power laws
@@ -411,7 +413,7 @@ def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[
     EllipticContact
     """
     _positive(effective_modulus=effective_modulus)
-    tensor = np.asarray(hessian, dtype=float)
+    tensor = reals(hessian, "hessian")
     if tensor.shape != (2, 2) or not np.allclose(
         tensor, tensor.T, rtol=0.0, atol=1e-12 * np.abs(tensor).max()
     ):

@@ -12,6 +12,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import reals
+
 Array = NDArray[np.float64]
 
 
@@ -50,7 +52,7 @@ class MindlinContact:
         return 3.0 * self.sliding_load * self.compliance / (16.0 * self.contact_radius)
 
     def _fraction(self, load: ArrayLike) -> Array:
-        f = np.asarray(load, dtype=float) / self.sliding_load
+        f = reals(load, "load") / self.sliding_load
         if np.any(np.abs(f) > 1.0):
             raise ValueError("the tangential load is larger than mu P")
         return f
@@ -66,7 +68,7 @@ class MindlinContact:
 
     def load(self, shift: ArrayLike) -> Array:
         """Tangential load (N) under a first prescribed shift (m): mu P [1 - (1 - Delta/Delta_s)^(3/2)]."""
-        d = np.asarray(shift, dtype=float) / self.sliding_shift
+        d = reals(shift, "shift") / self.sliding_shift
         return np.asarray(self.sliding_load * np.sign(d) * (1.0 - np.maximum(1.0 - np.abs(d), 0.0) ** 1.5))
 
     def traction(self, r: ArrayLike, load: float) -> Array:
@@ -83,7 +85,7 @@ class MindlinContact:
     def _sliding_traction(self, r: ArrayLike, radius: float) -> Array:
         """Semi-ellipsoid of the curvature of mu p over the circle of the given radius (Pa)."""
         a = self.contact_radius
-        inside = np.maximum(radius**2 - np.asarray(r, dtype=float) ** 2, 0.0)
+        inside = np.maximum(radius**2 - reals(r, "r") ** 2, 0.0)
         return np.asarray(1.5 * self.sliding_load / (np.pi * a**3) * np.sqrt(inside))
 
     def shift_unloading(self, load: ArrayLike, peak: float) -> Array:
@@ -256,7 +258,7 @@ class PlaneCattaneo:
     def traction(self, x: ArrayLike, load: float) -> Array:
         """Shear traction (Pa) at distance x (m) from the middle under a first loading to Q' (N/m)."""
         b, c = self.half_width, self.stick_half_width(load)
-        x2 = np.asarray(x, dtype=float) ** 2
+        x2 = reals(x, "x") ** 2
         slope = 2.0 * self.friction_coefficient * self.normal_load / (np.pi * b**2)
         parts = [np.sqrt(np.maximum(half**2 - x2, 0.0)) for half in (b, c)]
         return np.asarray(np.sign(load) * slope * (parts[0] - parts[1]))

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from . import deck as decks
 from . import grid as grids
 from . import native, native_friction
-from .case_arguments import as_toml, body_keys, given, middle_of, with_radians
+from .arguments import reals
+from .case_arguments import as_toml, body_keys, given, middle_of, segments
 from .case_checks import algorithm_of, checked_deck
 from .deck import Deck
 from .deck_assembly import Assembled, assemble
@@ -25,6 +26,7 @@ from .messages import MISSING, Problem, Source, deck_error
 from .native import ElasticPair, Method
 from .surfaces import Separation, Surface
 from .validation import SMALLEST
+from .variables import LARGEST
 
 if TYPE_CHECKING:
     from .progress import Reporter
@@ -208,7 +210,7 @@ class Case:
         every: int | None = None,
         title: str = "",
     ) -> None:
-        array = None if gap is None or callable(gap) else np.array(gap, dtype=float)
+        array = None if gap is None or callable(gap) else reals(gap, "gap").copy()
         if lattice is not None:
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
             if gap is None:  # so that the deck of the case finds the same window again
@@ -236,7 +238,7 @@ class Case:
                 algorithm=algorithm, method=method, tolerance=tolerance, coupling=coupling, entry=entry
             )
             or None,
-            load=[with_radians(load) for load in ([loads] if isinstance(loads, Mapping) else loads)],
+            load=segments(loads),
             output=given(fields=fields, every=every) or None,
         )
         self._set_up(assemble(data, None, Source(), Path()), gap if callable(gap) else array, lattice)
@@ -366,6 +368,8 @@ class Case:
             )
         if np.isnan(gap).any() or np.isneginf(gap).any():
             raise DeckError("gap: expected numbers, or inf where nothing can touch, at every node")
+        if (abs(gap[np.isfinite(gap)]) > LARGEST).any():
+            raise DeckError(f"gap: expected lengths of at most {LARGEST:g} m, or inf where nothing can touch")
         return gap, np.isfinite(gap)
 
     def grown(self, lattice: Lattice, contact: NDArray[np.bool_] | None = None) -> Lattice:
@@ -511,7 +515,7 @@ class Case:
         if self._surface_gap is not None:
             return self._surface_gap(x, y)
         assert callable(self._given_gap)
-        gap = np.asarray(self._given_gap(x, y), dtype=float)
+        gap = reals(self._given_gap(x, y), "gap")
         if gap.shape != np.shape(x):
             raise DeckError(f"gap: expected an array of the shape of x, {np.shape(x)}, not {gap.shape}")
         if (bad := np.isnan(gap)).any():

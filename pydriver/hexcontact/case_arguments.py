@@ -38,6 +38,13 @@ def body_keys(body: Body | Mapping[str, Any]) -> Any:
     return {**keys, "rigid": True} if body.rigid else keys
 
 
+def segments(loads: Any) -> Any:
+    """Return the entries of [[load]]; whatever are none is left to the deck to refuse."""
+    if isinstance(loads, Mapping):
+        return [with_radians(loads)]
+    return [with_radians(load) for load in loads] if isinstance(loads, list | tuple) else plain(loads)
+
+
 def with_radians(load: Any) -> Any:
     """Give bare angles of a load their unit: in Python, unlike in a deck, all numbers are SI."""
     if not isinstance(load, Mapping):

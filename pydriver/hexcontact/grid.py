@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .arguments import reals
 from .deck import Grid
 from .lattice import Lattice
 from .messages import MISSING, Problem
@@ -203,7 +204,7 @@ def _starting_half_size(
     x = center[0] + radii[:, None] * np.cos(angles)
     y = center[1] + radii[:, None] * np.sin(angles)
     with np.errstate(all="ignore"):
-        height = np.asarray(gap(x, y), float)
+        height = reals(gap(x, y), "gap")
         height = np.where(np.isfinite(height), height, np.inf)
         # The median over the directions: some of them may lie outside of a punch or along a groove.
         profile = np.median(height, axis=1) - height.min()

@@ -14,7 +14,6 @@ The potential of a unit load at the apex of a pyramid, (3 sqrt(3)/2) ln 3:
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from .arguments import integer, number, reals
 from .errors import DeckError
 from .native import raise_for
 
@@ -133,7 +133,7 @@ def triangle_integral(vertices: ArrayLike, x: ArrayLike, y: ArrayLike, j: int, k
     >>> round(float(sum(triangle_integral(t, 0.5, 0.5, 1, 0, 0) for t in square)), 6)
     3.525494
     """
-    exponents = {name: _integer(value, name) for name, value in (("j", j), ("k", k), ("m", m))}
+    exponents = {name: _exponent(value, name) for name, value in (("j", j), ("k", k), ("m", m))}
     return _evaluate(_flat.triangle_integral, x, y, vertices=_vertices(vertices), **exponents)
 
 
@@ -183,8 +183,8 @@ def triangle_displacement(
         direction=_choice(direction, _DIRECTIONS, "direction"),
         k=k,
         m=m,
-        shear_modulus=_number(shear_modulus, "shear_modulus"),
-        poisson_ratio=_number(poisson_ratio, "poisson_ratio"),
+        shear_modulus=number(shear_modulus, "shear_modulus"),
+        poisson_ratio=number(poisson_ratio, "poisson_ratio"),
     )
     return Displacement(*components)
 
@@ -223,7 +223,7 @@ def linear_load_displacement(
     DeckError
         If an argument is not a finite number, has the wrong shape or is out of range.
     """
-    loads = _array(traction, "traction")
+    loads = reals(traction, "traction")
     if loads.shape != (3, 3):
         raise DeckError(f"traction: an array of shape {loads.shape}, expected (3, 3): x, y, z at each corner")
     components = _evaluate(
@@ -232,8 +232,8 @@ def linear_load_displacement(
         y,
         vertices=_vertices(vertices),
         traction=loads.T,
-        shear_modulus=_number(shear_modulus, "shear_modulus"),
-        poisson_ratio=_number(poisson_ratio, "poisson_ratio"),
+        shear_modulus=number(shear_modulus, "shear_modulus"),
+        poisson_ratio=number(poisson_ratio, "poisson_ratio"),
     )
     return Displacement(*components)
 
@@ -283,7 +283,7 @@ def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> Pyram
     DeckError
         If an argument is not a finite number or out of range, or the shapes do not broadcast.
     """
-    nu = _number(poisson_ratio, "poisson_ratio")
+    nu = number(poisson_ratio, "poisson_ratio")
     if not -1.0 < nu <= 0.5:
         raise DeckError(f"poisson_ratio = {nu:g}: a number above -1 and at most 0.5 expected")
     nu_0 = nu / (1.0 - nu)
@@ -292,20 +292,9 @@ def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> Pyram
     return PyramidFunctions(k1, kx, ky, kx, k1 + nu_0 * kxx, kxy, ky, kxy, k1 + nu_0 * kernels.Kyy)
 
 
-def _array(values: ArrayLike, name: str) -> Array:
-    """Return an argument as real numbers."""
-    try:
-        array = np.asarray(values)
-        if np.iscomplexobj(array):
-            raise TypeError("complex numbers")
-        return array.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
-        raise DeckError(f"{name}: an array of real numbers expected") from error
-
-
 def _evaluate(procedure: Callable[..., Any], x: ArrayLike, y: ArrayLike, **arguments: Any) -> Array:
     """Call the core for all points; the result has the shape of the points behind that of one value."""
-    px, py = _array(x, "x"), _array(y, "y")
+    px, py = reals(x, "x"), reals(y, "y")
     try:
         px, py = np.broadcast_arrays(px, py)
     except ValueError as error:
@@ -319,29 +308,17 @@ def _evaluate(procedure: Callable[..., Any], x: ArrayLike, y: ArrayLike, **argum
 
 def _vertices(vertices: ArrayLike) -> Array:
     """Return the corners of a triangle as columns."""
-    corners = _array(vertices, "vertices")
+    corners = reals(vertices, "vertices")
     if corners.shape != (3, 2):
         raise DeckError(f"vertices: an array of shape {corners.shape}, expected (3, 2): three points")
     return corners.T
 
 
-def _integer(value: int, name: str) -> int:
-    """Return an argument as an integer that the core can take."""
-    try:
-        number = operator.index(value)
-    except TypeError as error:
-        raise DeckError(f"{name} = {value!r}: an integer expected") from error
-    if abs(number) > 99:
-        raise DeckError(f"{name} = {number}: an integer from 0 to 4 expected")
-    return number
-
-
-def _number(value: float, name: str) -> float:
-    """Return an argument as a real number."""
-    try:
-        return float(value)
-    except (TypeError, ValueError) as error:
-        raise DeckError(f"{name} = {value!r}: a number expected") from error
+def _exponent(value: int, name: str) -> int:
+    """Return an exponent; the core knows those from 0 to 4."""
+    if abs(found := integer(value, name)) > 99:
+        raise DeckError(f"{name} = {found}: an integer from 0 to 4 expected")
+    return found
 
 
 def _choice(value: str, known: Mapping[str, _T], name: str) -> _T:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
+from .arguments import integer, number
 from .errors import DeckError
 
 
@@ -39,8 +40,11 @@ class Lattice:
     origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise DeckError(f"spacing = {self.spacing!r}: expected a positive length in meters")
+        kind = "a positive length in meters"
+        if not 0 < number(self.spacing, "spacing", kind) < np.inf:
+            raise DeckError(f"spacing = {self.spacing!r}: expected {kind}")
+        for name in ("row_first", "col_first", "n_row", "n_col"):
+            integer(getattr(self, name), name)
         if self.n_row < 1 or self.n_col < 1:
             raise DeckError(
                 f"window = [{self.n_row}, {self.n_col}]: expected at least one row and one column"

@@ -122,7 +122,7 @@ def shown(value: object, width: int = 60, depth: int = 5) -> str:
         text = "[" + ", ".join(shown(entry, width, depth - 1) for entry in value[:width]) + "]"
     elif isinstance(value, int):
         text = hex(value) if value.bit_length() > 200 else str(value)
-    elif hasattr(value, "__float__"):
+    elif hasattr(value, "__float__") and not getattr(value, "shape", ()):
         text = repr(float(value))
     else:
         text = str(value)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from .arguments import number, reals
 from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
 from .lattice import Lattice
 
@@ -36,9 +37,7 @@ def raise_for(code: int, message: bytes) -> None:
 
 def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
     """Return finite values over the window as one contiguous vector."""
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.shape != lattice.shape:
-        raise DeckError(f"{name}: an array of shape {array.shape}, expected {lattice.shape} (rows, columns)")
+    array = np.ascontiguousarray(shaped(values, lattice, name))
     if not np.isfinite(array).all():
         raise DeckError(f"{name}: {np.count_nonzero(~np.isfinite(array))} values are not finite numbers")
     return array.ravel()
@@ -46,12 +45,27 @@ def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.
 
 def checked_mask(candidate: ArrayLike | None, lattice: Lattice) -> NDArray[np.bool_]:
     """Return the nodes that may touch; None means all."""
-    mask = np.ones(lattice.shape, dtype=bool) if candidate is None else np.asarray(candidate, dtype=bool)
+    mask = np.ones(lattice.shape, dtype=bool) if candidate is None else reals(candidate, "candidate") != 0
     if mask.shape != lattice.shape:
         raise DeckError(
             f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)"
         )
     return mask
+
+
+def shaped(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
+    """Return values over the window, whatever they are."""
+    array = reals(values, name)
+    if array.shape != lattice.shape:
+        raise DeckError(f"{name}: an array of shape {array.shape}, expected {lattice.shape} (rows, columns)")
+    return array
+
+
+def checked_tolerance(tolerance: float) -> None:
+    """Refuse what can be no bound of residuals."""
+    kind = "a number between 0 and 1"
+    if not 0 < number(tolerance, "tolerance", kind) < 1:
+        raise DeckError(f"tolerance = {tolerance!r}: expected {kind}")
 
 
 def method_code(name: str) -> int:
@@ -104,7 +118,9 @@ class ElasticPair:
         bodies = [(young_modulus_1, poisson_ratio_1), (young_modulus_2, poisson_ratio_2)]
         rigid = [young is None for young, _ in bodies]
         constants, code, message = _api.elastic_constants(
-            [young or 0.0 for young, _ in bodies], [poisson or 0.0 for _, poisson in bodies], rigid
+            [0.0 if young is None else number(young, "young_modulus") for young, _ in bodies],
+            [0.0 if poisson is None else number(poisson, "poisson_ratio") for _, poisson in bodies],
+            rigid,
         )
         raise_for(code, message)
         return cls(*constants.tolist())
@@ -246,9 +262,10 @@ class NormalContact:
         self.lattice = lattice
         mask = checked_mask(candidate, lattice)
         # nodes that can never touch may have any gap, also none at all
-        gap = np.where(mask, np.asarray(initial_gap, dtype=np.float64), 0.0)
+        given = shaped(initial_gap, lattice, "initial_gap")
+        gap = np.where(mask, given, 0.0)
         self._mask = mask
-        self._outside = np.asarray(initial_gap, dtype=np.float64)[~mask]
+        self._outside = given[~mask]
         self._handle, code, message = _api.create_normal_contact(
             method_code(method),
             lattice.basis.T,
@@ -290,17 +307,16 @@ class NormalContact:
         """
         if (normal_load is None) == (approach is None):
             raise DeckError("expected either a normal load or an approach")
-        target = normal_load if normal_load is not None else approach
-        assert target is not None
-        if not np.isfinite(target) or (normal_load is not None and normal_load < 0):
-            name, kind = (
-                ("approach", "a number")
-                if normal_load is None
-                else ("normal_load", "a number not below zero")
-            )
-            raise DeckError(f"{name} = {target!r}: expected {kind}")
-        if not 0 < tolerance < 1:
-            raise DeckError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
+        if normal_load is not None:
+            kind = "a number not below zero"
+            target = number(normal_load, "normal_load", kind)
+            if not 0 <= target < np.inf:
+                raise DeckError(f"normal_load = {normal_load!r}: expected {kind}")
+        else:
+            target = number(approach, "approach")
+            if not np.isfinite(target):
+                raise DeckError(f"approach = {approach!r}: expected a number")
+        checked_tolerance(tolerance)
         out: Any = _api.solve_normal_contact(
             self._handle, 1 if approach is None else 2, target, tolerance, max_sweeps, self.lattice.size
         )

@@ -15,9 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from .arguments import number, reals
 from .errors import DeckError
 from .lattice import Lattice
-from .native import ElasticPair, Method, checked_field, checked_mask, method_code, raise_for
+from .native import (
+    ElasticPair,
+    Method,
+    checked_field,
+    checked_mask,
+    checked_tolerance,
+    method_code,
+    raise_for,
+    shaped,
+)
 
 _api = _core.hc_f2py_friction
 
@@ -156,15 +166,14 @@ class FrictionalContact:
     ) -> None:
         self.lattice = lattice
         mask = checked_mask(candidate, lattice)
-        if not friction_coefficient >= 0:
-            raise DeckError(
-                f"friction_coefficient = {friction_coefficient!r}: expected a number of at least 0, or inf"
-            )
+        kind = "a number of at least 0, or inf"
+        if not number(friction_coefficient, "friction_coefficient", kind) >= 0:
+            raise DeckError(f"friction_coefficient = {friction_coefficient!r}: expected {kind}")
         if coupling not in ("full", "goodman"):
             raise DeckError(f"coupling = {coupling!r}: expected 'full' or 'goodman'")
         # nodes that can never touch may have any gap, also none at all
         self._mask = mask
-        self._gap = np.asarray(initial_gap, dtype=np.float64)
+        self._gap = shaped(initial_gap, lattice, "initial_gap")
         self._handle, code, message = _api.create_frictional_contact(
             method_code(method),
             lattice.basis.T,
@@ -229,27 +238,29 @@ class FrictionalContact:
             ``touches_rim`` (contact at the rim of the window, where the advance ends: go on from the
             old state on a larger one).
         """
-        if len(control) != 4 or any(word not in _CONTROLS for word in control):
+        if not isinstance(control, list | tuple) or len(control) != 4 or not set(control) <= _CONTROLS.keys():
             raise DeckError(f"control = {control!r}: expected four of 'force' and 'displacement'")
-        if len(value) != 4 or not np.isfinite(value).all():
+        targets = reals(value, "value")
+        if targets.shape != (4,) or not np.isfinite(targets).all():
             raise DeckError(f"value = {value!r}: expected four finite numbers")
-        if control[0] == "force" and value[0] < 0:
-            raise DeckError(f"normal_load = {value[0]!r}: expected a number not below zero")
+        if control[0] == "force" and targets[0] < 0:
+            raise DeckError(f"normal_load = {targets[0]:g}: expected a number not below zero")
         if entry not in ("implicit", "interpolated"):
             raise DeckError(f"entry = {entry!r}: expected 'implicit' or 'interpolated'")
-        if not 0 < tolerance < 1:
-            raise DeckError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
+        checked_tolerance(tolerance)
         fields = np.empty((self.lattice.size, len(_FIELDS)), order="F")
         for column, name in enumerate(_FIELDS):
             values = getattr(state, name)
             fields[:, column] = checked_field(
-                np.where(self._mask, values, 0.0) if name == "gap" else values, self.lattice, name
+                np.where(self._mask, shaped(values, self.lattice, name), 0.0) if name == "gap" else values,
+                self.lattice,
+                name,
             )
         numbers = [getattr(state, name) for name in _NUMBERS]
         out: Any = _api.advance_friction(
             self._handle,
             [_CONTROLS[word] for word in control],
-            value,
+            targets,
             int(static),
             int(entry == "interpolated"),
             tolerance,

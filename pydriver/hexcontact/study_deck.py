@@ -64,7 +64,7 @@ class Parameter(Table):
         """Values or a range, never both."""
         if data.get("key") == "":
             yield "key", "expected a dotted key of the deck, such as load.1.normal_load"
-        if "values" not in data and "range" not in data:
+        if data.get("values") is None and data.get("range") is None:
             yield "values", "missing; expected values or range"
         if "values" in data:
             for key in ("range", "count", "scale"):

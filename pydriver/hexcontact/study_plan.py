@@ -147,7 +147,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     try:
         deck = Deck.parse(with_overrides(base, first), about)
     except DeckError as error:
-        raise DeckError(_with_case(str(error), about, 1, first)) from None
+        raise DeckError(_with_case(str(error), about, 1, first), error.faults) from None
     axes = tuple(_axis(entry, deck, file.combine, study) for entry in file.parameter)
     _refuse_namesakes(axes, study)
     settings = _settings(file, axes, study)

@@ -11,7 +11,7 @@ import math
 import operator
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn, Self
+from typing import Any, NoReturn, Self, TypeGuard
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
@@ -188,7 +188,7 @@ class Several(Kind):
         return f"{number} {self.plural} such as {self.example}"
 
     def _parse(self, value: object) -> tuple[Any, ...]:
-        if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
+        if isinstance(value, str | bytes | Mapping) or not _is_array(value):
             refuse(f"expected {self.expected}")
         entries = list(value)
         if not entries or self.count not in (None, len(entries)):
@@ -200,6 +200,11 @@ class Several(Kind):
             except PydanticCustomError as error:
                 refuse(f"expected {self.expected}; entry {number}, {shown(entry)}: {error.message()}")
         return tuple(parsed)
+
+
+def _is_array(value: object) -> TypeGuard[Iterable[Any]]:
+    """Tell whether something has entries in an order: a list, a tuple, an array of numpy."""
+    return hasattr(value, "__getitem__") and hasattr(value, "__len__") and getattr(value, "shape", (1,)) != ()
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ def reals(values: ArrayLike, name: str) -> NDArray[np.float64]:
         if array.dtype.kind not in "biuf" or values is None:
             raise TypeError(f"values of the type {array.dtype}")
         return array.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise DeckError(f"{name}: an array of real numbers expected") from error
 
 

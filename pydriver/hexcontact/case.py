@@ -284,6 +284,8 @@ class Case:
         folder: Path = Path(),
         overrides: Mapping[str, Any] | None = None,
     ) -> Case:
+        if not isinstance(data, Mapping):
+            raise DeckError("a deck: expected tables of keys")
         case = cls.__new__(cls)
         case._set_up(assemble(data, text, source, folder, overrides), None, None)
         return case

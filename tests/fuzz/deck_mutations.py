@@ -3,44 +3,36 @@
 import random
 import re
 from collections.abc import Callable
+from pathlib import Path
 
-VALUES = (  # instead of what a deck says
-    *("0", "-1", "1", "2", "0.5", "-0.0", "1e308", "-1e308", "1e-308", "5e-324", "1e400", "1e30", "-1e-30"),
-    *("nan", "inf", "-inf", "true", "false", "999999999999999999999", "0x7fffffff", "100000", "99999", "1_000"),
-    *('""', '" "', '"1"', '"nan"', '"inf m"', '"-1 N"', '"1 mm"', '"1 m"', '"1 GPa"', '"1 banana"', '"1e999 m"'),
-    *('"1 N m"', '"3 deg"', '"1 rad"', '"1 mm mm mm"', '"1/0 m"', '"m"', '"1e3"', '"10**10**10 m"', '"(1 m"'),
-    *('"1 degC"', '"1 m + 1"', '"µm"', '"١ mm"', '"1 µm"', '"\\u0000"', '"😀"', '"auto"', '"cubic"', '"/etc/passwd"'),
-    *("[]", "[[]]", "[1]", "[1, 2]", "[1, 2, 3]", "[nan, 1]", '["1 mm", "1 mm"]', '["a", 1]', "[1e300, 1e300]"),
-    *("{}", "{ a = 1 }", '{ shape = "sphere" }', "[{}]", "1979-05-27", "07:32:00", "1979-05-27T07:32:00Z"),
-    *('"""\ntext\n"""', "'''x'''", '"' + "x" * 5000 + '"', "[" * 60 + "]" * 60, "{a=" * 40 + "1" + "}" * 40),
-    *('"no_such_file.csv"', '"."', '".."', '"\\\\"', '"a\\tb"', '"[red]x[/red]"', '"%s%n{}"', "1.7976931348623157e308"),
-)
-WORDS = (  # keys and headers that belong somewhere else, or nowhere
-    *("spacing", "nodes_across", "nodes_in_radius", "window", "extent", "normal_load", "approach", "steps", "path"),
-    *("repeat", "series", "values", "ramp", "torque", "twist", "shift_x", "tangential_load_x", "include", "file"),
-    *("surface", "rigid", "poisson_ratio", "young_modulus", "coefficient", "tolerance", "method", "algorithm"),
-    *("every", "fields", "title", "unknown", "größe", '""', '"a.b"', "a.b.c", "Spacing", "label", "origin", "center"),
-)
-TABLES = (
-    *("[grid]", "[[grid]]", "[body]", "[body.1]", "[body.3]", "[[body.1]]", "[load]", "[[load]]", "[friction]"),
-    *("[solver]", "[output]", "[[load.path]]", "[nothing]", "[a.b.c.d]", "[", "[[load", "[body.1.surface]"),
-)
+_ODD = [
+    [line for line in block.splitlines() if not line.startswith("# ")]
+    for block in Path(__file__).with_name("odd_words.txt").read_text(encoding="utf-8").split("\n\n")
+]
+VALUES, KEYS, TABLES = _ODD  # instead of what a deck says
+VALUES += ['"""\ntext\n"""', '"' + "x" * 5000 + '"', "[" * 60 + "]" * 60, "{a=" * 40 + "1" + "}" * 40]
 LINES = (
-    *("nodes_across = 99999", "steps = 100000", "repeat = 100000", "spacing = 1e-30", 'window = [100000, 100000]'),
-    *("window = [5, 99999]", 'extent = ["1 km", "1 km"]', "nodes_in_radius = 100000", 'spacing = "1 pm"'),
-    *("[[load]]\nnormal_load = 1\nsteps = 99999", "normal_load = 1e30", 'approach = "1 km"', "tolerance = 1e-14"),
-    *("coefficient = inf", "coefficient = 1e300", "rigid = true", "\x00", "\ufeff", "= 1", "a = ", "# é", "\r\r\n"),
-    *("[[load]]\npath = [{ normal_load = 1 }]\nrepeat = 50000", 'include = ["deck.toml"]', "values = [0.1, 0.1, 1]"),
+    *("nodes_across = 99999", "steps = 100000", "repeat = 100000", "spacing = 1e-30", 'spacing = "1 pm"'),
+    *("window = [5, 99999]", "window = [100000, 100000]", 'extent = ["1 km", "1 km"]', "normal_load = 1e30"),
+    *("nodes_in_radius = 100000", "[[load]]\nnormal_load = 1\nsteps = 99999", 'approach = "1 km"'),
+    *("tolerance = 1e-14", "coefficient = inf", "coefficient = 1e300", "rigid = true", "\x00", "\ufeff"),
+    *("= 1", "a = ", "# é", "\r\r\n", 'include = ["deck.toml"]', "values = [0.1, 0.1, 1]"),
+    "[[load]]\npath = [{ normal_load = 1 }]\nrepeat = 50000",
 )
 _VALUE = re.compile(r"(?<==)\s*(\"[^\"\n]*\"|[-+\w.]+)")
 _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _KEY = re.compile(r"\b[a-z]\w*(?=\s*=)")
 _UNIT = re.compile(r"(?<=\d )[A-Za-zµ]+(?=\")")
-_UNITS = ("m", "mm", "um", "km", "pm", "lightyear", "N", "kN", "GN", "lbf", "Pa", "GPa", "psi", "deg", "rad", "K", "s")
+_UNITS = (
+    *("m", "mm", "um", "km", "pm", "lightyear", "N", "kN", "GN", "lbf", "Pa", "GPa", "psi"),
+    *("deg", "rad", "K", "s"),
+)
 
 
-def mutated(text: str, rng: random.Random) -> bytes:
-    """Return a deck with one to three mutations."""
+def mutated(text: str, rng: random.Random, gently: bool = False) -> bytes:
+    """Return a deck with one to three mutations; gently: with one of a number or a line, if any."""
+    if gently:
+        return rng.choice(_GENTLE)(text, rng).encode()
     for _ in range(rng.choice((1, 1, 1, 2, 2, 3))):
         text = rng.choice(_STRUCTURED if rng.random() < 0.8 else _OF_TEXT)(text, rng)
     data = text.encode("utf-8", "surrogatepass")
@@ -68,12 +60,16 @@ def _number(text: str, rng: random.Random) -> str:
     return _at(_NUMBER, text, rng, scaled)
 
 
+def _a_little(text: str, rng: random.Random) -> str:
+    return _at(_NUMBER, text, rng, lambda word: f"{float(word) * rng.uniform(0.3, 3):.6g}")
+
+
 def _unit(text: str, rng: random.Random) -> str:
     return _at(_UNIT, text, rng, lambda _: rng.choice(_UNITS))
 
 
 def _key(text: str, rng: random.Random) -> str:
-    return _at(_KEY, text, rng, lambda _: rng.choice(WORDS))
+    return _at(_KEY, text, rng, lambda _: rng.choice(KEYS))
 
 
 def _typo(text: str, rng: random.Random) -> str:
@@ -125,7 +121,7 @@ def _cut(text: str, rng: random.Random) -> str:
 
 def _character(text: str, rng: random.Random) -> str:
     place = rng.randrange(len(text) + 1)
-    new = rng.choice(("", '"', "[", "]", "{", "=", "\n", "'", "\\", "#", ".", ",", "\t", "é", "\u202e", "\x07", "😀", "e9"))
+    new = rng.choice(("", '"', "e9", "\n", "\t", "\u202e", "\x07", *"[]{}='\\#.,é😀"))
     return text[:place] + new + text[place + rng.randint(0, 3) :]
 
 
@@ -137,7 +133,11 @@ def _deep(text: str, rng: random.Random) -> str:
     return f"{text}\nx = {kind * depth}{'1'}{('}' if kind != '[' else ']') * depth}\n"
 
 
-_STRUCTURED = (_value, _value, _value, _value, _number, _number, _unit, _key, _typo, _without_line, _line_twice, _line_more, _table)
+_STRUCTURED = (
+    *(_value, _value, _value, _value, _number, _number, _unit, _key, _typo),
+    *(_without_line, _line_twice, _line_more, _table),
+)
+_GENTLE = (_a_little, _a_little, _a_little, _number, _without_line, _line_more, _value)
 _OF_TEXT = (_cut, _character, _character, _lines_swapped, _deep, _many)
 
 

@@ -1,28 +1,32 @@
-"""Results and journals with damage: bytes, attributes, variables, records; the same damage for the same seed."""
+"""Results and journals with damage: bytes, attributes, variables, records; the same for the same seed."""
 
 import io
 import json
 import random
 import shutil
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import netCDF4
 import numpy as np
-
 from fuzz.deck_mutations import garbled
 
-ODD = ("", "nan", "x" * 3000, "\x00", "é", 0, -1, 7, 2**31 - 1, np.nan, np.inf, -1e308, 1e-308, np.zeros(3), np.zeros(0))
+ODD = (
+    *("", "nan", "x" * 3000, "\x00", "é", 0, -1, 7, 2**31 - 1, np.nan, np.inf, -1e308, 1e-308),
+    *(np.zeros(3), np.zeros(0)),
+)
+REWRITTEN = ("attribute", "no attribute", "no variable", "values", "type", "size", "of variable", "swap")
+RECORDS = ("bytes", "truncated", "gone", "text", "array", "text value", "folder", "more", "lock", "stopped")
 _CLASSIC = ("i1", "i2", "i4", "f4", "f8", "S1")  # types of variables
 
 
 def damaged(source: Path, target: Path, rng: random.Random) -> str:
     """Write a damaged copy of a result; return in a few words what was done."""
-    kinds: tuple[Callable[[Path, Path, random.Random], str], ...] = (_bytes, _bytes, _truncated, _other, _rewritten)
-    weights = (3, 2, 2, 1, 8)
-    return rng.choices(kinds, weights)[0](source, target, rng)
+    kinds: dict[Callable[[Path, Path, random.Random], str], int] = {
+        **{_bytes: 5, _truncated: 2, _other: 1, _rewritten: 8},
+    }
+    return rng.choices(list(kinds), list(kinds.values()))[0](source, target, rng)
 
 
 def _bytes(source: Path, target: Path, rng: random.Random) -> str:
@@ -60,11 +64,11 @@ def _other(source: Path, target: Path, rng: random.Random) -> str:
 
 
 def _rewritten(source: Path, target: Path, rng: random.Random) -> str:
-    """Write the file again with one attribute or variable that is gone, of another kind or full of nonsense."""
+    """Write the file again with an attribute or variable gone, of another kind or full of nonsense."""
     with netCDF4.Dataset(source) as old, netCDF4.Dataset(target, "w", format="NETCDF4") as new:
         attributes = {name: old.getncattr(name) for name in old.ncattrs()}
         names, sizes = list(old.variables), {name: len(dim) for name, dim in old.dimensions.items()}
-        what = rng.choice(("attribute", "no attribute", "no variable", "values", "type", "size", "of variable", "swap"))
+        what = rng.choice(REWRITTEN)
         victim = rng.choice(list(attributes)) if "attribute" in what else rng.choice(names)
         if what == "attribute":
             attributes[victim] = rng.choice((*ODD, str(attributes[victim])[:-3]))
@@ -100,11 +104,12 @@ def _copy(old: Any, new: Any, sizes: dict[str, int], what: str, rng: random.Rand
     if kind == "S1":
         filled = np.full(shape, b"?", "S1")
     else:
-        filled = np.resize(values.astype(kind, casting="unsafe") if values.dtype.kind != "S" else [1], shape or (1,))
+        numbers = [1] if values.dtype.kind == "S" else values.astype(kind, casting="unsafe")
+        filled = np.resize(numbers, shape or (1,))
     if what == "values" and kind != "S1":
-        odd = rng.choice((0, -1, 77, 126)) if kind[0] == "i" else rng.choice((np.nan, np.inf, -1.0, 1e308, 0.0))
-        share = rng.choice((0.02, 1.0))
-        filled = np.where(np.random.default_rng(rng.randrange(1000)).random(filled.shape) < share, odd, filled)
+        odd = rng.choice((0, -1, 77, 126) if kind[0] == "i" else (np.nan, np.inf, -1.0, 1e308, 0.0))
+        places = np.random.default_rng(rng.randrange(1000)).random(filled.shape) < rng.choice((0.02, 1.0))
+        filled = np.where(places, odd, filled)
     elif old.dtype.kind == "S" and kind == "S1" and shape == values.shape:
         filled = values
     column[...] = filled.reshape(shape) if shape else filled.ravel()[0] if filled.size else 0
@@ -117,7 +122,7 @@ def damaged_journal(source: Path, target: Path, rng: random.Random) -> str:
     """Copy the folder of a journal with damage to one of its files; return what was done."""
     shutil.copytree(source, target)
     record = rng.choice(sorted(target.glob("*.npz")))
-    kind = rng.choice(("bytes", "truncated", "gone", "text", "array", "text value", "folder", "more", "lock", "stopped"))
+    kind = rng.choice(RECORDS)
     if kind == "bytes":
         record.write_bytes(garbled(record.read_bytes(), rng))
     elif kind == "truncated":
@@ -131,9 +136,10 @@ def damaged_journal(source: Path, target: Path, rng: random.Random) -> str:
         record.unlink()
         record.mkdir()
     elif kind == "more":
-        (target / rng.choice(("000000.npz", "000009.npz", "999999.npz", "000001.npz.tmp"))).write_bytes(b"x")
+        (target / rng.choice(("000000.npz", "000009.npz", "999999.npz", "1.npz.tmp"))).write_bytes(b"x")
     elif kind == "lock":
-        (target / "lock").write_bytes(rng.choice((b"", b"\xff\xfe", b"[]", b'{"process": "x", "host": 3}', b"{}")))
+        holders = b"", b"\xff\xfe", b"[]", b'{"process": "x", "host": 3}', b"{}"
+        (target / "lock").write_bytes(rng.choice(holders))
     else:
         (target / "stopped.txt").write_bytes(rng.randbytes(100))
     return f"{kind}: {record.name}"
@@ -146,22 +152,18 @@ def _rewrite_record(record: Path, kind: str, rng: random.Random) -> None:
     if kind == "array":
         name = rng.choice([name for name in arrays if name != "about"])
         values = arrays[name]
-        arrays[name] = rng.choice(
-            (values[:-1], values.ravel(), values.astype("i1"), values.astype(complex), values * np.nan, values[:0], values > 0)
-        )
+        shapes = values[:-1], values.ravel(), values[:0]
+        kinds = values.astype("i1"), values.astype(complex), values * np.nan, values > 0
+        arrays[name] = rng.choice((*shapes, *kinds))
     about = json.loads(arrays["about"].tobytes())
     if kind == "text":
         about = rng.choice(({}, [], 1, None, "x", {"journal_version": 1}, about | {"journal_version": 99}))
     elif kind == "text value":
-        table = rng.choice((about, about["metadata"], about["lattice"], about["history"], about["metadata"]["parameters"]))
+        metadata = about["metadata"]
+        table = rng.choice((about, metadata, metadata["parameters"], about["lattice"], about["history"]))
         name = rng.choice(list(table))
         table[name] = rng.choice((None, "", "x", -1, 0, 10**12, 1e308, [], {}, [1], {"a": 1}, True))
     arrays["about"] = np.frombuffer(json.dumps(about).encode(), "u1")
     with io.BytesIO() as archive:
         np.savez(archive, **arrays)
         record.write_bytes(archive.getvalue())
-
-
-def is_archive(path: Path) -> bool:
-    """Tell whether a record is at least an archive."""
-    return zipfile.is_zipfile(path)

@@ -1,4 +1,4 @@
-"""Opens damaged results in a process of its own, which the C libraries may crash; started by test_fuzz_files.py.
+"""Opens damaged results in a process of its own, which the C libraries may crash; see test_fuzz_files.py.
 
 ``python file_worker.py FOLDER FIRST LAST`` damages copies of the results in FOLDER by the seeds from FIRST to
 LAST - 1 and gives each to all that reads results. A line is printed before each command (so that a crash
@@ -15,8 +15,8 @@ from typing import Any
 
 import netCDF4  # noqa: F401 (before the time limit)
 import xarray  # noqa: F401
-
 from fuzz import file_damage, harness
+
 from hexcontact import cli_show, cli_solve
 from hexcontact.errors import HexcontactError
 from hexcontact.plot_choices import OF_A_RESULT
@@ -28,9 +28,14 @@ PICTURES = [name for name in OF_A_RESULT if name != "overview"]
 def commands(file: Path, folder: Path, rng: random.Random) -> list[tuple[str, Any, dict[str, Any]]]:
     """Return what is done with a file: name, command, options."""
     what = rng.choice(PICTURES)
+    tables = {"vtk": True, "ugrid": True, "csv": True}
     return [
         ("info", cli_show.info, {"file": file, "as_json": True}),
-        ("export", cli_show.export, {"file": file, "vtk": True, "ugrid": True, "csv": True, "output": folder / "e"}),
+        (
+            "export",
+            cli_show.export,
+            {"file": file, **tables, "output": folder / "tables"},
+        ),
         ("report", cli_show.report, {"file": file, "output": folder / "page.html"}),
         (f"plot {what}", cli_show.plot, {"files": [file], "what": what, "output": folder / "picture.svg"}),
         ("resume", cli_solve.resume, {"file": file, "quiet": True, "as_json": True}),

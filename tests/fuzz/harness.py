@@ -1,4 +1,4 @@
-"""Runs commands in this process and judges how they end: a clean result or a sentence, never anything else."""
+"""Runs commands in this process and judges how they end: a clean result or a sentence, nothing else."""
 
 import contextlib
 import hashlib

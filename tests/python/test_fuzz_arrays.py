@@ -1,0 +1,230 @@
+"""Odd arrays and values in the Python interface: a result, or a sentence that is a `DeckError`."""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from fuzz.harness import time_limit
+
+from hexcontact import (
+    Case,
+    ContactState,
+    DeckError,
+    ElasticPair,
+    FlexibilityOperator,
+    FrictionalContact,
+    HexcontactError,
+    Lattice,
+    NormalContact,
+    Study,
+    analytic,
+    influence,
+)
+
+LATTICE = Lattice(spacing=1e-4, row_first=-4, col_first=-4, n_row=9, n_col=9)
+GAP = (LATTICE.x**2 + LATTICE.y**2) / 20e-3
+MIDDLE = np.arange(81).reshape(9, 9) == 40
+PAIR = ElasticPair.from_materials(210e9, 0.3, 70e9, 0.33)
+ELASTIC: dict[str, Any] = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+SPHERE: dict[str, Any] = {**ELASTIC, "surface": {"shape": "sphere", "radius": 10e-3}}
+FORCES = ["force", "force", "force", "displacement"]
+
+GOOD = {  # the same numbers in another form
+    "good": GAP,
+    "Fortran order": np.asfortranarray(GAP),
+    "strided": np.repeat(np.repeat(GAP, 2, 0), 2, 1)[::2, ::2],
+    "backwards": GAP[::-1, ::-1],  # the gap is symmetric
+    "other byte order": GAP.astype(">f8"),
+    "long double": GAP.astype(np.longdouble),
+    "list": GAP.tolist(),
+    "objects that are numbers": GAP.astype(object),
+    "nothing masked": np.ma.array(GAP, mask=False),
+}
+ODD = {
+    **{
+        name: np.where(MIDDLE, value, GAP)
+        for name, value in (("a NaN", np.nan), ("-inf", -np.inf), ("inf", np.inf))
+    },
+    **{
+        f"all {value}": np.full((9, 9), value)
+        for value in (np.nan, np.inf, -np.inf, 0.0, 1.0, 5e-324, 1e308, -1.0)
+    },
+    "negative": -GAP,
+    "huge": GAP * 1e305,
+    "float16": GAP.astype("f2"),
+    "integers": np.ones((9, 9), int),
+    "booleans": MIDDLE,
+    "complex": GAP + 1j,
+    "complex without an imaginary part": GAP + 0j,
+    "masked": np.ma.masked_greater(GAP, 1e-5),
+    "None": None,
+    "Nones": np.full((9, 9), None),
+    "text": GAP.astype(str),
+    "words": np.full((9, 9), "x"),
+    "bytes": GAP.astype("S"),
+    "dates": np.zeros((9, 9), "M8[s]"),
+    "records": np.zeros((9, 9), [("a", "f8")]),
+    "ragged": [[1, 2], [3]],
+    "flat": GAP.ravel(),
+    "three dimensions": GAP[None],
+    "a row less": GAP[:-1],
+    "empty": np.zeros((0, 0)),
+    "a number": 1.0,
+    "a numpy number": np.float64(1.0),
+    "an array of no dimension": np.array(1.0),
+    "a huge integer": 10**400,
+    "a word": "abc",
+    "a dict": {},
+    "a set": {1.0},
+    "a function": lambda x, y: x,
+    "a generator": None,  # is made when it is used
+}
+
+
+def case(**keys: Any) -> Case:
+    given = {"body_1": SPHERE, "body_2": ELASTIC, "nodes_in_radius": 4, "loads": [{"normal_load": 1.0}]}
+    return Case(**(given | keys))
+
+
+def flat(gap: Any) -> Case:
+    return case(body_1=ELASTIC, gap=gap, nodes_in_radius=None, spacing=1e-4, window=(9, 9))
+
+
+def friction(**changed: Any) -> ContactState:
+    contact = FrictionalContact(LATTICE, PAIR, GAP, friction_coefficient=0.3)
+    state = contact.advance(contact.virgin(), FORCES, [100.0, 5.0, 0.0, 0.0])
+    return contact.advance(dataclasses.replace(state, **changed), FORCES, [100.0, 6.0, 0.0, 0.0])
+
+
+def advanced(control: Any, value: Any) -> ContactState:
+    contact = FrictionalContact(LATTICE, PAIR, GAP, friction_coefficient=0.3)
+    return contact.advance(contact.virgin(), control, value)
+
+
+def study(values: Any) -> Study:
+    deck = {
+        "body": {"1": SPHERE, "2": ELASTIC},
+        "grid": {"nodes_in_radius": 4},
+        "load": [{"normal_load": 1.0}],
+    }
+    return Study(deck, {"load.1.normal_load": values}, output="no_such_study.nc")
+
+
+TAKERS: dict[str, Callable[[Any], object]] = {
+    "gap": lambda a: flat(a).run(),
+    "gap of a function": lambda a: flat(lambda x, y: a).run(),
+    "series": lambda a: case(loads=[{"series": {"normal_load": a}}]),
+    "values of a ramp": lambda a: case(loads=[{"normal_load": 3.0, "values": a}]),
+    "loads": lambda a: case(loads=a),
+    "modulus": lambda a: case(body_1=SPHERE | {"young_modulus": a}),
+    "body": lambda a: case(body_1=a),
+    "surface": lambda a: case(body_1=ELASTIC | {"surface": a}),
+    "window": lambda a: case(nodes_in_radius=None, spacing=1e-5, window=a),
+    "spacing": lambda a: case(nodes_in_radius=None, spacing=a),
+    "center": lambda a: case(center=a),
+    "deck": lambda a: Case.from_dict(a),
+    "friction coefficient": lambda a: case(friction_coefficient=a),
+    "gap of a contact": lambda a: NormalContact(LATTICE, PAIR, a).solve(normal_load=10.0),
+    "candidates": lambda a: NormalContact(LATTICE, PAIR, GAP, a).solve(normal_load=10.0),
+    "load of a contact": lambda a: NormalContact(LATTICE, PAIR, GAP).solve(normal_load=a),
+    "approach of a contact": lambda a: NormalContact(LATTICE, PAIR, GAP).solve(approach=a),
+    "tolerance of a contact": lambda a: NormalContact(LATTICE, PAIR, GAP).solve(normal_load=1.0, tolerance=a),
+    "gap with friction": lambda a: FrictionalContact(LATTICE, PAIR, a, friction_coefficient=0.3),
+    "mu with friction": lambda a: FrictionalContact(LATTICE, PAIR, GAP, friction_coefficient=a),
+    "pressure of a state": lambda a: friction(pressure=a),
+    "displacement of a state": lambda a: friction(relative_displacement_x=a),
+    "gap of a state": lambda a: friction(gap=a),
+    "values of an advance": lambda a: advanced(FORCES, a),
+    "control of an advance": lambda a: advanced(a, [1.0, 0.0, 0.0, 0.0]),
+    "tractions of an operator": lambda a: FlexibilityOperator(LATTICE, PAIR).apply(GAP, a, GAP),
+    "points of kernels": lambda a: influence.pyramid_kernels(a, a),
+    "Poisson's ratio of functions": lambda a: influence.pyramid_functions(0.0, 0.0, a),
+    "triangle": lambda a: influence.triangle_integral(a, 0.0, 0.0, 0, 0, 0),
+    "Hertz, load": lambda a: analytic.hertz_sphere(1e11, 1e-2, normal_load=a),
+    "Hertz, places": lambda a: analytic.hertz_sphere(1e11, 1e-2, normal_load=3.0).pressure(a),
+    "Hertz, tensor": lambda a: analytic.hertz_ellipse(1e11, a, normal_load=3.0),
+    "lattice, spacing": lambda a: Lattice(spacing=a, row_first=0, col_first=0, n_row=3, n_col=3),
+    "lattice, first row": lambda a: Lattice(spacing=1.0, row_first=a, col_first=0, n_row=3, n_col=3).x,
+    "lattice, rows": lambda a: (
+        Lattice(spacing=1.0, row_first=0, col_first=0, n_row=a, n_col=3).x if a is not True else 0
+    ),
+    "pair": lambda a: ElasticPair.from_materials(a, 0.3, 1e9, 0.3),
+    "study": study,
+}
+DOCUMENTED = {"Hertz, tensor": ValueError, "Hertz, load": ValueError}  # of the closed solutions
+
+
+def made(name: str, value: Any) -> Any:
+    return (i for i in range(3)) if name == "a generator" else value
+
+
+def unchanged(value: Any, kept: Any) -> bool:
+    return not isinstance(value, np.ndarray) or value.tobytes() == kept
+
+
+@pytest.mark.parametrize("taker", TAKERS)
+def test_odd_values_give_a_result_or_a_sentence(taker: str) -> None:
+    for name, value in (GOOD | ODD).items():
+        kept = value.tobytes() if isinstance(value, np.ndarray) else None
+        try:
+            with time_limit():
+                TAKERS[taker](made(name, value))
+        except (HexcontactError, DOCUMENTED.get(taker, HexcontactError)) as error:
+            assert len(str(error)) > 10, (name, error)
+        except Exception as error:
+            raise AssertionError(f"{taker}, {name}: {error!r}") from error
+        assert unchanged(value, kept), name
+
+
+@pytest.mark.parametrize("taker", ["gap", "gap of a contact"])
+@pytest.mark.parametrize("form", GOOD)
+def test_the_same_numbers_in_another_form_give_the_same_pressure(taker: str, form: str) -> None:
+    value = GOOD[form]
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    expected, found = (pressure(TAKERS[taker](gap)) for gap in (GAP, value))
+    assert found.max() > 0
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * expected.max())
+
+
+def pressure(result: Any) -> np.ndarray:
+    return np.asarray(result.pressure).reshape(9, 9)
+
+
+def bad() -> Iterator[tuple[str, str, str]]:
+    yield "gap", "complex", "gap: an array of real numbers expected"
+    yield "gap", "masked", "gap: an array without masked values expected"
+    yield "gap", "a row less", r"gap: expected an array of shape \(9, 9\)"
+    yield "gap", "huge", r"gap: expected lengths of at most 1e\+30 m"
+    yield "gap of a function", "words", "gap: an array of real numbers expected"
+    yield (
+        "gap of a contact",
+        "three dimensions",
+        r"initial_gap: an array of shape \(1, 9, 9\), expected \(9, 9\)",
+    )
+    yield "load of a contact", "flat", r"normal_load = array\(\[.*: expected a number not below zero"
+    yield "pressure of a state", "a NaN", "pressure: 1 values are not finite numbers"
+    yield (
+        "mu with friction",
+        "a word",
+        "friction_coefficient = 'abc': expected a number of at least 0, or inf",
+    )
+    yield "lattice, rows", "a number", "n_row = 1.0: expected an integer"
+    yield "loads", "a number", "load: expected an array of tables"
+    yield "values of an advance", "a set", "value: an array of real numbers expected"
+
+
+@pytest.mark.parametrize(("taker", "name", "sentence"), list(bad()))
+def test_the_sentence_names_the_argument(taker: str, name: str, sentence: str) -> None:
+    with pytest.raises(DeckError, match=sentence):
+        TAKERS[taker](ODD[name])
+
+
+def test_a_deck_that_holds_itself_is_refused() -> None:
+    deck: dict[str, Any] = {"load": []}
+    deck["body"] = deck
+    deck["load"].append(deck["load"])
+    with pytest.raises(DeckError, match="nested too deeply"):
+        Case.from_dict(deck)

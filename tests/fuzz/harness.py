@@ -56,6 +56,12 @@ def ending(command: Callable[..., Any], **options: Any) -> Ending:
     return Ending(code, out.getvalue(), error.getvalue())
 
 
+def told(end: Ending) -> dict[str, Any]:
+    """Return the object that a command has printed."""
+    found: dict[str, Any] = json.loads(end.out)
+    return found
+
+
 def complaints(end: Ending, as_json: bool = True) -> list[str]:
     """Return what is wrong with the way in which a command has ended."""
     found = []

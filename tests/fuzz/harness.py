@@ -30,8 +30,9 @@ class Ending(NamedTuple):
 
 
 @contextlib.contextmanager
-def time_limit(seconds: float = LONGEST) -> Iterator[None]:
-    """Raise `Hang` after some processor time."""
+def time_limit() -> Iterator[None]:
+    """Raise `Hang` after more than `LONGEST`."""
+    seconds = LONGEST
 
     def ring(number: int, frame: Any) -> None:
         raise Hang(f"more than {seconds} s")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 from fuzz import harness
 from fuzz.deck_mutations import garbled, mutated
 
@@ -193,3 +194,59 @@ def test_other_files_with_mistakes_get_a_sentence(kind: str, folder: Path) -> No
         codes[end.exit_code] += 1
     assert codes[0] > 0
     assert codes[2] > 0
+
+
+@pytest.mark.parametrize("depth", [60, 300, 600, 3000])
+@pytest.mark.parametrize("kind", ["[", "{a=", "a.", "[a."])
+def test_tables_in_tables_in_tables_are_refused(kind: str, depth: int, folder: Path) -> None:
+    deep = {
+        "[": f"x = {'[' * depth}1{']' * depth}",
+        "{a=": f"x = {'{a=' * depth}1{'}' * depth}",
+        "a.": f"{'a.' * depth}a = 1",
+        "[a.": f"[{'a.' * depth}a]",
+    }
+    for deck in ("measured_history.toml", "hertz_spheres.toml"):  # one that is put together of several files
+        (folder / deck).write_text(f"{(CASES / deck).read_text()}\n{deep[kind]}\n")
+        end = judged(cli_deck.check, depth, folder, deck=folder / deck)
+        assert end.exit_code == 2
+        assert "nested too deeply" in end.error
+
+
+def endless(as_json: bool) -> None:
+    while True:
+        pass
+
+
+@cli_guard.guarded
+def unforeseen(as_json: bool) -> cli_guard.Content:
+    raise ZeroDivisionError("a mistake of the program")
+
+
+@cli_guard.guarded
+def not_a_number(as_json: bool) -> cli_guard.Content:
+    print("a word")
+    return {"value": float("nan")}
+
+
+@cli_guard.guarded
+def scribble(as_json: bool, file: Path) -> cli_guard.Content:
+    file.write_text("x")
+    return {}
+
+
+def silent_failure(as_json: bool) -> None:
+    raise typer.Exit(3)
+
+
+def test_the_judge_sees_what_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(harness, "LONGEST", 0.1)
+    with pytest.raises(AssertionError, match="Hang"):
+        judged(endless, 0, tmp_path)
+    with pytest.raises(AssertionError, match="ZeroDivisionError"):
+        judged(unforeseen, 0, tmp_path)
+    with pytest.raises(AssertionError, match="is not JSON"):
+        judged(not_a_number, 0, tmp_path)
+    with pytest.raises(AssertionError, match="an error without a sentence"):
+        judged(silent_failure, 0, tmp_path)
+    with pytest.raises(AssertionError, match="damage"):
+        judged(scribble, 0, tmp_path, file=tmp_path / "damage")

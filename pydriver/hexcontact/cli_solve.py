@@ -37,15 +37,13 @@ def run(
     from .store import Store
 
     listeners = command.Listeners("run", quiet, as_json, log_file, log_level)
-    case = command.case_of(deck, settings)
-    target = command.target_of(case, deck, output)
-    with (
-        listeners.logging(deck, target),
-        news() as heard,
-        Store(target, metadata_of(case), overwrite) as store,
-    ):
-        histories = command.solved(case, store, heard, deck.stem, listeners)
-    picture = command.overview(store.path) if plot else None
+    with listeners.logging(deck, *([output] if output else [])):
+        case = command.case_of(deck, settings)
+        target = command.target_of(case, deck, output)
+        listeners.spare(target)
+        with news() as heard, Store(target, metadata_of(case), overwrite) as store:
+            histories = command.solved(case, store, heard, deck.stem, listeners)
+        picture = command.overview(store.path) if plot else None
     return listeners.tell(case, histories, target, picture)
 
 

@@ -35,6 +35,7 @@ class HexcontactError(Exception):
     """Base of every error this package raises on purpose."""
 
     exit_code = 1
+    logged = False  # whether the log has it already
 
 
 class DeckError(HexcontactError, ValueError):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -88,7 +89,9 @@ def ending() -> Iterator[None]:
     try:
         yield
     except HexcontactError as error:
-        logger.error(words("stopped", reason=str(error)))
+        if not error.logged:
+            logger.error(words("stopped", reason=str(error)))
+        error.logged = True
         raise
 
 
@@ -164,7 +167,7 @@ class _Stream(logging.StreamHandler[IO[str]]):
 
 @contextlib.contextmanager
 def kept(file: Path | None, level: str | None, spare: Sequence[Path] = ()) -> Iterator[None]:
-    """Write the log to a file, else, if a level is given, to standard error.
+    """Write the log to a file, else, if a level is given, to standard error; errors on the way out, too.
 
     Parameters
     ----------
@@ -190,7 +193,8 @@ def kept(file: Path | None, level: str | None, spare: Sequence[Path] = ()) -> It
     logger.propagate = False
     logger.addHandler(handler)
     try:
-        yield
+        with ending():
+            yield
     finally:
         logger.removeHandler(handler)
         logger.setLevel(before[0])
@@ -198,12 +202,30 @@ def kept(file: Path | None, level: str | None, spare: Sequence[Path] = ()) -> It
         handler.close()
 
 
-def _opened(file: Path, spare: Sequence[Path]) -> _File:
+def refuse_same(file: Path | None, spare: Sequence[Path]) -> None:
+    """Refuse a log in one of the files of a command."""
+    if file is None:
+        return
     for other in spare:
         if file == other or (file.exists() and other.exists() and file.samefile(other)):
             raise DeckError(f"--log-file {file}: expected a file of its own, not {other} of this command")
+
+
+def _may_be_a_log(file: Path) -> bool:
+    """Tell whether a file is empty or begins with a time."""
+    with file.open("rb") as there:
+        return re.match(rb"\d{4}-\d\d-\d\dT|$", there.read(20)) is not None
+
+
+def _opened(file: Path, spare: Sequence[Path]) -> _File:
+    refuse_same(file, spare)
     try:
+        if file.is_file() and not _may_be_a_log(file):
+            expected = "expected a new file, or a log to append to"
+            raise DeckError(f"--log-file {file}: is there and no log; {expected}")
         return _File(file, encoding="utf-8", errors="backslashreplace")
+    except DeckError:
+        raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise DeckError(f"--log-file {file}: cannot be written: {reason}") from None

@@ -72,6 +72,10 @@ class Listeners:
         """Keep the log, never in one of the files that the command reads or writes."""
         return log.kept(self.log_file, self.log_level, spare)
 
+    def spare(self, target: Path) -> None:
+        """Refuse a log in the output, once it is known."""
+        log.refuse_same(self.log_file, [target])
+
     @property
     def silent(self) -> bool:
         """Whether no progress is shown: if quiet, or where the log is shown instead."""
@@ -123,6 +127,7 @@ def _leave(store: Store, signaled: Interrupted, listeners: Listeners) -> NoRetur
     message = f"interrupted; {kept}"
     with contextlib.suppress(OSError):  # nobody listens any more
         log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", done=len(store.heads)))
+        log.logger.disabled = True  # for what is still at work
         complain(message)
         if listeners.as_json:
             json_output.write(listeners.command, json_output.error(message, signaled.exit_code))

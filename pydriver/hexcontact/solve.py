@@ -225,8 +225,9 @@ def steps(
     log.begun(case, lattice, len(before))
     started = time.perf_counter()
     for step in _solved(case, lattice, kept_in_memory, before):
-        log.finished(step, case.load_steps[step.index], len(case.load_steps))
         yield step
+        # only now it is where the caller keeps it
+        log.finished(step, case.load_steps[step.index], len(case.load_steps))
     log.logger.info(log.words("finished", steps=len(case.load_steps), seconds=time.perf_counter() - started))
 
 

@@ -1,4 +1,4 @@
-"""Two hundred damaged results and journals: what reads them gives a result or a sentence, and changes nothing."""
+"""Two hundred damaged results and journals: each gives a result or a sentence, and stays as it is."""
 
 import json
 import os

@@ -24,7 +24,7 @@ _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _KEY = re.compile(r"\b[a-z]\w*(?=\s*=)")
 _UNIT = re.compile(r"(?<=\d )[A-Za-zµ]+(?=\")")
 _UNITS = (
-    *("m", "mm", "um", "km", "pm", "lightyear", "N", "kN", "GN", "lbf", "Pa", "GPa", "psi"),
+    *("m", "mm", "um", "km", "pm", "parsec", "N", "kN", "GN", "lbf", "Pa", "GPa", "psi"),
     *("deg", "rad", "K", "s"),
 )
 

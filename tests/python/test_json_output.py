@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 import hexcontact
 from hexcontact import Case, ConvergenceError, cli_deck, json_output, solve, verify
 from hexcontact.cli import app
+from hexcontact.errors import Fault
 from hexcontact.store import open_result
 
 DECK = """title = "A sphere"
@@ -313,3 +314,12 @@ def test_an_interruption_is_told(folder: Path) -> None:
     assert (process.returncode, told["exit_code"], told["error"]["kind"]) == (143, 143, "interrupted")
     assert "to go on: hexcontact resume" in told["error"]["message"]
     assert f"hexcontact: {told['error']['message']}" in error
+
+
+def test_every_name_is_in_the_documentation(folder: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs/running.md").read_text()
+    objects = [command("check", "deck.toml")[1], command("run", "deck.toml", "-q")[1]]
+    objects += [command("run", "no.toml")[1], command("study", "study.toml", "--jobs", "1", "-q")[1]]
+    objects.append(objects[2]["error"])
+    objects.append({name: None for name in Fault._fields})
+    assert {name for one in objects for name in one if f"`{name}`" not in page} == set()

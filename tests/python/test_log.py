@@ -1,5 +1,6 @@
 """The log of runs, in Python and on the command line: what a line says, where it goes."""
 
+import calendar
 import dataclasses
 import logging
 import math
@@ -17,7 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, ConvergenceError, NormalContact, log
+from hexcontact import Case, ConvergenceError, FrictionalContact, NormalContact, log
 from hexcontact.cli import app
 from hexcontact.errors import DeckError
 from hexcontact.store import open_result
@@ -196,7 +197,7 @@ def test_log_file_keeps_every_run_one_event_by_line(deck: Path) -> None:
     assert first[-1][1] == f'written file="{deck.parent / "a.nc"}"'
     stamp = LINE.fullmatch(place.read_text().splitlines()[0])
     assert stamp
-    told = time.mktime(time.strptime(stamp[1][:19], "%Y-%m-%dT%H:%M:%S")) - time.timezone
+    told = calendar.timegm(time.strptime(stamp[1][:19], "%Y-%m-%dT%H:%M:%S"))
     assert before - 2 < told < time.time() + 2  # UTC
     assert command("run", deck, "-o", deck.parent / "b.nc", "--log-file", place, "--quiet") == (0, "", "")
     assert len(read(place)) == 16
@@ -222,6 +223,38 @@ def test_a_run_that_stops_leaves_the_reason(deck: Path) -> None:
     assert level == "ERROR"
     assert "grid.window = [9, 9]: the window is smaller than the contact" in message
     assert words(message)["reason"] in error
+
+
+def test_a_step_that_does_not_converge_is_one_line(deck: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    original = FrictionalContact.advance
+
+    def hasty(self: FrictionalContact, *arguments: Any, **options: Any) -> Any:
+        return original(self, *arguments, **options, max_sweeps=1, max_cuts=0)
+
+    monkeypatch.setattr(FrictionalContact, "advance", hasty)
+    place = deck.parent / "run.log"
+    code, _, error = command("run", deck, "-o", deck.parent / "a.nc", "--log-file", place)
+    assert code == 3
+    [stopped] = [message for level, message in read(place) if level == "ERROR"]
+    assert "did not converge" in stopped
+    assert "did not converge" in error
+
+
+def test_a_message_of_several_lines_is_one_in_the_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TZ", "Asia/Tokyo")
+    time.tzset()
+    before = time.time()
+    try:
+        with log.kept(tmp_path / "log", None):
+            log.logger.warning("one\ntwo")
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+    assert read(tmp_path / "log") == [("WARNING", "one; two")]
+    told = time.strptime((tmp_path / "log").read_text()[:19], "%Y-%m-%dT%H:%M:%S")
+    assert abs(calendar.timegm(told) - before) < 60  # UTC, wherever we are
 
 
 def test_a_wrong_deck_is_in_the_log_too(deck: Path) -> None:

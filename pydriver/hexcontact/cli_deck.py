@@ -44,6 +44,8 @@ def schema(
     if output is None or str(output) == "-":
         print(text, end="")
         return
+    if output.exists() and not output.read_bytes().lstrip().startswith(b"{"):
+        raise DeckError(f"{output} is there and no JSON, so it is not overwritten; choose another output")
     output.write_text(text, encoding="utf-8")
     print(f'written: {output}; first line of a deck that uses it: "#:schema {output}"')
 

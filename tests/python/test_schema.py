@@ -130,3 +130,14 @@ def test_every_key_has_a_description() -> None:
                 yield from undescribed(entry, f"{path}.{key}")
 
     assert list(undescribed(deck_schema(), "")) == [".$schema", ".load"]
+
+
+def test_the_schema_replaces_an_older_one_but_nothing_else(tmp_path: Path) -> None:
+    old, deck = tmp_path / "deck.schema.json", tmp_path / "deck.toml"
+    old.write_text("{}")
+    deck.write_text("# a deck\n")
+    assert CliRunner().invoke(app, ["schema", "-o", str(old)]).exit_code == 0
+    assert len(old.read_text()) > 1000
+    refused = CliRunner().invoke(app, ["schema", "-o", str(deck)])
+    assert (refused.exit_code, "is there and no JSON" in refused.stderr) == (2, True)
+    assert deck.read_text() == "# a deck\n"

@@ -22,7 +22,6 @@ from .progress import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
 if TYPE_CHECKING:
     from .case import Case
     from .lattice import Lattice
-    from .load_history import LoadStep
     from .result import Step
 
 logger = logging.getLogger("hexcontact")
@@ -95,13 +94,13 @@ def ending() -> Iterator[None]:
         raise
 
 
-def finished(step: Step, target: LoadStep, total: int) -> None:
-    """Tell of a finished load step: loads and motions, zones, residuals, work."""
+def finished(step: Step, total: int | None) -> None:
+    """Tell of a finished load step: loads and motions, zones, residuals, work; no total: not known yet."""
     if not logger.isEnabledFor(logging.INFO):
         return
     history = step.history
     values: dict[str, Any] = {"segment": history.get("segment", "-"), "label": history.get("label", "")}
-    values["fraction"] = target.fraction
+    values["fraction"] = step.segment_fraction
     shown = worth_showing([history])
     values |= {LOADS_AND_MOTIONS[name][0].replace(" ", "_"): float(history[name]) for name in shown}
     values["p_max"] = float(history["max_pressure"])
@@ -111,7 +110,7 @@ def finished(step: Step, target: LoadStep, total: int) -> None:
     values["halvings"] = history.get("cuts", 0)
     values["applications"] = _rounded(history["operator_applications"])
     values["seconds"] = _rounded(history["seconds"])
-    logger.info(words(f"step={step.number}/{total}", **values))
+    logger.info(words(f"step={step.number}" + (f"/{total}" if total else ""), **values))
 
 
 def _rounded(value: float | int | str) -> float:

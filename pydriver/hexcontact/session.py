@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import ValidationError
 
-from . import solve
+from . import log, solve
 from .case_arguments import given, middle_of, with_radians
 from .deck import Load
 from .errors import DeckError
@@ -293,6 +293,7 @@ class Session:
                 raise
             self._steps[-1:] = [before.head for before in self._steps[-1:]]
         self._steps.append(step)
+        log.finished(step, None if self._by_hand else len(self.case.load_steps))
         return step
 
     def _asked(self) -> Iterator[LoadStep]:

@@ -105,6 +105,7 @@ def run(
         with log.ending(), shown.watching(case.title, len(case.load_steps)):
             for step in steps(case, kept_in_memory=True):
                 finished.append(step)
+                log.finished(step, len(case.load_steps))
                 shown.finished(step)
                 if stopped := stops(on_step, step):
                     break
@@ -151,6 +152,7 @@ def record(
     with log.ending():
         for step in steps(case, before=before):
             store.append(step)
+            log.finished(step, len(case.load_steps))
             shown.finished(step)
             try:
                 stopped = stops(on_step, step)
@@ -224,14 +226,20 @@ def steps(
     lattice = before[-1].lattice if before else case.lattice
     log.begun(case, lattice, len(before))
     started = time.perf_counter()
-    for step in _solved(case, lattice, kept_in_memory, before):
+    done = len(before)
+    for step in _solved(case, lattice, kept_in_memory, before, targets):
         yield step
-        # only now it is where the caller keeps it
-        log.finished(step, case.load_steps[step.index], len(case.load_steps))
-    log.logger.info(log.words("finished", steps=len(case.load_steps), seconds=time.perf_counter() - started))
+        done = step.number
+    log.logger.info(log.words("finished", steps=done, seconds=time.perf_counter() - started))
 
 
-def _solved(case: Case, lattice: Lattice, kept_in_memory: bool, before: Sequence[Step]) -> Iterator[Step]:
+def _solved(
+    case: Case,
+    lattice: Lattice,
+    kept_in_memory: bool,
+    before: Sequence[Step],
+    targets: Iterable[LoadStep] | None,
+) -> Iterator[Step]:
     """Solve step by step, from a window on; see `steps`."""
     window = kind_of(case)(case, lattice, len(case.load_steps) if kept_in_memory else 0)
     state: Any = window.restored(before[-1]) if before else None

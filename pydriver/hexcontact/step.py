@@ -44,6 +44,8 @@ class Step:
         The loads (N, N m) and motions (m, rad) that drove the step; empty for a step read from a file.
     load_fraction : float
         How much of the load history is done after the step, from 0 to 1; NaN for a step read from a file.
+    segment_fraction : float
+        How much of the ramp of its segment is applied, usually from 0 to 1; NaN for a step read from a file.
     """
 
     index: int
@@ -52,6 +54,7 @@ class Step:
     history: Mapping[str, Value]
     prescribed: Mapping[str, float] = field(default_factory=dict)
     load_fraction: float = math.nan
+    segment_fraction: float = math.nan
 
     def __post_init__(self) -> None:
         safe = {name: _read_only(values) for name, values in self.fields.items()}

@@ -230,6 +230,7 @@ class Window(ABC, Generic[S]):
             history,
             prescribed=self._prescribed(target, history),
             load_fraction=(target.index + 1) / len(self.case.load_steps),
+            segment_fraction=target.fraction,
         )
 
     def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:

@@ -15,7 +15,7 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError, StopRun
+from .errors import AccuracyWarning, ConvergenceError, DeckError, HexcontactError, ResourceError, StopRun
 
 # Threads that wait for each other keep their cores busy, by default for so long that two runs on the same
 # cores take most of each other's time. OpenMP reads this when the compiled core is loaded.
@@ -56,6 +56,7 @@ _HOME = {
 _MODULES = ("analytic", "influence", "plotting", "surfaces")
 
 __all__ = [
+    "AccuracyWarning",
     "Case",
     "ContactState",
     "ConvergenceError",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,6 +77,14 @@ class SolverSettings:
 
 
 @dataclass(frozen=True)
+class AccuracySettings:
+    """How far the lattice is refined; see [accuracy] in the deck reference."""
+
+    target: float
+    max_nodes: int
+
+
+@dataclass(frozen=True)
 class OutputSettings:
     """What is kept of a run; see [output] in the deck reference.
 
@@ -115,6 +124,8 @@ class Case:
         Coefficient of friction; frictionless if absent.
     algorithm, method, tolerance, coupling, entry : optional
         Keys of [solver].
+    accuracy : float or mapping, optional
+        Target of [accuracy], or all its keys: refine the lattice until it is reached.
     fields, every : optional
         Keys of [output].
     title : str, optional
@@ -132,6 +143,8 @@ class Case:
         Coefficient of friction.
     solver : SolverSettings
         How it is solved.
+    accuracy : AccuracySettings or None
+        How accurate the result is to be; None: the lattice is not refined.
     load_steps : tuple of LoadStep
         The history.
     output : OutputSettings
@@ -174,6 +187,7 @@ class Case:
     pair: ElasticPair
     friction_coefficient: float
     solver: SolverSettings
+    accuracy: AccuracySettings | None
     load_steps: tuple[LoadStep, ...]
     output: OutputSettings
     deck: Deck
@@ -206,6 +220,7 @@ class Case:
         tolerance: float | None = None,
         coupling: str | None = None,
         entry: str | None = None,
+        accuracy: float | Mapping[str, Any] | None = None,
         fields: Sequence[str] | None = None,
         every: int | None = None,
         title: str = "",
@@ -238,6 +253,7 @@ class Case:
                 algorithm=algorithm, method=method, tolerance=tolerance, coupling=coupling, entry=entry
             )
             or None,
+            accuracy=given(target=accuracy) if isinstance(accuracy, int | float) else accuracy,
             load=segments(loads),
             output=given(fields=fields, every=every) or None,
         )
@@ -314,6 +330,8 @@ class Case:
             given_solver.coupling,
             given_solver.entry,
         )
+        wanted = deck.accuracy
+        self.accuracy = AccuracySettings(wanted.target, wanted.max_nodes) if wanted else None
         self.output = OutputSettings(
             Path(deck.output.file) if deck.output.file else None, deck.output.fields or (), deck.output.every
         )
@@ -331,7 +349,10 @@ class Case:
             self.body_2.poisson_ratio,
         )
         self.window_fixed = grids.is_fixed(deck.grid)
+        self._contact: Estimate | None = None  # where the window follows from it alone
         self.lattice = self._size(deck.grid, source, lattice)
+        if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
+            raise deck_error(problems, source)
 
     @property
     def frictional(self) -> bool:
@@ -386,6 +407,26 @@ class Case:
             it.
         """
         return grids.grown(lattice) if contact is None else grids.grown(lattice, grids.rim_sides(contact))
+
+    def on_lattice(self, spacing: float, origin: tuple[float, float]) -> Case:
+        """Return the same problem on another lattice, solved on that one alone.
+
+        Parameters
+        ----------
+        spacing : float
+            Spacing, m.
+        origin : (float, float)
+            Position of a node, m.
+        """
+        other = copy.copy(self)
+        other.accuracy = None
+        moved = np.array(grids.lattice_coordinates(*self.lattice.origin, origin))
+        if self._contact is not None:
+            bounds = self._contact.bounds + moved[:, None]
+            other.lattice = grids.enclosing(bounds[:, 0], bounds[:, 1], spacing, grids.MARGIN, origin)
+        else:
+            other.lattice = grids.covering(self.lattice, spacing, origin)
+        return other
 
     def method_for(self, lattice: Lattice) -> Method:
         """Return the method to use on a window, "direct" or "fft"; decides what "auto" means."""
@@ -513,6 +554,17 @@ class Case:
 
     # --- the window -----------------------------------------------------------------------------------------
 
+    def _refinement_problems(self, wanted: AccuracySettings) -> list[Problem]:
+        """Complain about what cannot be refined, or not far enough for errors to be told."""
+        if isinstance(self._given_gap, np.ndarray):
+            sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
+            return [Problem(("accuracy", "target"), wanted.target, sentence)]
+        third = self.on_lattice(self.lattice.spacing / 2, self.lattice.origin).lattice.size
+        if third <= wanted.max_nodes:
+            return []
+        sentence = f"expected at least {third}, the nodes of the third lattice, or a coarser grid to begin with"
+        return [Problem(("accuracy", "max_nodes"), wanted.max_nodes, sentence)]
+
     def _gap_at(self, x: Array, y: Array) -> Array:
         if self._surface_gap is not None:
             return self._surface_gap(x, y)
@@ -542,6 +594,8 @@ class Case:
             raise deck_error(
                 [Problem(("grid",), MISSING, f"no window can be found: {error}")], source
             ) from None
+        if lattice is None and not (self.window_fixed or grid.nodes_across):
+            self._contact = estimate
         lattice = lattice or grids.window(grid, center, estimate)
         if problems := grids.check(grid, lattice, estimate):
             raise deck_error(problems, source)

@@ -264,6 +264,21 @@ class Load(Segment):
             yield "repeat", "needs a path of segments or a series to repeat"
 
 
+class Accuracy(Table):
+    """How accurate the result is to be; the grid is that of the first, coarsest lattice then."""
+
+    target: Annotated[float, Quantity(NUMBER, at_least=1e-6, at_most=0.5)] = Field(
+        description=(
+            "the lattice is refined until the estimated errors of max_pressure, contact_area_fit, "
+            "stick_area_fit and approach are at most this share of the largest value of each"
+        ),
+        examples=["0.01"],
+    )
+    max_nodes: Annotated[int, Whole(100, 1_000_000_000)] = Field(
+        500_000, description="nodes of the finest window at most", examples=["100_000"]
+    )
+
+
 class Output(Table):
     """What is written, and where."""
 
@@ -291,6 +306,7 @@ class Deck(Table):
     friction: Friction | None = None
     grid: Grid
     solver: Solver = Field(default_factory=Solver)
+    accuracy: Accuracy | None = None
     load: list[Load] = Field(min_length=1)
     output: Output = Field(default_factory=Output)
 

@@ -54,6 +54,12 @@ class DeckError(HexcontactError, ValueError):
         self.faults = tuple(faults)
 
 
+class AccuracyWarning(UserWarning):
+    """The lattice could not be refined until the accuracy asked for was reached; the finest result is kept."""
+
+    exit_code = 3
+
+
 class ConvergenceError(HexcontactError, RuntimeError):
     """A load step did not meet its tolerance; the last good step is kept.
 

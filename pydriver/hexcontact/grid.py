@@ -67,6 +67,11 @@ class Estimate:
     cell: float
     size: Array
 
+    @property
+    def bounds(self) -> Array:
+        """Smallest and largest lattice coordinates (m), in columns, of what may be in contact."""
+        return np.stack([self.lower - self.cell, self.upper + self.cell], axis=1)
+
     def joined(self, other: Estimate) -> Estimate:
         """Return an estimate that covers both: the larger radius, the union of the bounds."""
         larger = self if self.radius >= other.radius else other
@@ -112,6 +117,16 @@ def enclosing(
     first = [math.floor(value / spacing) - margin for value in lower]
     last = [math.ceil(value / spacing) + margin for value in upper]
     return Lattice(spacing, first[1], first[0], last[1] - first[1] + 1, last[0] - first[0] + 1, origin=origin)
+
+
+def covering(window: Lattice, spacing: float, origin: tuple[float, float]) -> Lattice:
+    """Return the smallest window of another lattice about all nodes of a window."""
+    moved = np.array(lattice_coordinates(*window.origin, origin))
+    first = np.array([window.col_first, window.row_first])
+    last = first + np.array([window.n_col, window.n_row]) - 1
+    slack = 1e-9 * spacing  # nodes that both have in common stay the rim, whatever the rounding
+    lower, upper = (window.spacing * index + moved for index in (first, last))
+    return enclosing(lower + slack, upper - slack, spacing, 0, origin)
 
 
 def rim_sides(contact: NDArray[np.bool_]) -> tuple[bool, bool, bool, bool]:
@@ -262,7 +277,7 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
     ``extent = "auto"`` gives the smallest rhombus about the estimated contact (its bounds plus one coarse
     cell, since the edge lies somewhere in it) with a margin of two nodes.
     """
-    lower, upper = estimate.lower - estimate.cell, estimate.upper + estimate.cell
+    lower, upper = estimate.bounds.T
     spacing = grid.spacing or (estimate.radius / grid.nodes_in_radius if grid.nodes_in_radius else None)
     if spacing is not None:
         if grid.window is not None:

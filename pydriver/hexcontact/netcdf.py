@@ -62,12 +62,12 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             file.setncatts(layout.attributes(complete))
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
-            for name, values in (layout.coordinates() | layout.histories()).items():
+            for name, values in (layout.coordinates() | layout.histories() | layout.trials).items():
                 if VARIABLES[name].dtype == "str":
                     _write_text(file, name, values)
                 else:
-                    _column(file, name)[...] = values
-            columns = {name: _column(file, name) for name in layout.fields}
+                    _column(file, name, layout)[...] = values
+            columns = {name: _column(file, name, layout) for name in layout.fields}
             mesh.write_mesh(file, layout.window)
         gap_column = columns.pop("initial_gap", None)
         gap: Any = None
@@ -100,7 +100,7 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     flush(path)
 
 
-def _column(file: netCDF4.Dataset, name: str) -> netCDF4.Variable:
+def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variable:
     """Create the variable `name` with its attributes."""
     variable = VARIABLES[name]
     options: dict[str, Any] = {}
@@ -111,7 +111,7 @@ def _column(file: netCDF4.Dataset, name: str) -> netCDF4.Variable:
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
     column = file.createVariable(name, variable.dtype, variable.dims, **options)
-    column.setncatts(variable.attributes)
+    column.setncatts(layout.attributes_of(name))
     if variable.dims[-2:] == ("row", "col") and name not in ("x", "y"):
         column.coordinates = "x y"
     return column

@@ -54,6 +54,24 @@ class Reporter:
         """
         yield
 
+    def lattice(self, words: str) -> None:
+        """Hear that the load history begins again on another lattice.
+
+        Parameters
+        ----------
+        words : str
+            Which one, in words.
+        """
+
+    def says(self, words: str) -> None:
+        """Hear what is worth telling between load steps.
+
+        Parameters
+        ----------
+        words : str
+            What there is to tell.
+        """
+
     def finished(self, step: Step) -> None:
         """Hear of a finished step.
 
@@ -83,6 +101,14 @@ class Lines(Reporter):
         self.steps = steps
         self._print(f"{title or 'case'}: {steps} load step{'s' * (steps != 1)}")
         yield
+
+    def lattice(self, words: str) -> None:
+        """Print which lattice is next."""
+        self._print(words)
+
+    def says(self, words: str) -> None:
+        """Print it."""
+        self._print(words)
 
     def finished(self, step: Step) -> None:
         """Print the line of a step."""
@@ -114,10 +140,18 @@ class Bar(Reporter):
 
         columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()]
         self._bar = Progress(*columns, TimeElapsedColumn())
-        self._task = self._bar.add_task(title, total=steps)
+        self._title, self._task = title, self._bar.add_task(title, total=steps)
         self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
         with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
             yield
+
+    def lattice(self, words: str) -> None:
+        """Start the bar again, with the name of the lattice."""
+        self._bar.update(self._task, completed=0, description=f"{self._title}, {words.partition(':')[0]}")
+
+    def says(self, words: str) -> None:
+        """Show it until the next step."""
+        self._latest.plain = f"  {words}"
 
     def finished(self, step: Step) -> None:
         """Move the bar on by one step."""

@@ -139,9 +139,13 @@ class Layout:
         Where the result comes from, and which fields it keeps.
     steps : sequence of Step
         All its steps (heads are enough), in order.
+    trials : mapping of str to sequence, optional
+        What was solved on other lattices, by the names of `hexcontact.variables`: values by trial.
     """
 
-    def __init__(self, metadata: Metadata, steps: Sequence[Step]) -> None:
+    def __init__(
+        self, metadata: Metadata, steps: Sequence[Step], trials: Mapping[str, Sequence[Any]] | None = None
+    ) -> None:
         if not steps:
             raise ValueError("a result needs at least one finished step")
         self.metadata = metadata
@@ -154,6 +158,17 @@ class Layout:
             present -= set(FIELDS) - set(metadata.fields)
         self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
         self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
+        self.trials = {name: np.array(v, VARIABLES[name].dtype) for name, v in (trials or {}).items()}
+        if self.trials:
+            self.variables |= {name: VARIABLES[name] for name in self.trials}
+            self.sizes["trial"] = len(next(iter(self.trials.values())))
+
+    def attributes_of(self, name: str) -> dict[str, Any]:
+        """CF attributes of a variable; those with an estimated error name it."""
+        attributes = VARIABLES[name].attributes
+        if (error := f"{name}_error") in self.variables:
+            attributes["ancillary_variables"] = error
+        return attributes
 
     def coordinates(self) -> dict[str, NDArray[Any]]:
         """Values of the coordinates."""
@@ -260,7 +275,12 @@ def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[A
     )
 
 
-def assemble(metadata: Metadata, steps: Iterable[Step], complete: bool = True) -> xarray.Dataset:
+def assemble(
+    metadata: Metadata,
+    steps: Iterable[Step],
+    complete: bool = True,
+    trials: Mapping[str, Sequence[Any]] | None = None,
+) -> xarray.Dataset:
     """Put the steps of a run together.
 
     Parameters
@@ -271,6 +291,8 @@ def assemble(metadata: Metadata, steps: Iterable[Step], complete: bool = True) -
         The finished steps in order; gone through twice, so not a generator.
     complete : bool
         Whether these are all steps of the run.
+    trials : mapping of str to sequence, optional
+        As for `Layout`.
 
     Returns
     -------
@@ -279,7 +301,7 @@ def assemble(metadata: Metadata, steps: Iterable[Step], complete: bool = True) -
     """
     import xarray
 
-    layout = Layout(metadata, [step.head for step in steps])
+    layout = Layout(metadata, [step.head for step in steps], trials)
     values = {
         name: np.empty([layout.sizes[dim] for dim in VARIABLES[name].dims], VARIABLES[name].dtype)
         for name in layout.fields
@@ -293,9 +315,9 @@ def assemble(metadata: Metadata, steps: Iterable[Step], complete: bool = True) -
             gap = layout.initial_gap(gap, step)
     if gap is not None:
         values["initial_gap"] = gap
-    values |= layout.histories() | layout.coordinates()
+    values |= layout.histories() | layout.coordinates() | layout.trials
     variables = {
-        name: xarray.Variable(v.dims, values[name], v.attributes)
+        name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
         for name, v in VARIABLES.items()
         if name in values
     }
@@ -373,6 +395,11 @@ class Result(ResultTools):
     def stopped(self) -> str:
         """Why the run ended before its time; empty if it did not, or could not say so."""
         return str(self.dataset.attrs.get("stopped", ""))
+
+    @property
+    def shortfall(self) -> str:
+        """Why the accuracy that was asked for is not reached; empty if it is, or none was asked for."""
+        return str(self.dataset.attrs.get("accuracy_shortfall", ""))
 
     @property
     def lattice(self) -> Lattice:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import platform
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import log, nonconvergence
-from .errors import HexcontactError, StopRun
+from .errors import AccuracyWarning, HexcontactError, StopRun
 from .load_series import LOADS
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
@@ -47,6 +48,7 @@ def parameters_of(case: Case) -> dict[str, Any]:
         "coupling": case.solver.coupling,
         "entry": case.solver.entry,
         "tolerance": case.solver.tolerance,
+        **({"accuracy_target": case.accuracy.target} if case.accuracy else {}),
         "machine": _machine(),
     }
 
@@ -78,8 +80,9 @@ def run(
     overwrite : bool
         Replace an output that is there already.
     on_step : callable, optional
-        Called with each finished `Step`, after it was written. If it returns something true, or raises
-        `hexcontact.StopRun`, the run ends there; any other exception ends it, too, and is passed on.
+        Called with each finished `Step`, after it was written; of every lattice, if the case has an accuracy to
+        reach. If it returns something true, or raises `hexcontact.StopRun`, the run ends there; any other
+        exception ends it, too, and is passed on.
     progress : Reporter or bool, optional
         Who is told about each step; True: a bar on a terminal, lines otherwise.
 
@@ -88,6 +91,11 @@ def run(
     Result
         What is finished: all load steps, or those up to where `on_step` ended the run. With an output, the
         finished steps are kept as after a signal then, and `hexcontact.resume` goes on.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the lattice could not be refined until the accuracy of the case was reached.
 
     Raises
     ------
@@ -100,6 +108,11 @@ def run(
     """
     shown = progress if isinstance(progress, Reporter) else reporter(quiet=not progress)
     if output is None:
+        if case.accuracy is not None:
+            from . import refinement
+
+            with shown.watching(case.title, len(case.load_steps)):
+                return checked(refinement.in_memory(case, shown, on_step))
         finished: list[Step] = []
         stopped = ""
         with log.ending(), shown.watching(case.title, len(case.load_steps)):
@@ -119,7 +132,14 @@ def run(
         shown.watching(case.title, len(case.load_steps)),
     ):
         record(case, store, shown, on_step)
-    return open_result(store.path)
+    return checked(open_result(store.path))
+
+
+def checked(result: Result) -> Result:
+    """Warn if a result is less accurate than it was to be."""
+    if result.shortfall:
+        warnings.warn(result.shortfall, AccuracyWarning, stacklevel=3)
+    return result
 
 
 def record(
@@ -149,6 +169,12 @@ def record(
     DeckError, ConvergenceError, ResourceError
         As `run`.
     """
+    if case.accuracy is not None:
+        from . import trial_store
+
+        with log.ending():
+            trial_store.record(case, store, shown, on_step)
+        return
     with log.ending():
         for step in steps(case, before=before):
             store.append(step)

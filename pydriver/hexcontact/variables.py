@@ -25,7 +25,7 @@ class Variable:
     Attributes
     ----------
     dims : tuple of str
-        Some of ``step``, ``row``, ``col``.
+        Some of ``step``, ``row``, ``col``, ``trial``.
     units : str
         SI unit, ``"1"`` for a pure number, empty for text.
     long_name : str
@@ -151,3 +151,28 @@ VARIABLES: dict[str, Variable] = {
 }
 
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.is_field)
+
+_OF_THE_WORK = ("sweeps", "cuts", "operator_applications", "seconds", "segment", "label")
+ESTIMATED = tuple(
+    name
+    for name, variable in VARIABLES.items()
+    if variable.dims == ("step",) and name not in ("step", *_OF_THE_WORK) and not name.startswith("residual_")
+)
+"""Quantities of the history whose discretization error is estimated."""
+
+VARIABLES |= {
+    f"{name}_error": _scalar(VARIABLES[name].units, f"estimated discretization error: {VARIABLES[name].long_name}")
+    for name in ESTIMATED
+}
+VARIABLES |= {
+    "trial_level": Variable(("trial",), "1", "how often the lattice of the trial was refined", dtype="i4"),
+    "trial_copy": Variable(("trial",), "1", "number of the shifted copy, 0: the lattice itself", dtype="i4"),
+    "trial_spacing": Variable(("trial",), "m", "spacing of the lattice of the trial"),
+    "trial_origin_x": Variable(("trial",), "m", "x coordinate of a node of the trial"),
+    "trial_origin_y": Variable(("trial",), "m", "y coordinate of a node of the trial"),
+    "trial_nodes": Variable(("trial",), "1", "nodes of the window of the trial", dtype="i4"),
+}
+VARIABLES |= {
+    f"trial_{name}": Variable(("trial", "step"), VARIABLES[name].units, f"on each trial: {VARIABLES[name].long_name}")
+    for name in ESTIMATED
+}

@@ -37,6 +37,7 @@ TABLES: dict[str, type[Table]] = {
     "load": deck.Load,
     "series": load_series.Series,
     "columns": load_series.Columns,
+    "accuracy": deck.Accuracy,
     "output": deck.Output,
     "study": study_deck.StudyFile,
     "parameter": study_deck.Parameter,

@@ -9,7 +9,7 @@ of a coarser lattice: of the same spacing, with the origin moved by fractions of
 Both follow from a least-squares fit of q + c h^p to the last solutions, each weighted by 1/h, as a scatter
 in proportion to h asks for. The procedure is the same for every scalar of the history and every load step.
 It follows Eca and Hoekstra, Journal of Computational Physics 262 (2014) 104-130; factors and numbers here are
-those with which errors known from closed solutions stay within the estimate (docs/theory.md, section 13).
+those with which errors known from closed solutions stay within the estimate (docs/theory.md, section 12).
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def limits_of_error(spacings: Array, values: Array) -> Array:
         scatters.append(scatter)
         widths.append(SAFETY * trend + DEVIATIONS * math.sqrt(covariance[0, 0]) * scatter)
     possible = np.array(scatters) <= _ALIKE * np.min(scatters, axis=0)
-    return np.asarray(scale * np.where(possible, widths, 0.0).max(axis=0) + 0.0 * values[0])
+    return np.asarray(scale * np.where(possible, widths, 0.0).max(axis=0) + 0.0 * values.sum(axis=0))
 
 
 def relative_errors(histories: Sequence[History], errors: Sequence[Mapping[str, float]]) -> dict[str, float]:

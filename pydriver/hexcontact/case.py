@@ -562,7 +562,9 @@ class Case:
         third = self.on_lattice(self.lattice.spacing / 2, self.lattice.origin).lattice.size
         if third <= wanted.max_nodes:
             return []
-        sentence = f"expected at least {third}, the nodes of the third lattice, or a coarser grid to begin with"
+        sentence = (
+            f"expected at least {third}, the nodes of the third lattice, or a coarser grid to begin with"
+        )
         return [Problem(("accuracy", "max_nodes"), wanted.max_nodes, sentence)]
 
     def _gap_at(self, x: Array, y: Array) -> Array:

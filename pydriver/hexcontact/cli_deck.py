@@ -17,13 +17,15 @@ from .errors import DeckError
 def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Read a deck, report everything that is wrong with it, and say what would be run."""
     from . import json_output, run_command, summary
+    from .refinement import least_and_most
     from .window import require_memory
 
     case = run_command.case_of(deck, settings)
     if not as_json:
         console = summary.console()
         console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
-    require_memory(case, case.lattice)
+    first = least_and_most(case)[0][-1] if case.accuracy else case  # the first that may be the result
+    require_memory(first, first.lattice)
     target = run_command.target_of(case, deck)
     if as_json:
         return json_output.of_case(case, target)

@@ -47,6 +47,8 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
     console.print(summary.pairs("Last load step", summary.step_rows(histories[-1])))
     if case is not None and (rows := summary.hertz_rows(case, histories[-1])):
         console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+    if rows := summary.trial_rows(result):
+        console.print(summary.table("Accuracy", summary.TRIAL_HEADERS, rows))
     return None
 
 

@@ -55,7 +55,7 @@ class DeckError(HexcontactError, ValueError):
 
 
 class AccuracyWarning(UserWarning):
-    """The lattice could not be refined until the accuracy asked for was reached; the finest result is kept."""
+    """The lattice could not be refined to the accuracy asked for; the finest result is kept."""
 
     exit_code = 3
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -42,11 +43,22 @@ def seconds(case: Case) -> float | None:
 
 def work(case: Case) -> str:
     """Say it in words: "about 1,800 operator applications, about 4 s on one core"."""
-    applications, time = operator_applications(case), seconds(case)
-    if applications is None or time is None:
+    from .refinement import least_and_most
+
+    runs = least_and_most(case) if case.accuracy else ([case],)
+    applications = [_total(operator_applications(one) for one in cases) for cases in runs]
+    times = [_total(seconds(one) for one in cases) for cases in runs]
+    if None in applications or None in times:
         return "LAPACK on the nodes in contact, not estimated"
-    count = f"about {_rounded(applications):,} operator applications"
-    return f"{count}, about {_duration(time)} on one core"
+    count = " to ".join(f"{_rounded(number):,}" for number in applications if number)
+    durations = " to ".join(dict.fromkeys(_duration(time) for time in times if time))
+    return f"about {count} operator applications, about {durations} on one core"
+
+
+def _total(parts: Iterable[float | None]) -> float | None:
+    """Return the sum, or None if a part is not known."""
+    known = list(parts)
+    return None if None in known else sum(part for part in known if part is not None)
 
 
 def _rounded(number: float) -> int:

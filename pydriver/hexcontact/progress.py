@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .result import Step
 
-_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
 
 def quantity(value: float, unit: str = "", digits: int = 4) -> str:
@@ -32,10 +32,10 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
         return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
     rounded = float(f"{value:.{digits - 1}e}")
     power = 3 * math.floor(math.log10(abs(rounded)) / 3)
-    if not unit or power not in _PREFIXES:
+    if not unit or power not in PREFIXES:
         return f"{rounded:.{digits}g} {unit}".rstrip()
     scaled = f"{rounded / 10.0**power:#.{digits}g}".rstrip(".")
-    return f"{scaled} {_PREFIXES[power]}{unit}"
+    return f"{scaled} {PREFIXES[power]}{unit}"
 
 
 class Reporter:
@@ -54,13 +54,15 @@ class Reporter:
         """
         yield
 
-    def lattice(self, words: str) -> None:
+    def lattice(self, words: str, shifted: bool) -> None:
         """Hear that the load history begins again on another lattice.
 
         Parameters
         ----------
         words : str
             Which one, in words.
+        shifted : bool
+            Whether it is a shifted copy, which only serves to estimate errors.
         """
 
     def says(self, words: str) -> None:
@@ -94,6 +96,7 @@ class Lines(Reporter):
     def __init__(self, stream: IO[str]) -> None:
         self.stream = stream
         self.steps = 0
+        self._shifted = False
 
     @contextlib.contextmanager
     def watching(self, title: str, steps: int) -> Iterator[None]:
@@ -102,16 +105,19 @@ class Lines(Reporter):
         self._print(f"{title or 'case'}: {steps} load step{'s' * (steps != 1)}")
         yield
 
-    def lattice(self, words: str) -> None:
+    def lattice(self, words: str, shifted: bool) -> None:
         """Print which lattice is next."""
         self._print(words)
+        self._shifted = shifted
 
     def says(self, words: str) -> None:
         """Print it."""
         self._print(words)
 
     def finished(self, step: Step) -> None:
-        """Print the line of a step."""
+        """Print the line of a step; those of shifted copies tell nothing new."""
+        if self._shifted:
+            return
         width = len(str(self.steps))
         self._print(f"step {step.number:>{width}}/{self.steps}  {describe(step.history)}")
 
@@ -145,7 +151,7 @@ class Bar(Reporter):
         with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
             yield
 
-    def lattice(self, words: str) -> None:
+    def lattice(self, words: str, shifted: bool) -> None:
         """Start the bar again, with the name of the lattice."""
         self._bar.update(self._task, completed=0, description=f"{self._title}, {words.partition(':')[0]}")
 
@@ -225,6 +231,19 @@ def fitted(name: str, history: Mapping[str, Any]) -> float:
     """Return an area or radius to the edge between the nodes; as its nodes have it where no fit was kept."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
+
+
+def error_of(name: str, history: Mapping[str, Any]) -> str:
+    """Write the estimated error of what `fitted` or `load_or_motion` give, as " ± 0.05 %"; empty if none."""
+    own = name if math.isnan(float(history.get(f"{name}_fit", math.nan))) else f"{name}_fit"
+    value, error = abs(float(history[own])), float(history.get(f"{own}_error", 0.0))
+    least = _NOISE * _scale(name, history) if name in LOADS_AND_MOTIONS else 0.0
+    return f" ± {percent(error / value)}" if value > least and error > 0.0 else ""
+
+
+def percent(share: float) -> str:
+    """Write a share with two digits, as "0.051 %"."""
+    return f"{100.0 * share:.2g} %" if math.isfinite(share) else "-"
 
 
 def stick_share(history: Mapping[str, Any]) -> str:

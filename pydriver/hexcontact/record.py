@@ -83,8 +83,7 @@ def read_record(path: Path) -> tuple[Metadata, Step]:
             fields = {name: file[name] for name in about["fields"]}
         origin = tuple(about["lattice"].pop("origin"))
         lattice = Lattice(**about["lattice"], origin=origin)
-        chosen, resumed = (tuple(about["metadata"].pop(name)) for name in ("fields", "resumed"))
-        metadata = Metadata(**about["metadata"], fields=chosen, resumed=resumed)
+        metadata = Metadata.from_plain(about["metadata"])
         step = Step(about["index"], lattice, fields, about["history"])
         if fault := fault_of_record(metadata, step):
             raise DeckError(f"{path} is damaged: {fault}")

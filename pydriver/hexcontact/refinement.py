@@ -1,10 +1,10 @@
 """Refines the lattice of a case until its result is as accurate as asked for.
 
 Lattices that get finer by the square root of two are solved one after the other, each with the whole load
-history, until the last two agree to the target. Then four shifted copies of the lattice two levels below, which
-together have as many nodes as the finest, show the scatter, and errors are estimated. If they miss the target
-the next level follows. The solvers start every load step from coarser lattices of their own, so nothing is
-handed from one lattice to the next.
+history, until the last two agree to the target. Then four shifted copies of the lattice two levels below,
+which together have as many nodes as the finest, show the scatter, and errors are estimated. If they miss the
+target the next level follows. The solvers start every load step from coarser lattices of their own, so that
+nothing is handed from one lattice to the next.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from . import accuracy
+from . import accuracy, log
 from .accuracy import LEAST_LEVELS, RATIO, SHIFTS, Solution
-from .errors import ResourceError
+from .errors import ResourceError, StopRun
 from .progress import Reporter, quantity
 from .result import Metadata, Result, Step, assemble
 from .variables import ESTIMATED
@@ -62,7 +62,15 @@ class Trial:
 
 
 class Solver(ABC):
-    """Solves a case on one lattice after the other, and keeps what comes out."""
+    """Solves a case on one lattice after the other, and keeps what comes out.
+
+    Attributes
+    ----------
+    in_memory : bool
+        Whether the load steps of a lattice stay in memory.
+    """
+
+    in_memory: ClassVar[bool] = False
 
     @abstractmethod
     def solve(self, trial: Trial, case: Case) -> Solution:
@@ -161,16 +169,18 @@ def refine(case: Case, solver: Solver, shown: Reporter) -> Outcome:
         If a load step cannot be solved on one of the lattices.
     """
     assert case.accuracy is not None
-    target, levels, copies = case.accuracy.target, [], []
+    target = case.accuracy.target
+    levels: list[Solution] = []
+    copies: list[Solution] = []
     while True:
         trial = Trial(len(levels))
         levels.append(_solved(trial, trial.case(case), solver, shown))
-        limit = limit_of(case, levels[-1])
+        limit = limit_of(case, levels[-1], solver.in_memory)
         if len(levels) < LEAST_LEVELS:
             if limit:
                 raise ResourceError(f"{limit}; errors cannot be told from fewer than {LEAST_LEVELS} lattices")
             continue
-        if not limit and not _meets(accuracy.changes(*levels[-2:], case.load_steps), target):
+        if not limit and not _meets(accuracy.changes(levels[-2], levels[-1], case.load_steps), target):
             continue
         coarse = len(levels) - LEAST_LEVELS
         for copy in range(1, len(SHIFTS) + 1):
@@ -180,6 +190,7 @@ def refine(case: Case, solver: Solver, shown: Reporter) -> Outcome:
         errors = accuracy.estimated_errors(solutions, case.load_steps)
         relative = accuracy.relative_errors(levels[-1].histories, errors)
         name, error = accuracy.worst(relative)
+        log.logger.info(log.words("errors", worst=name, error=error, target=target))
         shown.says(f"estimated error {100 * error:.2g} % ({_words(name)}), target {100 * target:.3g} %")
         if limit or _meets(relative, target):
             return Outcome(solutions, errors, relative, target, limit)
@@ -187,7 +198,10 @@ def refine(case: Case, solver: Solver, shown: Reporter) -> Outcome:
 
 def _solved(trial: Trial, case: Case, solver: Solver, shown: Reporter) -> Solution:
     lattice = case.lattice
-    shown.lattice(f"{trial.name}: spacing {quantity(lattice.spacing, 'm')}, {lattice.size:,} nodes")
+    log.logger.info(log.words("lattice", name=trial.name, spacing=lattice.spacing, nodes=lattice.size))
+    shown.lattice(
+        f"{trial.name}: spacing {quantity(lattice.spacing, 'm')}, {lattice.size:,} nodes", trial.copy > 0
+    )
     return solver.solve(trial, case)
 
 
@@ -199,32 +213,38 @@ def _words(name: str) -> str:
     return name.removesuffix("_fit").replace("_", " ")
 
 
-def limit_of(case: Case, last: Solution) -> str:
+def limit_of(case: Case, last: Solution, in_memory: bool) -> str:
     """Return what keeps the lattice from being refined after a solution; empty if nothing does."""
     from .window import require_memory
 
     assert case.accuracy is not None
     try:
         finer = Trial(last.level + 1).case(case)
-        nodes = max(finer.lattice.size, math.ceil(RATIO**2 * last.nodes))  # a window that grew will grow again
+        nodes = max(
+            finer.lattice.size, math.ceil(RATIO**2 * last.nodes)
+        )  # a window that grew will grow again
         if nodes > case.accuracy.max_nodes:
             return (
                 f"the next lattice has about {nodes:,} nodes, more than "
                 f"accuracy.max_nodes = {case.accuracy.max_nodes:,}"
             )
-        require_memory(finer, finer.lattice)
+        require_memory(finer, finer.lattice, len(case.load_steps) if in_memory else 0)
     except ResourceError as error:
         return str(error)
     return ""
 
 
-def level_within(case: Case) -> int:
-    """Return the finest level that the number of nodes allows."""
+def least_and_most(case: Case) -> tuple[list[Case], list[Case]]:
+    """Return a case on all lattices of the shortest refinement, and of the longest that max_nodes allows.
+
+    The last one is the finest.
+    """
     assert case.accuracy is not None
-    level = LEAST_LEVELS - 1
-    while Trial(level + 1).case(case).lattice.size <= case.accuracy.max_nodes:
-        level += 1
-    return level
+    coarse, levels = Trial(0).case(case), [Trial(level).case(case) for level in range(LEAST_LEVELS)]
+    least = [coarse] * len(SHIFTS) + levels
+    while (finer := Trial(len(levels)).case(case)).lattice.size <= case.accuracy.max_nodes:
+        levels.append(finer)
+    return least, [*(levels[: 1 - LEAST_LEVELS] * len(SHIFTS)), *levels]
 
 
 # --- in memory ----------------------------------------------------------------------------------------------
@@ -241,13 +261,15 @@ class InMemory(Solver):
         Called with each finished `Step`.
     """
 
+    in_memory = True
+
     def __init__(self, shown: Reporter, on_step: Callable[[Step], object] | None) -> None:
         self._shown, self._on_step = shown, on_step
         self.steps: list[Step] = []
 
     def solve(self, trial: Trial, case: Case) -> Solution:
         """Solve the load history on a lattice."""
-        from .solve import steps
+        from .solve import steps, stops
 
         if not trial.copy:
             self.steps.clear()
@@ -256,9 +278,10 @@ class InMemory(Solver):
             heads.append(step.head)
             if not trial.copy:
                 self.steps.append(step)
+            log.finished(step, len(case.load_steps))
             self._shown.finished(step)
-            if self._on_step is not None:
-                self._on_step(step)
+            if stopped := stops(self._on_step, step, more=True):
+                raise StopRun(stopped)
         return solution_of(trial, case, heads)
 
 
@@ -275,6 +298,10 @@ def in_memory(case: Case, shown: Reporter, on_step: Callable[[Step], object] | N
     from .solve import metadata_of
 
     solver = InMemory(shown, on_step)
-    outcome = refine(case, solver, shown)
+    try:
+        outcome = refine(case, solver, shown)
+    except StopRun as wanted:  # of the lattice that was under way, without errors
+        dataset = assemble(metadata_of(case), solver.steps, complete=False)
+        return Result(dataset.assign_attrs(stopped=str(wanted)))
     steps = [outcome.with_errors(step) for step in solver.steps]
     return Result(assemble(outcome.metadata(metadata_of(case)), steps, trials=outcome.trials))

@@ -122,6 +122,7 @@ def report(result: Result) -> str:
         loads=_loads(histories),
         deck=_deck(result.deck),
         hertz=_hertz(result, histories[-1]),
+        accuracy=_accuracy(result),
         residuals=_residuals(histories),
         provenance=_pairs(_provenance(result, histories)),
         data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
@@ -133,6 +134,8 @@ def report(result: Result) -> str:
 
 
 def _status(result: Result) -> str:
+    if result.shortfall:
+        return f'<p class="warning" role="note">{html.escape(result.shortfall)}</p>'
     if result.complete:
         return ""
     planned = int(result.dataset.attrs.get("planned_steps", 0))
@@ -154,10 +157,13 @@ def _kept(shown: int, steps: int) -> str:
 def _inputs(result: Result) -> list[tuple[str, ...]]:
     attributes, sizes = result.dataset.attrs, result.dataset.sizes
     case = summary.case_of(result)
-    left_out = ("window", "memory", "load steps")
+    left_out = {"window", "memory", "load steps"}
     rows: list[tuple[str, ...]] = []
+    if case is not None and case.accuracy:
+        left_out |= {"spacing", "accuracy", "work"}  # those of the first lattice, and guesses
+        rows = [("spacing", quantity(float(attributes["lattice_spacing"]), "m"))]
     if case is not None:
-        rows = [row for row in summary.case_rows(case) if row[0] not in left_out]
+        rows = [row for row in summary.case_rows(case) if row[0] not in left_out] + rows
     elif "effective_modulus" in attributes:
         rows = [
             (
@@ -242,6 +248,11 @@ def _hertz(result: Result, history: History) -> str:
     case = summary.case_of(result)
     rows = summary.hertz_rows(case, history) if case is not None else []
     return _table("Last load step against Hertz", summary.HERTZ_HEADERS, rows) if rows else ""
+
+
+def _accuracy(result: Result) -> str:
+    rows = summary.trial_rows(result)
+    return _table("Accuracy", summary.TRIAL_HEADERS, rows) if rows else ""
 
 
 def _residuals(histories: Sequence[History]) -> str:

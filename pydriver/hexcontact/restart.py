@@ -19,8 +19,9 @@ from .errors import DeckError, HexcontactError
 from .netcdf import read_output
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, now
-from .solve import metadata_of, record
+from .solve import checked, metadata_of, record
 from .store import Store, journal_of, open_result
+from .trial_folder import TrialFolder
 
 if TYPE_CHECKING:
     from .case import Case
@@ -96,12 +97,12 @@ def resume(
     shown = progress if isinstance(progress, Reporter) else reporter(quiet=not progress)
     with reopened(path, case, overrides) as restart:
         if restart is None:
-            return open_result(path)
+            return checked(open_result(path))
         if restart.warning:
             warnings.warn(restart.warning, stacklevel=2)
         with shown.watching(restart.case.title, len(restart.case.load_steps)):
             record(restart.case, restart.store, shown, on_step, restart.before)
-    return open_result(restart.store.path)
+    return checked(open_result(restart.store.path))
 
 
 @contextlib.contextmanager
@@ -116,7 +117,8 @@ def reopened(
         None if the run is finished already.
     """
     store, last = _found(_output_of(Path(path)))
-    if store is None or last is None:
+    refines = store is not None and bool(TrialFolder(store.folder))
+    if store is None or (last is None and not refines):
         if store is not None:
             store.close()
         yield None
@@ -130,7 +132,8 @@ def reopened(
         store.close()  # and leave the reason why the run stopped as it is
         raise
     with store:
-        yield Restart(case, store, [*store.heads[:-1], last], _warning(store.metadata))
+        before = [] if last is None else [*store.heads[:-1], last]
+        yield Restart(case, store, before, _warning(store.metadata))
 
 
 def _output_of(path: Path) -> Path:
@@ -202,12 +205,18 @@ def _physics(deck: str) -> dict[str, Any]:
     return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
 
 
-def _check(case: Case, store: Store, last: Step) -> None:
+def _check(case: Case, store: Store, last: Step | None) -> None:
     """See to it that the case is the one of the steps, though files that its deck names may have changed."""
-    found = f"{len(store.heads)} finished steps of {store.path}"
+    found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
     planned = store.metadata.planned_steps
     if len(case.load_steps) != planned:
         raise DeckError(f"the deck now has {len(case.load_steps)} load steps; the {found} are of {planned}")
+    if last is not None:
+        check_step(case, last, found)
+
+
+def check_step(case: Case, last: Step, found: str) -> None:
+    """See to it that lattice and surfaces of a case are those of a finished step; `found` names it."""
     if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
         raise DeckError(f"the deck now leads to another lattice than that of the {found}")
     gap, touching = case.initial_gap(last.lattice)
@@ -226,7 +235,10 @@ def _continued(store: Store, case: Case) -> Metadata:
         for name, value in new.parameters.items()
         if name == "tolerance" and value != old.parameters.get(name)
     ]
-    line = f"{now()} resumed after step {len(store.heads)} by hexcontact {__version__}"
+    done = f"step {len(store.heads)}"
+    if trials := TrialFolder(store.folder):
+        done = f"{len(trials.read()[1])} lattices"
+    line = f"{now()} resumed after {done} by hexcontact {__version__}"
     return dataclasses.replace(
         old,
         deck=new.deck,

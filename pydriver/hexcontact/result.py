@@ -108,6 +108,12 @@ class Metadata:
         return {**self.parameters, **own}
 
     @classmethod
+    def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
+        """Return what `dataclasses.asdict` had, from JSON."""
+        tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
+        return cls(**{**values, **tuples})
+
+    @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
         """Read them back.
 

@@ -10,16 +10,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+import typer
+
 from . import json_output, log, solve, summary
 from .cli_guard import complain
 from .cli_options import LogLevel, setting
-from .errors import DeckError
+from .errors import AccuracyWarning, DeckError
 from .interruption import Interrupted, in_background
 from .progress import reporter
+from .store import open_result
 
 if TYPE_CHECKING:
     from .case import Case
-    from .result import Step
+    from .result import Result, Step
     from .store import Store
 
 _PICTURES = (".png", ".pdf", ".svg")
@@ -89,12 +92,22 @@ class Listeners:
         picture: Path | None,
         warnings: Sequence[str] = (),
     ) -> dict[str, Any] | None:
-        """Print, or return, what came out."""
+        """Print, or return, what came out; an accuracy that was asked for and not reached too."""
+        refined = open_result(target) if case.accuracy else None
+        shortfall = refined.shortfall if refined is not None else ""
+        if refined is not None:
+            histories = refined.history.to_dict("records")  # of the finest lattice, with errors
+        if shortfall:
+            complain(shortfall)
         if self.as_json:
-            written = {"output": target, "picture": picture, "warnings": list(warnings)}
+            told = [*warnings, *([shortfall] if shortfall else [])]
+            written: dict[str, Any] = {"output": target, "picture": picture, "warnings": told}
+            written["exit_code"] = AccuracyWarning.exit_code if shortfall else 0
             return written | json_output.of_run(case, case.title, histories)
         if not self.quiet:
-            summarize(case, histories, target, picture)
+            summarize(case, histories, target, picture, refined)
+        if shortfall:
+            raise typer.Exit(AccuracyWarning.exit_code)
         return None
 
 
@@ -123,7 +136,7 @@ def solved(
 def _leave(store: Store, signaled: Interrupted, listeners: Listeners) -> NoReturn:
     """Say what is kept after an interruption and end the process, whatever the core is doing."""
     store.close(f"interrupted ({signaled.name})")
-    kept = store.kept if store.heads else "no load step was finished"
+    kept = store.kept or "no load step was finished"
     message = f"interrupted; {kept}"
     with contextlib.suppress(OSError):  # nobody listens any more
         log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", done=len(store.heads)))
@@ -139,13 +152,14 @@ def _leave(store: Store, signaled: Interrupted, listeners: Listeners) -> NoRetur
 def overview(path: Path) -> Path:
     """Draw a result beside its file."""
     from .plot_command import picture_of
-    from .store import open_result
 
     return picture_of([open_result(path)], "overview", path.with_suffix(".png"), {})
 
 
-def summarize(case: Case, histories: list[Any], target: Path, picture: Path | None) -> None:
-    """Print what came out: the history, the last step, and how it compares with Hertz."""
+def summarize(
+    case: Case, histories: list[Any], target: Path, picture: Path | None, refined: Result | None = None
+) -> None:
+    """Print what came out: history, last step, how it compares with Hertz; lattices and errors."""
     console, last = summary.console(), histories[-1]
     if len(histories) > 1:
         console.print(summary.history_table(histories, console))
@@ -153,14 +167,14 @@ def summarize(case: Case, histories: list[Any], target: Path, picture: Path | No
                                 summary.step_rows(last)))  # fmt: skip
     if rows := summary.hertz_rows(case, last):
         console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+    if refined is not None:
+        console.print(summary.table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
     console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)
 
 
 def was_finished(file: Path, picture: Path | None, listeners: Listeners) -> dict[str, Any] | None:
     """Say that there was nothing to go on with."""
     if listeners.as_json:
-        from .store import open_result
-
         result = open_result(file)
         histories, case = json_output.histories_of(result), summary.case_of(result)
         written: dict[str, Any] = {"output": file, "picture": picture, "warnings": []}

@@ -80,8 +80,8 @@ def run(
     overwrite : bool
         Replace an output that is there already.
     on_step : callable, optional
-        Called with each finished `Step`, after it was written; of every lattice, if the case has an accuracy to
-        reach. If it returns something true, or raises `hexcontact.StopRun`, the run ends there; any other
+        Called with each finished `Step`, after it was written; of every lattice, if the case has an accuracy
+        to reach. If it returns something true, or raises `hexcontact.StopRun`, the run ends there; any other
         exception ends it, too, and is passed on.
     progress : Reporter or bool, optional
         Who is told about each step; True: a bar on a terminal, lines otherwise.
@@ -195,10 +195,10 @@ def record(
     log.logger.info(log.words("written", file=store.path))
 
 
-def stops(on_step: Callable[[Step], object] | None, step: Step) -> str:
+def stops(on_step: Callable[[Step], object] | None, step: Step, more: bool = False) -> str:
     """Tell a callback of a finished step; return why the run ends here, nothing if it goes on.
 
-    The last step of a run ends it anyway.
+    The last step of a run ends it anyway, unless `more` lattices follow.
     """
     if on_step is None:
         return ""
@@ -209,7 +209,7 @@ def stops(on_step: Callable[[Step], object] | None, step: Step) -> str:
         reason = wish if isinstance(wish, str) else ""
     except StopRun as wanted:
         reason = str(wanted)
-    if step.load_fraction >= 1.0:
+    if step.load_fraction >= 1.0 and not more:
         return ""
     return f"stopped by on_step after step {step.number}" + (f": {reason}" if reason else "")
 

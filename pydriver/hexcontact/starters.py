@@ -50,6 +50,9 @@ title = "{title}"
 # method = "auto"                 # or direct, fft
 # tolerance = 1e-8
 
+# [accuracy]                      # refines the lattice; every number then has an error bar
+# target = 0.01
+
 [[load]]                          # add more [[load]] tables for a history
 {load}
 {steps}

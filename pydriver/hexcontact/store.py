@@ -17,15 +17,16 @@ import shlex
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from .errors import DeckError, HexcontactError, ResourceError
 from .lock import Lock
 from .netcdf import flush, read_output, reading, write
 from .record import SUFFIX, read_record, write_record
 from .result import Layout, Metadata, Result, Step, assemble
+from .trial_folder import TrialFolder
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
@@ -95,6 +96,7 @@ class Journal:
         """Delete the records, why they are not all, and what an interrupted write left; the lock stays."""
         for path in self.records:
             path.unlink(missing_ok=True)
+        TrialFolder(self.folder).remove()
         self.tidy()
 
     def tidy(self) -> None:
@@ -133,6 +135,8 @@ def open_result(path: str | os.PathLike[str]) -> Result:
             if output is not None and output.complete:
                 return output
             journal = Journal(journal_of(target))
+            if not journal and output is None and (trials := TrialFolder(journal.folder)):
+                return trials.result(target)
             if journal and (output is None or _continues(journal, output)):
                 if output is not None:
                     output.close()
@@ -182,7 +186,7 @@ class Store:
     def __init__(self, path: str | os.PathLike[str], metadata: Metadata, overwrite: bool = False) -> None:
         self._at(path)
         self.metadata = metadata
-        with self._writing("the journal"):
+        with self.writing("the journal"):
             self._lock = self._locked()
         try:
             self._take_over(overwrite)
@@ -207,7 +211,7 @@ class Store:
         store : Store
             Holds the lock.
         last : Step or None
-            The last finished step with all its fields; None if the run is finished.
+            The last finished step with all its fields; None if the run is finished, or refines its lattice.
 
         Raises
         ------
@@ -220,7 +224,7 @@ class Store:
         store._at(path)
         if not store.folder.is_dir():
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(store.folder))
-        with store._writing("the journal", missing=True):
+        with store.writing("the journal", missing=True):
             store._lock = Lock(store.folder / "lock", store.path)
         try:
             return store, store._read_again()
@@ -236,28 +240,37 @@ class Store:
         self._mutex = threading.RLock()  # close() may come from another thread than append()
         self._closed = False
         self._published = (0, time.monotonic())
+        self.interim = True  # whether a long run also writes outputs on the way
         if self.path.is_dir():
             raise DeckError(f"{self.path} is a folder; a file name is expected")
         if self.path.exists() and not self.path.is_file():  # to replace it would take a device away
             raise DeckError(f"{self.path} is not a regular file; choose another output")
         if not self.path.parent.is_dir():
             raise DeckError(f"cannot write {self.path}: the folder {self.path.parent} does not exist")
-        with self._writing("the journal"):
+        with self.writing("the journal"):
             if not os.access(self.path.parent, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     def _read_again(self) -> Step | None:
         """Read all records, so that damage shows now and not after the last step; return the last one."""
-        journal = Journal(self.folder)
+        journal, trials = Journal(self.folder), TrialFolder(self.folder)
+        left = trials.read()[0] if trials else None
         output = None
         with contextlib.suppress(DeckError):  # what is no result may not be replaced
             output = read_output(self.path) if self.path.exists() else None
-        ours = output is not None and (not journal or same_run(journal, output))
+        if left is not None:
+            ours = output is not None and output.dataset.attrs.get("run") == left.run
+        else:
+            ours = output is not None and (not journal or same_run(journal, output))
         steps, complete = (len(output), output.complete) if output is not None else (0, False)
         if output is not None:
             output.close()
         if ours and complete:  # killed while it cleared the journal away
             journal.remove()
+            return None
+        if left is not None:
+            self.metadata = left
+            self._refuse_newer(not ours, trials.ledger)
             return None
         if not journal and output is not None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self.folder))
@@ -277,19 +290,23 @@ class Store:
         self.metadata = journal.metadata
         with reading(self.folder, "a journal"):
             Layout(self.metadata, self.heads)  # fails if the steps do not belong together
-        self._in_the_way = self.path.exists() and not ours
-        if self._in_the_way and self.path.stat().st_mtime > journal.records[0].stat().st_mtime:
-            raise DeckError(
-                f"{self.path} is not of the run that left its steps in {self.folder}, and newer; move it away"
-            )
+        self._refuse_newer(not ours, journal.records[0])
         if ours:
             self._published = (steps, time.monotonic())
         return last
 
+    def _refuse_newer(self, foreign: bool, left: Path) -> None:
+        """Refuse an output of another run that is newer than what this one left."""
+        self._in_the_way = self.path.exists() and foreign
+        if self._in_the_way and self.path.stat().st_mtime > left.stat().st_mtime:
+            raise DeckError(
+                f"{self.path} is not of the run that left its steps in {self.folder}, and newer; move it away"
+            )
+
     def go_on(self, metadata: Metadata) -> None:
         """Begin to add steps to those of a journal that was opened again."""
         self.metadata = metadata
-        with self._writing("the journal"):
+        with self.writing("the journal"):
             Journal(self.folder).tidy()
 
     def _locked(self) -> Lock:
@@ -307,13 +324,15 @@ class Store:
             raise DeckError(
                 f"{self.path} is not a netCDF file, so it is not overwritten; choose another output"
             )
-        left = Journal(self.folder)
-        if left and not overwrite:
+        left, trials = Journal(self.folder), TrialFolder(self.folder)
+        if (left or trials) and not overwrite:
+            count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
             raise DeckError(
-                f"{self.folder} holds {_steps(len(left))} of an unfinished run; hexcontact resume "
-                f"{shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in Python) starts anew"
+                f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
+                f"hexcontact resume {shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in "
+                "Python) starts anew"
             )
-        with self._writing("the journal"):
+        with self.writing("the journal"):
             if left:  # they become the old output, which is only replaced by a complete new one
                 with contextlib.suppress(DeckError):
                     old = read_output(self.path) if self.path.exists() else None
@@ -332,18 +351,22 @@ class Store:
         """Close it; an error on its way out is written down, and told what is kept."""
         known = isinstance(error, HexcontactError | KeyboardInterrupt)
         self.close((str(error) or "interrupted") if known else "")
-        if isinstance(error, HexcontactError) and self.heads:
+        if isinstance(error, HexcontactError) and self.kept:
             error.add_note(self.kept)
 
     @property
     def kept(self) -> str:
-        """Sentence about the finished steps: how many, where, how to look at them."""
+        """Sentence about what is finished: how much, where, how to go on; empty if nothing is."""
         where = self.folder if self.folder.exists() else self.path
-        steps = f"{len(self.heads)} of {self.metadata.planned_steps} load steps are finished"
-        return f"{steps} and kept in {where}; to go on: hexcontact resume {shlex.quote(str(self.path))}"
+        finished = TrialFolder(self.folder).kept
+        if self.heads:
+            finished = f"{len(self.heads)} of {self.metadata.planned_steps} load steps are finished"
+        if not finished:
+            return ""
+        return f"{finished} and kept in {where}; to go on: hexcontact resume {shlex.quote(str(self.path))}"
 
     @contextlib.contextmanager
-    def _writing(self, what: str, missing: bool = False) -> Iterator[None]:
+    def writing(self, what: str, missing: bool = False) -> Iterator[None]:
         """Turn a failure to write into one sentence that names the file and the step."""
         try:
             yield
@@ -386,17 +409,19 @@ class Store:
                 raise ValueError("the store is closed")
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
-            with self._writing(f"step {step.number}"):
+            with self.writing(f"step {step.number}"):
                 record = self.folder / f"{step.number:06d}{SUFFIX}"
                 self._replace(record, lambda path: write_record(path, self.metadata, step))
             self.heads.append(step.head)
             steps, moment = self._published
             due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
-            if due and not self._in_the_way:  # doubling keeps the cost of all interim versions linear
+            if (
+                due and self.interim and not self._in_the_way
+            ):  # doubling keeps the cost of all interim versions linear
                 self._publish(complete=False)
 
     def _publish(self, complete: bool) -> None:
-        with self._writing("the output"):
+        with self.writing("the output"):
             self._put_together(Layout(self.metadata, self.heads), Journal(self.folder), complete)
         self._published = (len(self.heads), time.monotonic())
 
@@ -413,6 +438,32 @@ class Store:
             Journal(self.folder).remove()
             self.close()
 
+    def finish_with(
+        self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]
+    ) -> None:
+        """Put an output of steps that are kept elsewhere in its place and clear the journal away.
+
+        Parameters
+        ----------
+        metadata : Metadata
+            What the output says about the run.
+        steps : iterable of Step
+            The steps; gone through twice, so not a generator.
+        trials : mapping of str to sequence
+            What was solved on other lattices, as for `hexcontact.result.Layout`.
+
+        Raises
+        ------
+        DeckError, ResourceError
+            If it cannot be written; the journal is kept.
+        """
+        layout = Layout(metadata, [step.head for step in steps], trials)
+        with self._mutex:
+            with self.writing("the output"):
+                self._replace(self.path, lambda path: write(path, layout, steps, complete=True))
+            Journal(self.folder).remove()
+            self.close()
+
     def close(self, reason: str = "") -> None:
         """Let go of the files; the journal of an unfinished run stays.
 
@@ -425,13 +476,9 @@ class Store:
             if self._closed:
                 return
             self._closed = True
-            if reason and self.heads:
+            if reason and (self.heads or TrialFolder(self.folder)):
                 with contextlib.suppress(OSError):
                     (self.folder / _STOPPED).write_text(reason, encoding="utf-8")
             self._lock.release()
             with contextlib.suppress(OSError):  # unless there are records in it
                 self.folder.rmdir()
-
-
-def _steps(count: int) -> str:
-    return f"{count} finished step{'s' * (count != 1)}"

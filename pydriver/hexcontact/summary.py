@@ -11,14 +11,18 @@ from typing import TYPE_CHECKING, Any
 from .errors import HexcontactError
 from .progress import (
     LOADS_AND_MOTIONS,
+    PREFIXES,
+    error_of,
     fitted,
     is_frictional,
     load_or_motion,
+    percent,
     quantity,
     residuals,
     stick_share,
     worth_showing,
 )
+from .variables import VARIABLES
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -79,7 +83,6 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
 def case_rows(case: Case) -> list[Row]:
     """Return what would be run."""
     from .estimates import work
-    from .window import memory_needed
 
     lattice = case.lattice
     span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)  # the window may be too large to fill
@@ -97,12 +100,34 @@ def case_rows(case: Case) -> list[Row]:
             f"{lattice.n_row} x {lattice.n_col} nodes ({lattice.size:,}), {quantity(span[0], 'm')} x "
             f"{quantity(span[1], 'm')}, {'fixed' if case.window_fixed else 'grows with the contact'}",
         ),
+        *([("accuracy", _accuracy(case))] if case.accuracy else []),
         ("load steps", _history(case)),
         ("largest load", _largest(case)),
         ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
-        ("memory", f"{quantity(memory_needed(case, lattice), 'B', 3)}"),
+        ("memory", _memory(case)),
         ("work", work(case)),
     ]  # fmt: skip
+
+
+def _memory(case: Case) -> str:
+    from .refinement import least_and_most
+    from .window import memory_needed
+
+    last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
+    return " to ".join(quantity(memory_needed(one, one.lattice), "B", 3) for one in last)
+
+
+def _accuracy(case: Case) -> str:
+    """Say what is to be reached, and between which lattices the refinement will end."""
+    from .refinement import least_and_most
+
+    assert case.accuracy is not None
+    last = [cases[-1].lattice for cases in least_and_most(case)]
+    spacings = [quantity(lattice.spacing, "m") for lattice in last]
+    return (
+        f"target {percent(case.accuracy.target)}: spacing and window are of the first lattice, the last "
+        f"has {' to '.join(spacings)} ({' to '.join(f'{lattice.size:,}' for lattice in last)} nodes)"
+    )
 
 
 def _friction(case: Case) -> str:
@@ -163,10 +188,13 @@ def _surface(surface: Surface | None) -> str:
 
 
 def step_rows(history: History) -> list[Row]:
-    """Return what a load step came to, with its residuals."""
-    rows = [(_words(name), load_or_motion(name, history)) for name in worth_showing([history])]
+    """Return what a load step came to, with its estimated errors and residuals."""
+    rows = [
+        (_words(name), load_or_motion(name, history) + error_of(name, history))
+        for name in worth_showing([history])
+    ]
     rows += [
-        (_words(name), quantity(fitted(name, history), unit))
+        (_words(name), quantity(fitted(name, history), unit) + error_of(name, history))
         for name, unit in _FURTHER.items()
         if name in history
     ]
@@ -202,27 +230,50 @@ def _work(history: History) -> str:
 def history_table(histories: Sequence[History], console: Console) -> Table:
     """Return a table of the load steps; of a long history only some steps, the last among them.
 
-    The residual is the largest of a step. What a narrow console has no room for is left out.
+    The residual is the largest of a step. What a narrow console has no room for is left out, estimated errors
+    as the last.
     """
     stride = max(1, math.ceil(len(histories) / _MOST_ROWS))
     chosen = [k for k in range(len(histories)) if (len(histories) - 1 - k) % stride == 0]
+    for told in (_and_error, _alone):
+        columns = _columns(histories, told)
+        for spare in ("", "time", "label", "residual"):
+            columns.pop(spare, None)
+            rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
+            shown = table("History", ("step", *columns), rows, tight=True)
+            if console.measure(shown, options=console.options.update_width(1000)).maximum <= console.width:
+                return shown
+    return shown
+
+
+_Told = Callable[[str, str, History], str]
+
+
+def _alone(text: str, name: str, history: History) -> str:
+    return text
+
+
+def _and_error(text: str, name: str, history: History) -> str:
+    return text + error_of(name, history)
+
+
+def _columns(histories: Sequence[History], told: _Told) -> dict[str, Callable[[History], str]]:
+    """Return what a table of load steps shows, by its header."""
+
+    def column(entry: Callable[[History], str], name: str) -> Callable[[History], str]:
+        return lambda history: told(entry(history), name, history)
+
     columns: dict[str, Callable[[History], str]] = {"label": lambda h: str(h.get("label", ""))}
     for name in worth_showing(histories):
-        columns[LOADS_AND_MOTIONS[name][0]] = functools.partial(load_or_motion, name)
+        columns[LOADS_AND_MOTIONS[name][0]] = column(functools.partial(load_or_motion, name), name)
     if is_frictional(histories[-1]):
-        columns["stick"] = stick_share
+        columns["stick"] = column(stick_share, "stick_area")
     else:
-        columns["p_max"] = lambda h: quantity(h["max_pressure"], "Pa")
-        columns["radius"] = lambda h: quantity(fitted("contact_radius", h), "m")
+        columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
+        columns["radius"] = column(lambda h: quantity(fitted("contact_radius", h), "m"), "contact_radius")
     columns["residual"] = lambda h: f"{max(residuals(h).values(), default=math.nan):.1e}"
     columns["time"] = lambda h: quantity(h["seconds"], "s", 3)
-    for spare in ("", "time", "label", "residual"):
-        columns.pop(spare, None)
-        rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
-        shown = table("History", ("step", *columns), rows, tight=True)
-        if console.measure(shown, options=console.options.update_width(1000)).maximum <= console.width:
-            break
-    return shown
+    return columns
 
 
 # --- against Hertz --------------------------------------------------------------------------------
@@ -279,14 +330,66 @@ def hertz_rows(case: Case, history: History) -> list[Row]:
         "contact_radius_fit": "contact radius (to the edge)",
         "contact_radius": "contact radius (area of the nodes)",
     }
-    return [
-        (named.get(name, _words(name)), quantity(exact, unit, 6), quantity(value, unit, 6),
-         f"{100 * (value / exact - 1):+.3f} %")
-        for name, exact, value, unit in against_hertz(case, history)
-    ]  # fmt: skip
+    rows: list[Row] = []
+    for name, exact, value, unit in against_hertz(case, history):
+        off, error = f"{100 * (value / exact - 1):+.3f} %", float(history.get(f"{name}_error", math.nan))
+        if not math.isnan(error):
+            off += f" (± {percent(error / value)} estimated)"
+        rows.append((named.get(name, _words(name)), quantity(exact, unit, 6), quantity(value, unit, 6), off))
+    return rows
 
 
 HERTZ_HEADERS = ("", "Hertz", "computed", "difference")
+
+
+# --- accuracy -------------------------------------------------------------------------------------
+
+
+def _value(value: float, unit: str) -> str:
+    """Write a number to five digits; prefixes of squares are squared, too."""
+    if unit != "m2" or value <= 0.0:
+        return quantity(value, unit, 5)
+    power = 3 * math.floor((math.log10(value) + 1) / 6)  # from 0.1 of a unit on
+    return f"{value / 10.0 ** (2 * power):#.5g} ".replace(". ", " ") + f"{PREFIXES[power]}m²"
+
+
+TRIAL_HEADERS = ("", "first lattice", "last but one", "last", "largest error")
+
+
+def trial_rows(result: Result) -> list[Row]:
+    """Return what decides about the accuracy of a result that was refined, at the last load step.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+
+    Returns
+    -------
+    list of rows
+        Quantity, on three of the lattices, largest error of all load steps in its largest value; empty if
+        the lattice was not refined.
+    """
+    from .accuracy import JUDGED, relative_errors
+
+    data = result.dataset
+    if "trial_spacing" not in data:
+        return []
+    own = data.isel(trial=data["trial_copy"].values == 0)
+    shown = [0, -2, -1]
+    names = [name for name in JUDGED if name in data]
+    histories = result.history.to_dict("records")
+    errors = [{name: history[f"{name}_error"] for name in names} for history in histories]
+    relative = relative_errors(histories, errors)
+    rows = [
+        ("spacing", *(quantity(float(own["trial_spacing"][k]), "m") for k in shown), ""),
+        ("nodes", *(f"{int(own['trial_nodes'][k]):,}" for k in shown), ""),
+    ]
+    for name in names:
+        values = own[f"trial_{name}"].isel(step=-1)
+        told = (_value(float(values[k]), VARIABLES[name].units) for k in shown)
+        rows.append((_words(name.removesuffix("_fit")), *told, percent(relative[name])))
+    return [*rows, ("target", "", "", "", percent(float(data.attrs["accuracy_target"])))]
 
 
 # --- a file ---------------------------------------------------------------------------------------
@@ -306,8 +409,17 @@ def file_rows(result: Result) -> list[Row]:
         ("window", f"{sizes['row']} x {sizes['col']} nodes"),
         ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
         ("algorithm", algorithm(attributes)),
+        *([("accuracy", _reached(attributes))] if "accuracy_reached" in attributes else []),
         ("fields", ", ".join(fields)),
     ]
+
+
+def _reached(attributes: Mapping[str, Any]) -> str:
+    """Say whether the accuracy that was asked for is reached."""
+    if "accuracy_shortfall" in attributes:
+        return str(attributes["accuracy_shortfall"])
+    error, target = (percent(float(attributes[f"accuracy_{name}"])) for name in ("estimate", "target"))
+    return f"target {target} reached: estimated error {error}"
 
 
 def algorithm(attributes: Mapping[str, Any]) -> str:

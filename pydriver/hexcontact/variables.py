@@ -161,7 +161,9 @@ ESTIMATED = tuple(
 """Quantities of the history whose discretization error is estimated."""
 
 VARIABLES |= {
-    f"{name}_error": _scalar(VARIABLES[name].units, f"estimated discretization error: {VARIABLES[name].long_name}")
+    f"{name}_error": _scalar(
+        VARIABLES[name].units, f"estimated discretization error: {VARIABLES[name].long_name}"
+    )
     for name in ESTIMATED
 }
 VARIABLES |= {
@@ -173,6 +175,8 @@ VARIABLES |= {
     "trial_nodes": Variable(("trial",), "1", "nodes of the window of the trial", dtype="i4"),
 }
 VARIABLES |= {
-    f"trial_{name}": Variable(("trial", "step"), VARIABLES[name].units, f"on each trial: {VARIABLES[name].long_name}")
+    f"trial_{name}": Variable(
+        ("trial", "step"), VARIABLES[name].units, f"on each trial: {VARIABLES[name].long_name}"
+    )
     for name in ESTIMATED
 }

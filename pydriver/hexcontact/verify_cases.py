@@ -83,6 +83,12 @@ _ALL = (
         _of("verify_normal", "crossed_cylinders"),
     ),
     Check(
+        "error-bars",
+        "Estimated discretization errors",
+        "How many true errors lie within the estimated ones, on lattices of random spacing and origin.",
+        _of("verify_accuracy", "error_bars"),
+    ),
+    Check(
         "profiles",
         "Cone, powers and punches",
         "Axisymmetric contacts with closed solutions.",

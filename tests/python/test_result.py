@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 from hexcontact.lattice import Lattice
 from hexcontact.result import Layout, Metadata, Result, Step, assemble, window_of
-from hexcontact.variables import VARIABLES
+from hexcontact.variables import ESTIMATED, VARIABLES
 
 SMALL = Lattice(spacing=1e-4, row_first=-2, col_first=-3, n_row=5, n_col=6, origin=(1e-5, 0.0))
 LARGE = Lattice(spacing=1e-4, row_first=-3, col_first=-5, n_row=8, n_col=9, origin=(1e-5, 0.0))
@@ -170,7 +170,11 @@ class TestResult:
 
 def test_the_reference_page_names_every_quantity() -> None:
     page = (Path(__file__).parents[2] / "docs/netcdf.md").read_text()
+    of_each = {f"{name}_error" for name in ESTIMATED} | {f"trial_{name}" for name in ESTIMATED}
+    assert {"`NAME_error`", "`trial_NAME`"} <= set(page.split())
     for name, variable in VARIABLES.items():
+        if name in of_each:
+            continue
         assert f"| `{name}` | {variable.units or '–'} | {variable.long_name} |" in page
     for attribute in Layout(Metadata(), [made_step(0)]).attributes(complete=True):
         assert f"`{attribute}`" in page

@@ -89,7 +89,7 @@ def error(
     lines = [f"{step} did not converge: {after}; solver.tolerance = {case.solver.tolerance:g} was expected"]
     if worst.what == _LOST:
         lines.append(_LOST)
-    elif worst.what:
+    elif worst.what and worst.value > case.solver.tolerance:
         times = worst.value / case.solver.tolerance
         lines.append(f"worst is {worst.residual}, {_number(times)} times its bound: {worst.what}")
     lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful))}")

@@ -125,7 +125,8 @@ def fault_of_dimensions(name: str, dimensions: tuple[str, ...]) -> str:
     if known is None:
         fits = len(set(dimensions)) == len(dimensions)
     else:
-        fits = dimensions == known.dims + ((f"{name}_length",) if known.dtype == "str" else ())
+        characters = known.dtype == "str" and len(dimensions) == len(known.dims) + 1
+        fits = dimensions[: len(dimensions) - characters] == known.dims
     return "" if fits else f"{name} is over {', '.join(dimensions) or 'nothing'}"
 
 

@@ -212,13 +212,17 @@ def test_no_convergence_is_exit_code_3(deck: Path, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(native.NormalContact, "solve", solve)
     done = inside(deck.parent, "run", "sphere.toml")
-    refused(done, 3, r"step 2 of 2 did not converge: .*R_n = \S+ and R_P = \S+; solver\.tolerance = 1e-08")
+    refused(
+        done,
+        3,
+        r"step 2 of 2 \(press\) did not converge: .*R_n = \S+ and R_P = \S+; solver\.tolerance = 1e-08",
+    )
     refused(
         done, 3, r"1 of 2 load steps are finished and kept in .*sphere\.nc\.d; to go on: hexcontact resume "
     )
     assert len(open_result(deck.with_suffix(".nc"))) == 1
     told = " ".join(inside(deck.parent, "info", "sphere.nc").stdout.split())
-    assert "stopped step 2 of 2 did not converge: after" in told
+    assert "stopped step 2 of 2 (press) did not converge: after" in told
 
 
 # --- interrupted ----------------------------------------------------------------------------------

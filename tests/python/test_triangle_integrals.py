@@ -204,7 +204,7 @@ def test_exponents_that_are_not_supported(triple):
         (TRIANGLE, [0.0, 1.0], [0.0, 1.0, 2.0], "x and y.*broadcast"),
         (TRIANGLE, "here", 0.0, "x: an array of real numbers"),
         (TRIANGLE, 0.0, 1j, "y: an array of real numbers"),
-        (TRIANGLE, 0.0, None, "field points.*finite"),
+        (TRIANGLE, 0.0, None, "y: an array of real numbers"),
         ([[0, 0], [1, 0], [1]], 0.0, 0.0, "vertices: an array of real numbers"),
     ],
 )
@@ -226,7 +226,7 @@ def test_wrong_points_and_vertices(vertices, x, y, words):
         ({"load": ["constant"]}, "load = .*expected one of"),
         ({"direction": "z"}, "direction = 'z'.*'normal'"),
         ({"shear_modulus": 0.0}, "shear modulus.*positive"),
-        ({"shear_modulus": np.nan}, "shear modulus.*positive"),
+        ({"shear_modulus": np.nan}, "shear_modulus = nan: expected a number"),
         ({"shear_modulus": "steel"}, "shear_modulus = 'steel'.*number"),
         ({"poisson_ratio": 0.6}, "Poisson's ratio.*0.5"),
         ({"poisson_ratio": -1.0}, "Poisson's ratio.*-1"),
@@ -247,5 +247,5 @@ def test_wrong_tractions():
 
 
 def test_exponents_must_be_integers():
-    with pytest.raises(DeckError, match=r"k = 0\.5: an integer"):
+    with pytest.raises(DeckError, match=r"k = 0\.5: expected an integer"):
         triangle_integral(TRIANGLE, 0.0, 0.0, 1, 0.5, 0)

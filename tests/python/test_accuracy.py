@@ -136,7 +136,7 @@ def test_every_scalar_has_an_error(sheared: hexcontact.Result) -> None:
         assert (sheared[f"{name}_error"] == 0.0).all()
     assert (sheared.approach_error > 0.0).all()
     assert (sheared.torque_error[1:] > 0.0).all()  # follows from twist = 0
-    assert re.search(r"approach +\S+ ± \S+ m\n", repr(sheared))
+    assert re.search(r"approach +\S+ µm ± \S+ %\n", repr(sheared))
     assert re.search(r"normal_load +100 N\n", repr(sheared))
 
 

@@ -74,6 +74,7 @@ class SolverSettings:
     tolerance: float = 1e-8
     coupling: str = "full"
     entry: str = "implicit"
+    step_tolerance: float = 0.01
 
 
 @dataclass(frozen=True)
@@ -116,13 +117,13 @@ class Case:
         Keys of [grid].
     normal_load, approach : float, optional
         The only load (N) or motion (m), in one step or in `steps`.
-    steps : int, optional
-        Number of equal increments of it.
+    steps : int or "auto", optional
+        Number of equal increments of it, or as many as `step_tolerance` takes.
     loads : sequence of mappings, or mapping, optional
         Entries of [[load]] instead, for anything more; twist in rad.
     friction_coefficient : float, optional
         Coefficient of friction; frictionless if absent.
-    algorithm, method, tolerance, coupling, entry : optional
+    algorithm, method, tolerance, coupling, entry, step_tolerance : optional
         Keys of [solver].
     accuracy : float or mapping, optional
         Target of [accuracy], or all its keys: refine the lattice until it is reached.
@@ -146,7 +147,7 @@ class Case:
     accuracy : AccuracySettings or None
         How accurate the result is to be; None: the lattice is not refined.
     load_steps : tuple of LoadStep
-        The history.
+        The history; a segment in adaptive steps is one of them.
     output : OutputSettings
         What is kept.
     deck : Deck
@@ -212,7 +213,7 @@ class Case:
         origin: Sequence[float] | None = None,
         normal_load: float | None = None,
         approach: float | None = None,
-        steps: int | None = None,
+        steps: int | str | None = None,
         loads: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None,
         friction_coefficient: float | None = None,
         algorithm: str | None = None,
@@ -220,6 +221,7 @@ class Case:
         tolerance: float | None = None,
         coupling: str | None = None,
         entry: str | None = None,
+        step_tolerance: float | None = None,
         accuracy: float | Mapping[str, Any] | None = None,
         fields: Sequence[str] | None = None,
         every: int | None = None,
@@ -250,7 +252,12 @@ class Case:
                 origin=origin,
             ),
             solver=given(
-                algorithm=algorithm, method=method, tolerance=tolerance, coupling=coupling, entry=entry
+                algorithm=algorithm,
+                method=method,
+                tolerance=tolerance,
+                coupling=coupling,
+                entry=entry,
+                step_tolerance=step_tolerance,
             )
             or None,
             accuracy=given(target=accuracy) if isinstance(accuracy, int | float) else accuracy,
@@ -329,6 +336,7 @@ class Case:
             given_solver.tolerance,
             given_solver.coupling,
             given_solver.entry,
+            given_solver.step_tolerance,
         )
         wanted = deck.accuracy
         self.accuracy = AccuracySettings(wanted.target, wanted.max_nodes) if wanted else None
@@ -353,6 +361,17 @@ class Case:
         self.lattice = self._size(deck.grid, source, lattice)
         if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
             raise deck_error(problems, source)
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether load steps are chosen on the way: some are "auto", and the answer depends on them."""
+        incremental = self.solver.algorithm == "incremental"
+        return incremental and any(step.ramp is not None for step in self.load_steps)
+
+    @property
+    def planned_steps(self) -> int:
+        """Number of load steps; 0 if it shows on the way."""
+        return 0 if self.adaptive else len(self.load_steps)
 
     @property
     def frictional(self) -> bool:
@@ -541,9 +560,10 @@ class Case:
         """Name the case, its window and its steps."""
         rows, cols = self.lattice.shape
         title = f"{self.title!r}, " if self.title else ""
+        what = "adaptive segment" if self.adaptive else "load step"
         return (
             f"Case({title}{self.solver.algorithm}, {rows} x {cols} nodes, "
-            f"{(n := len(self.load_steps))} load step{'s' * (n > 1)})"
+            f"{(n := len(self.load_steps))} {what}{'s' * (n > 1)})"
         )
 
     def _repr_html_(self) -> str:
@@ -558,6 +578,9 @@ class Case:
         """Complain about what cannot be refined, or not far enough for errors to be told."""
         if isinstance(self._given_gap, np.ndarray):
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
+            return [Problem(("accuracy", "target"), wanted.target, sentence)]
+        if self.adaptive:
+            sentence = 'needs numbers of load steps, the same on all lattices, not steps = "auto"'
             return [Problem(("accuracy", "target"), wanted.target, sentence)]
         third = self.on_lattice(self.lattice.spacing / 2, self.lattice.origin).lattice.size
         if third <= wanted.max_nodes:

@@ -158,6 +158,14 @@ class Solver(Table):
             "the load step; interpolated: from the moment their gap closed"
         ),
     )
+    step_tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-4, at_most=0.5)] = Field(
+        0.01,
+        description=(
+            'incremental, steps = "auto": what halving a load step may change in the stick area, as a share '
+            "of the largest contact area, and in the shear tractions, as a share of what friction can carry"
+        ),
+        examples=["0.02"],
+    )
 
 
 @dataclass(frozen=True)
@@ -195,8 +203,17 @@ class Segment(Table):
     twist: Annotated[float, Quantity(ANGLE)] | None = Field(
         None, description="rotation about z, instead of torque"
     )
-    steps: Annotated[int, Whole(1, MOST_STEPS)] | None = Field(
-        None, description="number of load steps; 1, or as many as there are `values`"
+    steps: Annotated[int | str, WordOr("auto", Whole(1, MOST_STEPS))] | None = Field(
+        None,
+        description=(
+            "number of load steps; auto: as many as `solver.step_tolerance` takes; "
+            "if absent 1, or as many as there are `values`"
+        ),
+    )
+    largest_step: Annotated[float, Quantity(NUMBER, above=0, at_most=1)] | None = Field(
+        None,
+        description='largest part of the segment in one load step of steps = "auto"; 1 if absent',
+        examples=["0.1"],
     )
     ramp: Annotated[str, Word(("linear", "cubic"))] = Field(
         "linear", description="cubic: the cube root of normal_load grows evenly, all else linearly"
@@ -224,6 +241,8 @@ class Segment(Table):
         if "values" in data and data.get("ramp", "linear") != "linear":
             yield "ramp", "expected ramp or values, not both"
         values, steps = data.get("values"), data.get("steps")
+        if "largest_step" in data and steps != "auto":
+            yield "largest_step", 'needs steps = "auto" beside it'
         if isinstance(values, list | tuple) and steps is not None and steps != len(values):
             yield "steps", f"expected {len(values)}, as many as there are values (or no steps at all)"
 
@@ -258,7 +277,7 @@ class Load(Segment):
                     yield key, "expected inside the path, not beside it"
         elif "series" in data:
             for key in Segment.known_keys():
-                if key in data and key not in ("label", "steps"):
+                if key in data and key not in ("label", "steps", "largest_step"):
                     yield key, "expected in the series, not beside it"
         elif "repeat" in data:
             yield "repeat", "needs a path of segments or a series to repeat"

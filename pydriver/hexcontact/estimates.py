@@ -12,6 +12,10 @@ if TYPE_CHECKING:
 # Without friction they are of the pressure alone, a third of an application each.
 _FRICTIONLESS, _SIMILAR, _DISSIMILAR = 8 / 3, 20.0, 45.0
 _INTERPOLATED = 4.0  # times as many, where nodes enter the contact
+_ADAPTIVE, _ADAPTIVE_SIMILAR = (
+    30,
+    6,
+)  # solutions in a segment of adaptive steps: as measured, within a factor of 3
 _SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
 
 # Seconds per application and node of the window on one core of 2020 or so, with all that goes with it.
@@ -25,11 +29,21 @@ def operator_applications(case: Case) -> float | None:
         return None
     if not case.frictional:
         return _FRICTIONLESS * len(case.load_steps)
-    coupled = case.solver.coupling == "full" and abs(case.pair.beta) > _SMALLEST_BETA
-    each = _DISSIMILAR if coupled else _SIMILAR
+    each = _DISSIMILAR if _coupled(case) else _SIMILAR
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         each *= _INTERPOLATED
-    return each * len(case.load_steps)
+    return each * _solutions(case)
+
+
+def _coupled(case: Case) -> bool:
+    return case.solver.coupling == "full" and abs(case.pair.beta) > _SMALLEST_BETA
+
+
+def _solutions(case: Case) -> int:
+    """Return how many solutions a case takes; a guess for segments whose steps are chosen on the way."""
+    adaptive = sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
+    each = _ADAPTIVE if _coupled(case) else _ADAPTIVE_SIMILAR
+    return len(case.load_steps) - adaptive + each * adaptive
 
 
 def seconds(case: Case) -> float | None:
@@ -38,7 +52,7 @@ def seconds(case: Case) -> float | None:
     if applications is None:
         return None
     each = (_SECONDS if case.frictional else _SECONDS_FRICTIONLESS) * case.lattice.size
-    return applications * each + _SECONDS_LEAST * len(case.load_steps)
+    return applications * each + _SECONDS_LEAST * _solutions(case)
 
 
 def work(case: Case) -> str:
@@ -52,7 +66,8 @@ def work(case: Case) -> str:
         return "LAPACK on the nodes in contact, not estimated"
     count = " to ".join(f"{_rounded(number):,}" for number in applications if number)
     durations = " to ".join(dict.fromkeys(_duration(time) for time in times if time))
-    return f"about {count} operator applications, about {durations} on one core"
+    guess = "; load steps are chosen on the way, so a third or three times as much may be needed"
+    return f"about {count} operator applications, about {durations} on one core" + guess * case.adaptive
 
 
 def _total(parts: Iterable[float | None]) -> float | None:

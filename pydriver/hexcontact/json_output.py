@@ -104,7 +104,7 @@ def of_case(case: Case, output: Path) -> dict[str, Any]:
         "columns": lattice.n_col,
         "nodes": lattice.size,
         "window_fixed": case.window_fixed,
-        "load_steps": len(case.load_steps),
+        "load_steps": case.planned_steps or None,
         "segments": case.load_steps[-1].segment + 1,
         "memory": memory_needed(case, lattice),
         "operator_applications": estimates.operator_applications(case),

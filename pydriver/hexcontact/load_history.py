@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from .deck import MOST_STEPS, Load, Segment
@@ -48,8 +48,39 @@ class Target:
 
 
 @dataclass(frozen=True)
+class Ramp:
+    """A segment that is run in increments which only the solution tells (``steps = "auto"``).
+
+    Attributes
+    ----------
+    segment : Segment
+        What the deck says.
+    start : mapping of str to Target
+        What drives each motion when the segment begins.
+    virgin : bool
+        All is zero when it begins.
+    """
+
+    segment: Segment
+    start: Mapping[Motion, Target]
+    virgin: bool
+
+    @property
+    def largest(self) -> float:
+        """Largest part of the segment that one increment may take."""
+        return 1.0 if self.segment.largest_step is None else self.segment.largest_step
+
+    def targets(self, fraction: float) -> dict[str, Target]:
+        """Return what drives each motion when a fraction of the segment is done."""
+        return {
+            motion: _ramp(self.segment, motion, self.start[motion], fraction, self.virgin)
+            for motion in MOTIONS
+        }
+
+
+@dataclass(frozen=True)
 class LoadStep:
-    """One load step.
+    """One load step, or a segment whose load steps are chosen while it is solved.
 
     Attributes
     ----------
@@ -63,6 +94,8 @@ class LoadStep:
         What drives the normal motion, the two tangential ones and the rotation about z.
     fraction : float
         How much of the segment is done at the end of the step.
+    ramp : Ramp or None
+        The way there, if it is taken in increments that are chosen on it.
     """
 
     index: int
@@ -73,6 +106,13 @@ class LoadStep:
     y: Target
     twist: Target
     fraction: float = 1.0
+    ramp: Ramp | None = None
+
+    def until(self, fraction: float) -> LoadStep:
+        """Return the part of an adaptive segment that ends at a fraction of it."""
+        if self.ramp is None:
+            return self
+        return replace(self, fraction=fraction, **self.ramp.targets(fraction))  # type: ignore[arg-type]
 
     @property
     def targets(self) -> tuple[Target, Target, Target, Target]:
@@ -102,7 +142,11 @@ class _Stretch(NamedTuple):
     carries_on: bool = False
 
 
-START = {
+AUTO = "auto"  # number of load steps of a segment in which they are chosen
+LEAST = 1e-3  # of a segment, the smallest adaptive load step
+_WATCHED = [part / 16 for part in range(1, 17)]  # fractions of such a segment at which loads are looked at
+
+START: dict[Motion, Target] = {
     "z": Target("force", 0.0),
     "x": Target("force", 0.0),
     "y": Target("force", 0.0),
@@ -145,10 +189,12 @@ def load_steps(
         if segment.ramp == "cubic" and start["z"].control != "force":
             sentence = "expected linear, since the segment before was driven by approach"
             problems.append(Problem((*key, "ramp"), "cubic", sentence))
+        ramp = Ramp(segment, start, virgin) if segment.steps == AUTO else None
         for fraction in _fractions(segment):
             now = {motion: _ramp(segment, motion, start[motion], fraction, virgin) for motion in MOTIONS}
-            steps.append(LoadStep(len(steps), number, label, **now, fraction=fraction))
-            problems += _overload(key, segment, steps[-1], friction_coefficient)
+            steps.append(LoadStep(len(steps), number, label, **now, fraction=fraction, ramp=ramp))
+            for part in _WATCHED if ramp else (1.0,):
+                problems += _overload(key, segment, steps[-1].until(part), friction_coefficient)
 
     if all(step.z.value < SMALLEST for step in steps):
         first = loads[0].normal_load
@@ -183,8 +229,8 @@ def _rows(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:
     for row in load.series.rows():
         label = row.pop("label", "") or load.label
         # checked already, and there may be many
-        segment = Segment.model_construct(**row, steps=load.steps)
-        yield _Stretch(key, segment, label, carries_on=label == before and (load.steps or 1) == 1)
+        segment = Segment.model_construct(**row, steps=load.steps, largest_step=load.largest_step)
+        yield _Stretch(key, segment, label, carries_on=label == before and load.steps in (None, 1))
         before = label
 
 
@@ -197,12 +243,15 @@ def _in_turn(loads: Sequence[Load]) -> Iterator[_Stretch]:
 def _count_of(load: Load) -> int:
     """Return the number of load steps of an entry of [[load]]."""
     if load.series is not None:
-        return load.series.count * (load.steps or 1) * (load.repeat or 1)
+        return load.series.count * _count(load) * (load.repeat or 1)
     return sum(_count(segment) for segment in load.path or [load]) * (load.repeat or 1)
 
 
 def _count(segment: Segment) -> int:
-    return len(segment.values) if segment.values else segment.steps or 1
+    """Return the number of load steps of a segment, 1 for one in which they are chosen."""
+    if segment.values:
+        return len(segment.values)
+    return segment.steps if isinstance(segment.steps, int) else 1
 
 
 def _fractions(segment: Segment) -> Sequence[float]:

@@ -63,7 +63,7 @@ def begun(case: Case, lattice: Lattice, done: int) -> None:
             title=case.title,
             version=__version__,
             machine=known["machine"],
-            steps=len(case.load_steps),
+            steps=case.planned_steps or "auto",
             **({"done": done} if done else {}),
             window=_size(lattice),
             spacing=lattice.spacing,
@@ -100,7 +100,7 @@ def finished(step: Step, total: int | None) -> None:
         return
     history = step.history
     values: dict[str, Any] = {"segment": history.get("segment", "-"), "label": history.get("label", "")}
-    values["fraction"] = step.segment_fraction
+    values["fraction"] = step.ramp_done
     shown = worth_showing([history])
     values |= {LOADS_AND_MOTIONS[name][0].replace(" ", "_"): float(history[name]) for name in shown}
     values["p_max"] = float(history["max_pressure"])

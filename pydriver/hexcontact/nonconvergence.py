@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ConvergenceError
+from .load_history import LEAST
 from .messages import listed
 from .progress import RESIDUALS, quantity
 
@@ -79,7 +80,8 @@ def error(
         "worst": worst._asdict(),
     }
     segment = f" ({target.label})" if target.label else ""
-    step = f"step {target.index + 1} of {len(case.load_steps)}{segment}"
+    planned = f" of {case.planned_steps}" if case.planned_steps else ""
+    step = f"step {target.index + 1}{planned}{segment}"
     shown = listed([f"{sign} = {_number(value)}" for sign, value in residuals.items()], "and")
     after = f"after {listed(_tried(solution), 'and')} the residuals are {shown}"
     doubtful, excess = _sliding(case, solution, target, values)
@@ -92,7 +94,9 @@ def error(
     elif worst.what and worst.value > case.solver.tolerance:
         times = worst.value / case.solver.tolerance
         lines.append(f"worst is {worst.residual}, {_number(times)} times its bound: {worst.what}")
-    lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful))}")
+    if target.ramp is not None:
+        lines.append(f"it is {LEAST:.1%} of its segment, the least of adaptive steps")
+    lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful, target.ramp is not None))}")
     return ConvergenceError("\n".join(lines), details)
 
 
@@ -134,7 +138,7 @@ def _sliding(
     return True, f"{none_sticks}friction cannot carry the {listed(wanted, 'and the')}{known}"
 
 
-def _advice(case: Case, worst: Worst, doubtful: bool) -> list[str]:
+def _advice(case: Case, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:
     """Return what may help, the likeliest first."""
     mu, advice = case.friction_coefficient, []
     if case.frictional and math.isinf(mu) and worst.residual in ("R_n", "R_t"):
@@ -148,7 +152,7 @@ def _advice(case: Case, worst: Worst, doubtful: bool) -> list[str]:
         advice.append(
             "a prescribed motion in place of the load (shift_x, shift_y, twist), if friction cannot carry it"
         )
-    if case.solver.algorithm == "incremental":
+    if case.solver.algorithm == "incremental" and not adaptive:
         advice.append("more steps in this segment")
     if case.solver.tolerance >= _ROUNDING:
         advice.append("a larger solver.tolerance")

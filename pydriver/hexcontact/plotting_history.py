@@ -48,6 +48,7 @@ _BESIDE = {
 }
 _TINY = 1e-4
 _MANY = 60  # steps that are too many for a marker each
+_BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as a band around
 
 
 def _known(dataset: xarray.Dataset) -> list[str]:
@@ -145,7 +146,12 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
     marker = "o" if place.size <= _MANY else ""
     lines = (COMPUTED, "-", marker), (EXACT, "--", "s" if marker else "")
     for name, (color, dash, mark) in zip(names, lines, strict=False):
-        axes.plot(place, _values(dataset, name) * factor, ls=dash, marker=mark, ms=3, color=color, label=name)
+        values = _values(dataset, name) * factor
+        axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
+        if (bound := _BOUNDS.get(name, "")) in dataset:
+            around = _values(dataset, bound) * factor
+            low, high = np.maximum(values - around, 0.0), values + around
+            axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
     axes.set(xlabel=label, ylabel=_titled(names[0] if len(names) == 1 else _common(names), unit))
     if len(names) > 1:
         axes.legend([_apart(name, names) for name in names], handlelength=2.2)

@@ -50,7 +50,7 @@ class Reporter:
         title : str
             Title of the case.
         steps : int
-            Number of load steps.
+            Number of load steps; 0 if it shows on the way.
         """
         yield
 
@@ -102,7 +102,8 @@ class Lines(Reporter):
     def watching(self, title: str, steps: int) -> Iterator[None]:
         """Print the title first."""
         self.steps = steps
-        self._print(f"{title or 'case'}: {steps} load step{'s' * (steps != 1)}")
+        count = f"{steps} load step{'s' * (steps != 1)}" if steps else "adaptive load steps"
+        self._print(f"{title or 'case'}: {count}")
         yield
 
     def lattice(self, words: str, shifted: bool) -> None:
@@ -119,7 +120,10 @@ class Lines(Reporter):
         if self._shifted:
             return
         width = len(str(self.steps))
-        self._print(f"step {step.number:>{width}}/{self.steps}  {describe(step.history)}")
+        number = f"{step.number:>{width}}/{self.steps}"
+        if not self.steps:
+            number = f"{step.number:>3} ({step.done:4.0%})"
+        self._print(f"step {number}  {describe(step.history)}")
 
     def _print(self, line: str) -> None:
         with contextlib.suppress(OSError):  # nobody listens any more; the run goes on
@@ -144,9 +148,11 @@ class Bar(Reporter):
         )
         from rich.text import Text
 
-        columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()]
+        self._counted = steps > 0  # else by the share of the load history
+        count = MofNCompleteColumn() if self._counted else TextColumn("{task.percentage:.0f} %")
+        columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), count]
         self._bar = Progress(*columns, TimeElapsedColumn())
-        self._title, self._task = title, self._bar.add_task(title, total=steps)
+        self._title, self._task = title, self._bar.add_task(title, total=steps or 1.0)
         self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
         with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
             yield
@@ -162,7 +168,7 @@ class Bar(Reporter):
     def finished(self, step: Step) -> None:
         """Move the bar on by one step."""
         self._latest.plain = "  " + describe(step.history, short=True)
-        self._bar.update(self._task, completed=step.number)
+        self._bar.update(self._task, completed=step.number if self._counted else step.done)
 
 
 def reporter(quiet: bool = False, stream: IO[str] | None = None) -> Reporter:
@@ -252,6 +258,12 @@ def stick_share(history: Mapping[str, Any]) -> str:
     return f"{100 * fitted('stick_area', history) / area:.1f} %" if area else "-"
 
 
+def step_error_share(history: Mapping[str, Any]) -> float | None:
+    """Return the bound on the error of the stick area by load steps, as a share of the contact area."""
+    error, area = float(history.get("stick_area_step_error", math.nan)), fitted("contact_area", history)
+    return None if math.isnan(error) or not area else error / area
+
+
 def residuals(history: Mapping[str, Any]) -> dict[str, float]:
     """Return the residuals that there are, by the symbol of the theory."""
     found = {sign: float(history.get(name, math.nan)) for sign, name in RESIDUALS.items()}
@@ -269,7 +281,9 @@ def describe(history: Mapping[str, Any], short: bool = False) -> str:
     for name in worth_showing([history]):
         parts.append(f"{LOADS_AND_MOTIONS[name][0]} {load_or_motion(name, history)}")
     if is_frictional(history):
-        parts += [f"stick {stick_share(history)}", f"R {max(residuals(history).values()):.1e}"]
+        error = step_error_share(history)
+        around = "" if error is None or short else f" ± {100 * error:.1f} %"
+        parts += [f"stick {stick_share(history)}{around}", f"R {max(residuals(history).values()):.1e}"]
     else:
         parts.append(f"p_max {quantity(history['max_pressure'], 'Pa')}")
         if not short:

@@ -23,6 +23,7 @@ from .result_check import fault_of_record
 SUFFIX = ".npz"
 VERSION = 1
 _ABOUT = "about"  # the text, among the arrays
+_COMPANION = "companion_"  # before the names of the fields of a second solution
 
 
 def write_record(path: Path, metadata: Metadata, step: Step) -> None:
@@ -53,9 +54,12 @@ def write_record(path: Path, metadata: Metadata, step: Step) -> None:
         "lattice": dataclasses.asdict(step.lattice),
         "history": dict(step.history),
         "fields": list(step.fields),
+        "companion": list(step.companion),
+        "control": dict(step.control),
     }
     text = json.dumps(about, default=np.generic.item).encode()
     fields = {name: layout.padded(name, step) for name in step.fields}
+    fields |= {_COMPANION + name: values for name, values in step.companion.items()}
     with path.open("wb") as file:
         np.savez(file, **{_ABOUT: np.frombuffer(text, "u1")}, **fields)  # type: ignore[arg-type]
         file.flush()
@@ -81,10 +85,15 @@ def read_record(path: Path) -> tuple[Metadata, Step]:
                     f"layout {about['journal_version']}; this version reads layout {VERSION}"
                 )
             fields = {name: file[name] for name in about["fields"]}
+            companion = {name: file[_COMPANION + name] for name in about.get("companion", ())}
         origin = tuple(about["lattice"].pop("origin"))
         lattice = Lattice(**about["lattice"], origin=origin)
         metadata = Metadata.from_plain(about["metadata"])
-        step = Step(about["index"], lattice, fields, about["history"])
+        step = Step(
+            *(about["index"], lattice, fields, about["history"]),
+            companion=companion,
+            control=about.get("control", {}),
+        )
         if fault := fault_of_record(metadata, step):
             raise DeckError(f"{path} is damaged: {fault}")
         return metadata, step

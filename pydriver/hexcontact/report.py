@@ -140,7 +140,8 @@ def _status(result: Result) -> str:
         return ""
     planned = int(result.dataset.attrs.get("planned_steps", 0))
     reason = str(result.dataset.attrs.get("stopped", ""))
-    text = f"Unfinished run: {len(result)} of {planned} load steps. {reason}".strip()
+    of = f" of {planned}" if planned else ""
+    text = f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
     return f'<p class="warning" role="note">{html.escape(text)}</p>'
 
 
@@ -176,7 +177,12 @@ def _inputs(result: Result) -> list[tuple[str, ...]]:
             ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
         ]
     window = f"{sizes['row']} x {sizes['col']} nodes at the end"
-    return [*rows, ("window", window), ("load steps", f"{len(result)} of {int(attributes['planned_steps'])}")]
+    planned = int(attributes["planned_steps"])
+    return [
+        *rows,
+        ("window", window),
+        ("load steps", f"{len(result)}" + (f" of {planned}" if planned else "")),
+    ]
 
 
 def _provenance(result: Result, histories: Sequence[History]) -> list[tuple[str, ...]]:

@@ -100,7 +100,7 @@ def resume(
             return checked(open_result(path))
         if restart.warning:
             warnings.warn(restart.warning, stacklevel=2)
-        with shown.watching(restart.case.title, len(restart.case.load_steps)):
+        with shown.watching(restart.case.title, restart.case.planned_steps):
             record(restart.case, restart.store, shown, on_step, restart.before)
     return checked(open_result(restart.store.path))
 
@@ -154,8 +154,9 @@ def _found(path: Path) -> tuple[Store | None, Step | None]:
             output.close()
             if output.complete:
                 return None, None
+            planned = output.dataset.attrs["planned_steps"] or "an open number of"
             raise DeckError(
-                f"{path} has {len(output)} of {output.dataset.attrs['planned_steps']} load steps, but its "
+                f"{path} has {len(output)} of {planned} load steps, but its "
                 f"journal {journal_of(path)} is not there, which the next step would start from"
             )
     raise DeckError(f"there is neither a file {path} nor a journal {journal_of(path)} of a run")
@@ -209,6 +210,8 @@ def _check(case: Case, store: Store, last: Step | None) -> None:
     """See to it that the case is the one of the steps, though files that its deck names may have changed."""
     found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
     planned = store.metadata.planned_steps
+    if last is not None:
+        planned = int(last.control.get("load_steps", planned))
     if len(case.load_steps) != planned:
         raise DeckError(f"the deck now has {len(case.load_steps)} load steps; the {found} are of {planned}")
     if last is not None:
@@ -233,7 +236,7 @@ def _continued(store: Store, case: Case) -> Metadata:
     changed = [
         f"{name} = {value:g} instead of {old.parameters[name]:g}"
         for name, value in new.parameters.items()
-        if name == "tolerance" and value != old.parameters.get(name)
+        if name in ("tolerance", "step_tolerance") and value != old.parameters.get(name)
     ]
     done = f"step {len(store.heads)}"
     if trials := TrialFolder(store.folder):

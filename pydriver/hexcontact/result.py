@@ -62,7 +62,7 @@ class Metadata:
     every : int
         The output keeps the fields of every so manieth step, and of the last one.
     planned_steps : int
-        Load steps the whole run has.
+        Load steps the whole run has; 0 while adaptive steps leave it open.
     parameters : mapping of str to number or text
         What else describes the case: materials, tolerance, ...
     run : str

@@ -84,7 +84,7 @@ _ATTRIBUTES: dict[str, Callable[[Any], bool]] = {
     "output_fields": _is_text,
     "hexcontact_version": _is_text,
     "output_every": _is_positive,
-    "planned_steps": _is_positive,
+    "planned_steps": lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: not known yet
     "complete": _is_number,
     "lattice_spacing": _is_positive,
     "lattice_basis": _numbers(4),
@@ -170,7 +170,8 @@ def fault_of_record(metadata: Metadata, step: Step) -> str:
     """Return what is wrong with a record of a journal that was read; empty if nothing is."""
     about = dataclasses.asdict(metadata)
     texts = ("title", "deck", "run", "created", "version", "deck_file")
-    counts = {"every": metadata.every, "planned_steps": metadata.planned_steps, "index": step.index + 1}
+    planned = metadata.planned_steps or (1 if step.control else 0)  # not known of adaptive steps
+    counts = {"every": metadata.every, "planned_steps": planned, "index": step.index + 1}
     for name in texts:
         if not isinstance(about[name], str):
             return f"its {name} is no text"

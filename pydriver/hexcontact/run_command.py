@@ -123,7 +123,7 @@ def solved(
     shown, histories = reporter(listeners.silent), [step.history for step in before]
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
-        with shown.watching(title, len(case.load_steps)):
+        with shown.watching(title, case.planned_steps):
             in_background(
                 lambda: solve.record(case, store, shown, lambda step: histories.append(step.history), before),
                 heard,
@@ -169,6 +169,8 @@ def summarize(
         console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if refined is not None:
         console.print(summary.table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
+    if remark := summary.limited_steps(histories, case.solver.step_tolerance):
+        console.print(f"note: {remark}", soft_wrap=True)
     console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)
 
 

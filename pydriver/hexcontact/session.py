@@ -293,7 +293,7 @@ class Session:
                 raise
             self._steps[-1:] = [before.head for before in self._steps[-1:]]
         self._steps.append(step)
-        log.finished(step, None if self._by_hand else len(self.case.load_steps))
+        log.finished(step, None if self._by_hand else self.case.planned_steps)
         return step
 
     def _asked(self) -> Iterator[LoadStep]:
@@ -304,7 +304,7 @@ class Session:
 
     def _loads_so_far(self) -> list[dict[str, Any]]:
         """Return the loads that were applied by iterating: those of the case, or as many as were solved."""
-        if self._whole:
+        if self._whole and not self.case.adaptive:
             return list(tomllib.loads(self.case.deck_text)["load"])
         return self._resolved(self._steps)
 

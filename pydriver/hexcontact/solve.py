@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import platform
 import time
@@ -18,6 +19,7 @@ from .result import Metadata, Result, Step, assemble
 from .window import kind_of
 
 if TYPE_CHECKING:
+    from .adaptive_steps import AdaptivePath
     from .case import Case
     from .lattice import Lattice
     from .load_history import LoadStep
@@ -32,7 +34,7 @@ def metadata_of(case: Case) -> Metadata:
         deck_file=str(case.deck_file or ""),
         fields=tuple(case.output.fields),
         every=case.output.every,
-        planned_steps=len(case.load_steps),
+        planned_steps=case.planned_steps,
         parameters=parameters_of(case),
     )
 
@@ -48,6 +50,7 @@ def parameters_of(case: Case) -> dict[str, Any]:
         "coupling": case.solver.coupling,
         "entry": case.solver.entry,
         "tolerance": case.solver.tolerance,
+        **({"step_tolerance": case.solver.step_tolerance} if case.adaptive else {}),
         **({"accuracy_target": case.accuracy.target} if case.accuracy else {}),
         "machine": _machine(),
     }
@@ -111,14 +114,14 @@ def run(
         if case.accuracy is not None:
             from . import refinement
 
-            with shown.watching(case.title, len(case.load_steps)):
+            with shown.watching(case.title, case.planned_steps):
                 return checked(refinement.in_memory(case, shown, on_step))
         finished: list[Step] = []
         stopped = ""
-        with log.ending(), shown.watching(case.title, len(case.load_steps)):
+        with log.ending(), shown.watching(case.title, case.planned_steps):
             for step in steps(case, kept_in_memory=True):
-                finished.append(step)
-                log.finished(step, len(case.load_steps))
+                finished.append(dataclasses.replace(step, companion={}))
+                log.finished(step, case.planned_steps)
                 shown.finished(step)
                 if stopped := stops(on_step, step):
                     break
@@ -129,7 +132,7 @@ def run(
 
     with (
         Store(output, metadata_of(case), overwrite) as store,
-        shown.watching(case.title, len(case.load_steps)),
+        shown.watching(case.title, case.planned_steps),
     ):
         record(case, store, shown, on_step)
     return checked(open_result(store.path))
@@ -178,7 +181,7 @@ def record(
     with log.ending():
         for step in steps(case, before=before):
             store.append(step)
-            log.finished(step, len(case.load_steps))
+            log.finished(step, case.planned_steps)
             shown.finished(step)
             try:
                 stopped = stops(on_step, step)
@@ -267,17 +270,28 @@ def _solved(
     targets: Iterable[LoadStep] | None,
 ) -> Iterator[Step]:
     """Solve step by step, from a window on; see `steps`."""
-    window = kind_of(case)(case, lattice, len(case.load_steps) if kept_in_memory else 0)
+    window: Any = kind_of(case)(case, lattice, len(case.load_steps) if kept_in_memory else 0)
     state: Any = window.restored(before[-1]) if before else None
+    adaptive = _adaptive(case, window, before) if targets is None else None
     segment, begun, reached_by_now = -1, _standing({}), _standing({})
     for step in before:
         if step.history["segment"] != segment + 1:
             segment, begun = int(step.history["segment"]) - 1, reached_by_now
         reached_by_now = _standing(step.history)
-    for target in case.load_steps[len(before) :] if targets is None else targets:
+    if targets is None:
+        targets = case.load_steps[adaptive.position if adaptive else len(before) :]
+    for target in targets:
         started = time.perf_counter()
         if target.segment != segment:
             segment, begun = target.segment, reached_by_now
+        if adaptive and target.ramp is not None:
+            for step, reached in adaptive.steps(state, target, begun):
+                yield step
+                state, reached_by_now = reached, _standing(step.history)
+            window = adaptive.window
+            continue
+        if adaptive:
+            target = adaptive.numbered(target)
         values = target.values(begun)
         # a step that reached the rim is solved again on a larger window, from where it began
         while window.outgrown(reached := window.advance(state, target, values)):
@@ -287,8 +301,19 @@ def _solved(
         if not reached.converged:
             raise nonconvergence.error(case, window.lattice, reached, target, values)
         step = window.step(target, reached, state, started)
+        if adaptive:
+            adaptive.window, step = window, adaptive.given(step)
         yield step
         state, reached_by_now = reached, _standing(step.history)
+
+
+def _adaptive(case: Case, window: Any, before: Sequence[Step]) -> AdaptivePath | None:
+    """Return what chooses load steps, if there are some to choose."""
+    if not case.adaptive:
+        return None
+    from .adaptive_steps import AdaptivePath
+
+    return AdaptivePath(case, window, before)
 
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:

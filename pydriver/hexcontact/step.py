@@ -40,11 +40,17 @@ class Step:
         Arrays of shape (n_row, n_col), SI; names of `hexcontact.variables`. ``initial_gap`` among them.
     history : mapping of str to number or text
         Values by step; names of `hexcontact.variables`.
+    companion : mapping of str to ndarray
+        What else the next step starts from; for the journal only. The fields of the second solution that
+        adaptive load steps are compared with.
+    control : mapping of str to number
+        Where the step stands in the load history, and what chooses the next one; for the journal only.
+        Empty where all load steps are given.
     prescribed : mapping of str to float
         The loads (N, N m) and motions (m, rad) that drove the step; empty for a step read from a file.
     load_fraction : float
         How much of the load history is done after the step, from 0 to 1; NaN for a step read from a file.
-    segment_fraction : float
+    ramp_done : float
         How much of the ramp of its segment is applied, usually from 0 to 1; NaN for a step read from a file.
     """
 
@@ -52,9 +58,11 @@ class Step:
     lattice: Lattice
     fields: Mapping[str, NDArray[Any]]
     history: Mapping[str, Value]
+    companion: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    control: Mapping[str, Any] = field(default_factory=dict)
     prescribed: Mapping[str, float] = field(default_factory=dict)
     load_fraction: float = math.nan
-    segment_fraction: float = math.nan
+    ramp_done: float = math.nan
 
     def __post_init__(self) -> None:
         safe = {name: _read_only(values) for name, values in self.fields.items()}
@@ -120,7 +128,12 @@ class Step:
     @property
     def head(self) -> Step:
         """The same step without the values of its fields: small enough to keep."""
-        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, np.empty(0)))
+        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, np.empty(0)), companion={})
+
+    @property
+    def done(self) -> float:
+        """Share of the load history that is done, if adaptive load steps make it unknown by number."""
+        return float(self.control.get("done", 0.0))
 
     # --- between the nodes ----------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ in ``out.nc`` before stays readable.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import errno
 import os
 import re
@@ -82,7 +83,8 @@ class Journal:
     @property
     def complete(self) -> bool:
         """Whether all planned steps are there."""
-        return len(self) == self.metadata.planned_steps
+        metadata, last = read_record(self.records[-1])
+        return len(self) == metadata.planned_steps or last.done == 1.0
 
     def result(self, path: Path) -> Result:
         """All finished steps as a result in memory; `path` is what the user calls it."""
@@ -358,9 +360,12 @@ class Store:
     def kept(self) -> str:
         """Sentence about what is finished: how much, where, how to go on; empty if nothing is."""
         where = self.folder if self.folder.exists() else self.path
+        planned, count = self.metadata.planned_steps, len(self.heads)
         finished = TrialFolder(self.folder).kept
-        if self.heads:
-            finished = f"{len(self.heads)} of {self.metadata.planned_steps} load steps are finished"
+        if self.heads and planned:
+            finished = f"{count} of {planned} load steps are finished"
+        elif self.heads:
+            finished = f"{count} load step{'s are' if count != 1 else ' is'} finished"
         if not finished:
             return ""
         return f"{finished} and kept in {where}; to go on: hexcontact resume {shlex.quote(str(self.path))}"
@@ -434,6 +439,7 @@ class Store:
             If it cannot be written; the journal is kept.
         """
         with self._mutex:
+            self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
             self._publish(complete=True)
             Journal(self.folder).remove()
             self.close()

@@ -18,7 +18,7 @@ from .errors import DeckError
 from .messages import Source, shown
 from .study_deck import MOST_CASES, Parameter, StudyFile
 from .units import ANGLE
-from .validation import Kind, Quantity, Table, Whole
+from .validation import Kind, Quantity, Table, Whole, WordOr
 
 _MOST_TOLD = 20  # sentences about wrong cases
 
@@ -232,6 +232,8 @@ def _axis(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
     info = _field(deck, entry.key)
     kind = _kind(info)
     values = entry.values or ()
+    if isinstance(kind, WordOr) and isinstance(kind.kind, Quantity | Whole) and kind.word not in values:
+        kind = kind.kind  # a number like any other
     units = ""
     if isinstance(kind, Quantity | Whole):
         units = (kind.dimension.unit or "1") if isinstance(kind, Quantity) else "1"

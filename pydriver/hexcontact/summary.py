@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .errors import HexcontactError
+from .messages import listed
 from .progress import (
     LOADS_AND_MOTIONS,
     PREFIXES,
@@ -19,6 +20,7 @@ from .progress import (
     percent,
     quantity,
     residuals,
+    step_error_share,
     stick_share,
     worth_showing,
 )
@@ -36,6 +38,7 @@ History = Mapping[str, Any]
 Row = tuple[str, ...]
 
 _MOST_ROWS = 24  # steps shown of a long history
+_MOST_NAMED = 8  # load steps named in a remark
 _FURTHER = {  # shown of a load step besides loads and motions
     "max_pressure": "Pa",
     "max_traction": "Pa",
@@ -143,6 +146,12 @@ def _friction(case: Case) -> str:
 
 def _history(case: Case) -> str:
     segments = case.load_steps[-1].segment + 1
+    if case.adaptive:
+        chosen = sum(step.ramp is not None for step in case.load_steps)
+        given = len(case.load_steps) - chosen
+        where = f"{chosen} segment{'s' * (chosen > 1)}"
+        fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
+        return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}"
     return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "")
 
 
@@ -200,8 +209,25 @@ def step_rows(history: History) -> list[Row]:
     ]
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
+    if (error := step_error_share(history)) is not None:
+        halved = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
+        words = f"stick area within {100 * error:.1f} % of the contact area, {halved + 0.0:+.2f} % by halving"
+        rows.append(("load steps", words))
     found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
     return [*rows, ("residuals", found), ("work", _work(history))]
+
+
+def limited_steps(histories: Sequence[History], tolerance: float) -> str:
+    """Say which adaptive load steps missed their tolerance; empty if none did."""
+    missed = [k for k, history in enumerate(histories, start=1) if history.get("step_limited") == 1]
+    if not missed:
+        return ""
+    named = listed([f"{k}" for k in missed[:_MOST_NAMED]] + ["..."] * (len(missed) > _MOST_NAMED), "and")
+    return (
+        f"{len(missed)} of {len(histories)} load steps change more by halving than solver.step_tolerance = "
+        f"{tolerance:g}, and smaller ones did not help: step{'s' * (len(missed) > 1)} {named}; their "
+        "stick_area_step_error holds"
+    )
 
 
 def _words(name: str) -> str:
@@ -399,7 +425,8 @@ def file_rows(result: Result) -> list[Row]:
     """Return where a result comes from and how large it is."""
     attributes, sizes = result.dataset.attrs, result.dataset.sizes
     planned = int(attributes["planned_steps"])
-    state = "complete" if result.complete else f"unfinished, {planned} were planned"
+    plan = f"{planned} were planned" if planned else "their number was open"
+    state = "complete" if result.complete else f"unfinished, {plan}"
     fields = [str(n) for n, v in result.dataset.data_vars.items() if v.dims == ("step", "row", "col")]
     return [
         ("file", result.path),

@@ -76,6 +76,7 @@ def _scalar(units: str, long_name: str, **more: Any) -> Variable:
 
 
 _ZONES = {NOT_KEPT: "not_kept", 0: "separated", 1: "stick", 2: "slip"}
+_LIMITS = {NOT_KEPT: "not_adaptive", 0: "within_tolerance", 1: "no_smaller_step_helps"}
 _PLANE = ("row", "col")
 
 VARIABLES: dict[str, Variable] = {
@@ -146,6 +147,19 @@ VARIABLES: dict[str, Variable] = {
     "residual_force": _scalar("1", "residual of the normal load, R_P"),
     "residual_shear_force": _scalar("1", "residual of the tangential load, R_Q"),
     "residual_torque": _scalar("1", "residual of the torque, R_M"),
+    "stick_area_step_error": _scalar("m2", "bound on the error of the stick area by the size of load steps"),
+    "stick_area_step_change": _scalar("m2", "change of the stick area by load steps of half the size"),
+    "traction_step_change": _scalar(
+        "1", "change of the shear tractions by load steps of half the size, share of what friction can carry"
+    ),
+    "rejected_steps": _scalar("1", "larger load steps that were tried and rejected", dtype="i4"),
+    "step_limited": _scalar(
+        "1",
+        "whether the tolerance of load steps was missed, since smaller ones did not help",
+        dtype="i1",
+        flags=_LIMITS,
+    ),
+    "segment_fraction": _scalar("1", "fraction of the segment that is done"),
     "segment": _scalar("1", "segment of the load history, the first is 1", dtype="i4"),
     "label": _scalar("", "label of the segment", dtype="str"),
 }
@@ -153,10 +167,16 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.is_field)
 
 _OF_THE_WORK = ("sweeps", "cuts", "operator_applications", "seconds", "segment", "label")
+_ADAPTIVE = (  # errors of load steps are not estimated once more, and do not go together with these
+    *("stick_area_step_error", "stick_area_step_change", "traction_step_change"),
+    *("rejected_steps", "step_limited", "segment_fraction"),
+)
 ESTIMATED = tuple(
     name
     for name, variable in VARIABLES.items()
-    if variable.dims == ("step",) and name not in ("step", *_OF_THE_WORK) and not name.startswith("residual_")
+    if variable.dims == ("step",)
+    and name not in ("step", *_OF_THE_WORK, *_ADAPTIVE)
+    and not name.startswith("residual_")
 )
 """Quantities of the history whose discretization error is estimated."""
 

@@ -38,6 +38,7 @@ DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"
 S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
+_COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
 _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
 
 
@@ -53,6 +54,8 @@ def memory_needed(case: Case, lattice: Lattice) -> int:
     arrays = kind_of(case).arrays
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         arrays += _ENTRY_ARRAYS
+    if case.adaptive:
+        arrays += _COMPANION_ARRAYS
     return case.memory_needed(lattice) + len(bodies) * operator + arrays * _ITEM * lattice.size
 
 
@@ -213,9 +216,7 @@ class Window(ABC, Generic[S]):
             if wanted:
                 moved = self._displacement(body, fields)
                 fields |= {name: moved[name[-1]] for name in wanted}
-        edges = ContactEdges(
-            solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
-        )
+        edges = self.edges_of(solution)
         history: dict[str, float | int | str] = {
             **self._contact_measures(solution, edges),
             **self._more_history(solution, before, edges),
@@ -230,7 +231,7 @@ class Window(ABC, Generic[S]):
             history,
             prescribed=self._prescribed(target, history),
             load_fraction=(target.index + 1) / len(self.case.load_steps),
-            segment_fraction=target.fraction,
+            ramp_done=target.fraction,
         )
 
     def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
@@ -242,6 +243,12 @@ class Window(ABC, Generic[S]):
                 # a ramp that takes over from the other control begins where that one ended
                 driven[name] = float(history[name] if drive.from_start else drive.value)
         return driven
+
+    def edges_of(self, solution: S) -> ContactEdges:
+        """Return the edges of the contact, and of what is inside."""
+        return ContactEdges(
+            solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
+        )
 
     def closing(self, solution: S) -> Array:
         """Return u_1z + u_2z (m), by which the deformation opens the gap; NaN where nothing can touch."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import ContactEdges
+from .edges import ContactEdges, Edge
 from .errors import DeckError
 from .estimators import area_radius
 from .load_history import LoadStep
@@ -24,6 +24,7 @@ _SCALARS = (  # of a state, besides the residuals, that have the names of the hi
     *("normal_load", "tangential_load_x", "tangential_load_y", "torque"),
     *("approach", "shift_x", "shift_y", "twist", "dissipated_energy", "operator_applications"),
 )
+_ROUGHLY = 1e-4  # residual of a solution that only tells how large the contact becomes
 
 
 class FrictionWindow(Window["ContactState"]):
@@ -101,13 +102,34 @@ class FrictionWindow(Window["ContactState"]):
             "cuts": solution.cuts,
         }
 
-    def _stick_measures(self, solution: ContactState, edges: ContactEdges) -> dict[str, float]:
-        """Return size and place of the stick zone; NaN for its place where there is none."""
+    def stick_edge(self, solution: ContactState, edges: ContactEdges) -> Edge:
+        """Return the edge of the stick zone."""
         stick, mu = solution.zone == 1, self.case.friction_coefficient
         reserve = np.zeros(stick.shape)  # not looked at where nothing slips
         if math.isfinite(mu):
             reserve = mu * solution.pressure - np.hypot(solution.traction_x, solution.traction_y)
-        edge = edges.stick(stick, reserve)
+        return edges.stick(stick, reserve)
+
+    def largest_contact_area(self) -> float:
+        """Return the contact area at the largest load of the history, without friction (m2)."""
+        from .native import NormalContact
+
+        gap, candidate = self.case.initial_gap(self.lattice)
+        method = self.case.method_for(self.lattice)
+        contact = NormalContact(self.lattice, self.case.pair, gap, candidate, method)
+        areas = []
+        for control, name in (("force", "normal_load"), ("displacement", "approach")):
+            values = [step.z.value for step in self.case.load_steps if step.z.control == control]
+            if (value := max(values, default=0.0)) > 0:
+                driven: dict[str, Any] = {name: value}
+                solution = contact.solve(**driven, tolerance=_ROUGHLY)
+                areas.append(self.lattice.cell_area * int((solution.zone > 0).sum()))
+        return max([self.lattice.cell_area, *areas])
+
+    def _stick_measures(self, solution: ContactState, edges: ContactEdges) -> dict[str, float]:
+        """Return size and place of the stick zone; NaN for its place where there is none."""
+        stick = solution.zone == 1
+        edge = self.stick_edge(solution, edges)
         x, y = self.lattice.x[stick], self.lattice.y[stick]
         some = x.size > 0
         return {

@@ -137,7 +137,7 @@ def test_every_scalar_has_an_error(sheared: hexcontact.Result) -> None:
     assert (sheared.approach_error > 0.0).all()
     assert (sheared.torque_error[1:] > 0.0).all()  # follows from twist = 0
     assert re.search(r"approach +\S+ µm ± \S+ %\n", repr(sheared))
-    assert re.search(r"normal_load +100 N\n", repr(sheared))
+    assert re.search(r"normal load +100.0 N\n", repr(sheared))
 
 
 def test_target_is_that_of_the_largest_values(sheared: hexcontact.Result) -> None:

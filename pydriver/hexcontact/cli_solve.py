@@ -138,7 +138,7 @@ def study(
         return None
     with listeners.logging(file, planned.output):
         if case is not None:
-            outcome = planned.run_case(case, retry)
+            outcome = command.run_case(planned, case, retry, listeners)
             if outcome.exit_code:
                 raise Failure(outcome.message, outcome.exit_code)
             return {

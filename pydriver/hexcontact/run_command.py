@@ -84,6 +84,19 @@ class Listeners:
         """Whether no progress is shown: if quiet, or where the log is shown instead."""
         return self.quiet or (self.log_level is not None and self.log_file is None)
 
+    def leave(self, signaled: Interrupted, kept: str, **about: Any) -> NoReturn:
+        """Say what is kept after an interruption and end the process, whatever the core is doing."""
+        message = f"interrupted; {kept}"
+        with contextlib.suppress(OSError):  # nobody listens any more
+            log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", **about))
+            log.logger.disabled = True  # for what is still at work
+            complain(message)
+            if self.as_json:
+                json_output.write(self.command, json_output.error(message, signaled.exit_code))
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(signaled.exit_code)
+
     def tell(
         self,
         case: Case,
@@ -129,24 +142,9 @@ def solved(
                 heard,
             )
     except Interrupted as signaled:
-        _leave(store, signaled, listeners)
+        store.close(f"interrupted ({signaled.name})")
+        listeners.leave(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories
-
-
-def _leave(store: Store, signaled: Interrupted, listeners: Listeners) -> NoReturn:
-    """Say what is kept after an interruption and end the process, whatever the core is doing."""
-    store.close(f"interrupted ({signaled.name})")
-    kept = store.kept or "no load step was finished"
-    message = f"interrupted; {kept}"
-    with contextlib.suppress(OSError):  # nobody listens any more
-        log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", done=len(store.heads)))
-        log.logger.disabled = True  # for what is still at work
-        complain(message)
-        if listeners.as_json:
-            json_output.write(listeners.command, json_output.error(message, signaled.exit_code))
-        sys.stdout.flush()
-        sys.stderr.flush()
-    os._exit(signaled.exit_code)
 
 
 def overview(path: Path) -> Path:

@@ -29,6 +29,7 @@ from .study_store import Outcome, StudyFolder
 if TYPE_CHECKING:
     import xarray
 
+    from .progress import Reporter
     from .study_dask import DaskPool
     from .study_run import Job, LocalPool
 
@@ -272,7 +273,7 @@ class Study:
         """Return the Dask cluster that `run` would use; None: processes of this machine."""
         return Dask(address=dask) if dask else self.file.dask if jobs is None else None
 
-    def run_case(self, number: int, retry: bool = False) -> Outcome:
+    def run_case(self, number: int, retry: bool = False, shown: Reporter | None = None) -> Outcome:
         """Run one case here, unless it is done; for job arrays.
 
         Parameters
@@ -281,6 +282,8 @@ class Study:
             Number of the case, as in the names of the files.
         retry : bool
             Also if it failed by itself before.
+        shown : Reporter, optional
+            Who is told about each load step.
 
         Returns
         -------
@@ -296,7 +299,8 @@ class Study:
         case = known[number]
         if number not in missing:
             return self.folder.failure(case) or Outcome(case.hash)
-        outcome = solve_case(Job(case.hash, case.deck, os.path.realpath(self.folder.path(case))))
+        job = Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))
+        outcome = solve_case(job, shown=shown)
         self.folder.note(case, outcome)
         return outcome
 

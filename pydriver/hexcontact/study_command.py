@@ -9,10 +9,13 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from .progress import quantity
 from .study import Outcome, PlannedCase, Study, StudyWatcher
+
+if TYPE_CHECKING:
+    from .run_command import Listeners
 
 FAILED = 3  # exit code of a study of which some cases failed
 _MOST_TOLD = 20  # failures listed at the end
@@ -121,6 +124,24 @@ def interrupted(study: Study) -> str:
     )
 
 
+def run_case(study: Study, number: int, retry: bool, listeners: Listeners) -> Outcome:
+    """Run one case for a job array; signals end the process, and what is finished stays."""
+    from .interruption import Interrupted, in_background, news
+    from .progress import reporter
+
+    outcomes: list[Outcome] = []
+    shown = reporter(listeners.silent)
+    with news() as heard:
+        try:
+            in_background(lambda: outcomes.append(study.run_case(number, retry, shown)), heard)
+        except Interrupted as signaled:
+            listeners.leave(
+                signaled,
+                f"the finished load steps of case {number} are kept; the same command goes on after them",
+            )
+    return outcomes[0]
+
+
 def run_in_background(study: Study, cancel: threading.Event, options: dict[str, Any]) -> Any:
     """Return what to do in a second thread, and the event that is set when it is over."""
     over = threading.Event()
@@ -154,6 +175,9 @@ def slurm_script(study: Study, path: Path, retry: bool) -> str:
     if not numbers:
         return ""
     options = {"job-name": study.output.stem, "output": f"{study.folder.folder}/slurm-%A_%a.log"}
+    options["signal"] = (
+        "B:USR1@60"  # a minute before a time limit, to the command that takes the shell's place
+    )
     options |= {str(key).replace("_", "-"): value for key, value in study.file.slurm.items()}
     words = [
         *("hexcontact", "study", str(path.resolve()), "--output", os.path.abspath(study.output)),

@@ -26,7 +26,9 @@ from .study_store import Outcome
 
 if TYPE_CHECKING:
     from .case import Case
+    from .progress import Reporter
     from .restart import Restart
+    from .step import Step
 
 _POLL = 0.2  # s between looks at whether to stop
 _BLOCKED = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
@@ -41,7 +43,7 @@ class Job:
     path: str
 
 
-def solve_case(job: Job, apart: bool = False) -> Outcome:
+def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> Outcome:
     """Run one case into its file.
 
     Parameters
@@ -50,6 +52,8 @@ def solve_case(job: Job, apart: bool = False) -> Outcome:
         The case.
     apart : bool
         Write under a name of this attempt's own first, for when another attempt may still be under way.
+    shown : Reporter, optional
+        Who is told about each load step.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def solve_case(job: Job, apart: bool = False) -> Outcome:
     from .solve import metadata_of, record
     from .store import Store
 
-    started = time.perf_counter()
+    started, shown = time.perf_counter(), shown or Reporter()
     target = Path(job.path)
     own = target.with_name(f"{target.stem}.{uuid.uuid4().hex[:8]}.nc") if apart else target
 
@@ -79,10 +83,11 @@ def solve_case(job: Job, apart: bool = False) -> Outcome:
             if restart is None:
                 store = stack.enter_context(Store(own, metadata_of(case), overwrite=True))
                 began = True
-                record(case, store, Reporter())
+                before: Sequence[Step] = ()
             else:
-                own, began = restart.store.path, True
-                record(case, restart.store, Reporter(), before=restart.before)
+                own, began, store, before = restart.store.path, True, restart.store, restart.before
+            with shown.watching(case.title or target.stem, case.planned_steps):
+                record(case, store, shown, before=before)
         apart = own != target
         if apart:
             os.replace(own, target)

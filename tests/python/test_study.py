@@ -380,6 +380,26 @@ def test_job_array_runs_case_by_case(folder: Path) -> None:
         assert_array_equal(dataset.status, [[2, 0, 0], [2, 2, 2]])
 
 
+def test_a_task_of_a_job_array_heeds_what_slurm_sends(folder: Path) -> None:
+    (folder / "deck.toml").write_text(LONG)
+    (folder / "study.toml").write_text(
+        'deck = "deck.toml"\n[[parameter]]\nkey = "load.1.normal_load"\nvalues = [1, 2]\n'
+    )
+    assert "#SBATCH --signal=B:USR1@60\n" in command("study.toml", "--slurm").stdout
+    words = [sys.executable, "-m", "hexcontact", "study", "study.toml", "--case", "1"]
+    process = subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
+    for _ in range(300):
+        if len(list(Path().glob("study/0001.nc.d/*.npz"))) > 2:
+            break
+        time.sleep(0.05)
+    process.send_signal(signal.SIGUSR1)
+    _, told = process.communicate(timeout=30)
+    assert process.returncode == 128 + signal.SIGUSR1
+    assert re.search(r"^\S* *1/400 ", told, re.MULTILINE), told
+    assert "hexcontact: interrupted; the finished load steps of case 1 are kept" in told
+    assert Case.from_text(LONG, "deck.toml").title == hexcontact.open_result("study/0001.nc").case_title
+
+
 def worker_of(process: int) -> psutil.Process:
     """Wait for a worker that solves something: a process below that uses the core."""
     for _ in range(300):

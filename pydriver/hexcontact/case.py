@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from . import native, native_friction
 from .arguments import reals
 from .case_arguments import as_toml, body_keys, given, middle_of, segments
 from .case_checks import algorithm_of, checked_deck
+from .case_settings import AccuracySettings, Body, OutputSettings, SolverSettings
 from .deck import Deck
 from .deck_assembly import Assembled, assemble
 from .errors import DeckError
@@ -25,7 +25,7 @@ from .lattice import Lattice
 from .load_history import LoadStep, Target, load_steps
 from .messages import MISSING, Problem, Source, deck_error
 from .native import ElasticPair, Method
-from .surfaces import Separation, Surface
+from .surfaces import Separation
 from .validation import SMALLEST
 from .variables import LARGEST
 
@@ -41,60 +41,6 @@ Array = NDArray[np.float64]
 
 # Windows of up to so many nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
 MOST_DIRECT_NODES = 200
-
-
-@dataclass(frozen=True)
-class Body:
-    """One of the two bodies.
-
-    Attributes
-    ----------
-    young_modulus : float or None
-        Young's modulus (Pa); None for a rigid body.
-    poisson_ratio : float or None
-        Poisson's ratio; None for a rigid body.
-    rigid : bool
-        Whether the body is rigid.
-    surface : Surface or None
-        Shape of its surface; None for a flat one, or if the gap of the case is given as a whole.
-    """
-
-    young_modulus: float | None = None
-    poisson_ratio: float | None = None
-    rigid: bool = False
-    surface: Surface | None = None
-
-
-@dataclass(frozen=True)
-class SolverSettings:
-    """How a case is solved; see [solver] in the deck reference."""
-
-    algorithm: str = "frictionless"
-    method: str = "auto"
-    tolerance: float = 1e-8
-    coupling: str = "full"
-    entry: str = "implicit"
-    step_tolerance: float = 0.01
-
-
-@dataclass(frozen=True)
-class AccuracySettings:
-    """How far the lattice is refined; see [accuracy] in the deck reference."""
-
-    target: float
-    max_nodes: int
-
-
-@dataclass(frozen=True)
-class OutputSettings:
-    """What is kept of a run; see [output] in the deck reference.
-
-    No fields: all that the algorithm yields, except for the displacements of the bodies.
-    """
-
-    file: Path | None = None
-    fields: tuple[str, ...] = ()
-    every: int = 1
 
 
 class Case:

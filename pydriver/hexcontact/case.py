@@ -526,7 +526,7 @@ class Case:
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
             return [Problem(("accuracy", "target"), wanted.target, sentence)]
         if self.adaptive:
-            sentence = 'needs numbers of load steps, the same on all lattices, not steps = "auto"'
+            sentence = 'expected steps as numbers with it, not "auto": all lattices need the same load steps'
             return [Problem(("accuracy", "target"), wanted.target, sentence)]
         third = self.on_lattice(self.lattice.spacing / 2, self.lattice.origin).lattice.size
         if third <= wanted.max_nodes:

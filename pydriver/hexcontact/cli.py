@@ -49,7 +49,7 @@ def _hexcontact(
 ) -> None:
     """Elastic contact in 3-D from a deck in TOML: pressure, shear traction, stick and slip, approach, shift.
 
-    Exit codes: 0 done, 2 wrong input, 3 no convergence or accuracy, 4 no memory or disk; 130, 138, 143 stopped.
+    Exit codes: 0 done, 2 wrong input, 3 no convergence or accuracy, 4 memory or disk; 130, 138, 143 stopped.
     """
 
 

@@ -219,11 +219,15 @@ contains
     thread = 1
     !$omp parallel num_threads(self%n_threads) private(j, m, b, kernel, sign, from, to) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
-    allocate (kernel(n_kernel, 1 - n(1):n(1) - 1, 2), source=0.0_wp)
+    allocate (kernel(n_kernel, 1 - n(1):n(1) - 1, 2))
     !$omp do schedule(dynamic)
     do j = 0, n(2) - 1, 2
       call source%row(j, kernel(:, :, 1))
-      if (j + 1 < n(2)) call source%row(j + 1, kernel(:, :, 2))
+      if (j + 1 < n(2)) then
+        call source%row(j + 1, kernel(:, :, 2))
+      else
+        kernel(:, :, 2) = 0.0_wp                                               ! not what another row left there
+      end if
       do m = 1, n_kernel
         associate (given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
           given(:n(1)) = scale*cmplx(kernel(m, 0:, 1), kernel(m, 0:, 2), wp)

@@ -51,7 +51,7 @@ contains
     do
       ! both sides of the window count
       cost = time_per_point(length)*real(length, wp)**2
-      if (cost < least) then
+      if (cost > 0.0_wp .and. cost < least) then
         least = cost
         good_size = length
       end if
@@ -61,7 +61,7 @@ contains
   end function good_size
 
   !> Times per point of FFTW's estimated plans over those of powers of two, roughly (measured with AVX2
-  !> in both precisions and both directions); huge for lengths with larger prime factors.
+  !> in both precisions); zero for lengths with larger prime factors, which are not to be taken.
   elemental real(wp) function time_per_point(length)
     integer, intent(in) :: length
     integer :: rest, prime
@@ -83,7 +83,7 @@ contains
           rest = rest/primes(prime)
         end do
       end do
-      time_per_point = merge(1.9_wp, huge(1.0_wp)/real(length, wp)**2, rest == 1)
+      time_per_point = merge(1.9_wp, 0.0_wp, rest == 1)
     end select
   end function time_per_point
 

@@ -263,14 +263,16 @@ contains
     real(wp), intent(in) :: displacement(:)
     !> Its traction if all nodes stuck, in the frames (2 n)
     real(wp), intent(inout) :: traction(:)
-    real(wp) :: stiffness
+    real(wp) :: moved, stretch
     integer :: i, n
 
     n = size(self%compliance)
     do i = 1, n
-      if (.not. self%compliance(i) > 0.0_wp) cycle
-      stiffness = magnitude(traction([i, n + i]))/max(magnitude(displacement([i, n + i])), tiny(1.0_wp))
-      traction(i) = traction(i)/(1.0_wp + stiffness*self%compliance(i))
+      ! what the spring gives way under that traction
+      stretch = self%compliance(i)*magnitude(traction([i, n + i]))
+      if (.not. stretch > 0.0_wp) cycle
+      moved = magnitude(displacement([i, n + i]))
+      traction(i) = traction(i)*moved/(moved + stretch)
     end do
   end subroutine soften
 

@@ -251,7 +251,10 @@ def test_the_next_load_may_depend_on_the_last_answer(tmp_path: Path) -> None:
     again = Case.from_text(result.deck).run()
     both = {"row": again.row, "col": again.col}
     for name in ("tangential_load_x", "shift_x", "approach", "normal_load"):
-        assert again[name].values == pytest.approx(result[name].values, rel=1e-6, abs=1e-12), name
+        expected = result[name].values
+        # a load that is next to none is as exact as the larger ones
+        scale = np.abs(expected).max()
+        assert again[name].values == pytest.approx(expected, rel=1e-6, abs=1e-8 * scale), name
     there = result.traction_x.reindex(both, fill_value=0.0).values
     assert np.abs(again.traction_x.values - there).max() < 1e-6 * float(result.max_traction.max())
 

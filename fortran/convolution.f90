@@ -13,6 +13,8 @@ module hc_convolution
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
+  use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, release
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_row_pairs, only: split_rows, join_rows
   use hc_spectral_product, only: multiply, multiply_one
   !$ use omp_lib, only: omp_get_thread_num, omp_get_max_threads
@@ -29,8 +31,10 @@ module hc_convolution
   !> Plans, spectra and scratch space.
   type :: convolution_t
     !> Spectra (frequency, block, kernel), normalised; those of odd kernels are divided by i.
-    !> `frequencies` tells which frequency stands where.
-    real(wp), allocatable :: spectrum(:, :, :)
+    !> `frequencies` tells which frequency stands where. Other convolutions may share them.
+    real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
+    !> What the results are multiplied with
+    real(wp) :: factor = 1.0_wp
     !> Threads that share the work
     integer :: n_threads = 1
     !> Transform lengths along the two lattice directions
@@ -41,8 +45,10 @@ module hc_convolution
     integer, private :: extent(2) = 0
     !> Number of frequencies along the first direction, and the leading dimension that holds them
     integer, private :: n_frequency = 0, leading = 0
-    !> The first odd kernel
-    integer, private :: first_odd = 0
+    !> Number of kernels, the first odd one
+    integer, private :: n_kernel = 0, first_odd = 0
+    !> Where the spectra are
+    type(kernel_spectrum_t), pointer, private :: held => null()
     type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
     !> Row transforms (leading, n_row or one more, component)
     complex(wp), allocatable, private :: work(:, :, :)
@@ -53,13 +59,15 @@ module hc_convolution
   contains
     !> Sums of weighted convolutions
     procedure :: convolve
+    !> Spectra from a cache, or room for them, and to the cache
+    procedure :: take_spectra, share_spectra
     !> Spectra of kernels given at the lattice offsets
     procedure :: transform_kernels
     !> Frequencies of the entries of a block of the spectra
     procedure :: frequencies
     !> The transforms of one scalar product and nothing else
     procedure :: time_transforms
-    final :: free_plans
+    final :: free
   end type convolution_t
 
   !> Something that knows the kernels at lattice offsets.
@@ -80,7 +88,7 @@ module hc_convolution
 
 contains
 
-  !> Plans and scratch space for convolutions over a window; the spectra are still to be set.
+  !> Plans and scratch space for convolutions over a window; the spectra are still to be taken.
   subroutine new_convolution(self, extent, padded, n_kernel, n_component, error, first_odd, n_threads)
     !> Convolution to be set up
     type(convolution_t), intent(out) :: self
@@ -100,6 +108,7 @@ contains
     integer :: stat
 
     self%n_threads = threads_for(extent, n_threads)
+    self%n_kernel = n_kernel
     self%first_odd = n_kernel + 1
     if (present(first_odd)) self%first_odd = first_odd
     self%extent = extent
@@ -112,7 +121,6 @@ contains
       ! the columns that only fill up the last block are transformed too: zeros stay zeros
       allocate (self%work(self%leading, even(extent(2)), n_component), self%row_buffer(padded(1), 2, self%n_threads), &
                 self%block_buffer(column, n_component, self%n_threads), source=(0.0_wp, 0.0_wp), stat=stat)
-      if (stat == 0) allocate (self%spectrum(column, self%n_block, n_kernel), source=0.0_wp, stat=stat)
     end associate
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
@@ -120,6 +128,51 @@ contains
     end if
     call make_plans(self, error)
   end subroutine new_convolution
+
+  !> Spectra that a cache has, or room for spectra that are still to be made, zero.
+  subroutine take_spectra(self, found, error, cache, key)
+    class(convolution_t), intent(inout) :: self
+    !> They were there, and must not be changed
+    logical, intent(out) :: found
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Where to look, if anywhere
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> With a cache: what the kernels depend on
+    type(kernel_key_t), intent(in), optional :: key
+    integer :: shape_wanted(3), stat
+
+    shape_wanted = [self%width*self%padded(2), self%n_block, self%n_kernel]
+    found = .false.
+    if (present(cache)) then
+      if (associated(cache)) call cache%find(key, self%held)
+    end if
+    if (associated(self%held)) then
+      call self%held%point(shape_wanted, self%spectrum)
+      found = associated(self%spectrum)
+      if (found) return
+      call release(self%held)
+    end if
+    allocate (self%held)
+    call self%held%reserve(shape_wanted, self%spectrum, stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
+      return
+    end if
+    self%spectrum = 0.0_wp
+  end subroutine take_spectra
+
+  !> Let a cache have the spectra, once they are complete.
+  subroutine share_spectra(self, cache, key)
+    class(convolution_t), intent(in) :: self
+    !> The cache, if there is one
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> With a cache: what the kernels depend on
+    type(kernel_key_t), intent(in), optional :: key
+
+    if (.not. present(cache)) return
+    if (associated(cache)) call cache%keep(key, self%held)
+  end subroutine share_spectra
 
   !> Threads that a window is worth.
   integer function threads_for(extent, n_threads)
@@ -318,8 +371,8 @@ contains
         associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
           call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
           call fftw_execute_dft(self%row_plan, joined, transformed)
-          result(:, row, o) = real(transformed(:n(1)), wp)
-          if (row < n(2)) result(:, row + 1, o) = -aimag(transformed(:n(1)))
+          result(:, row, o) = self%factor*real(transformed(:n(1)), wp)
+          if (row < n(2)) result(:, row + 1, o) = -self%factor*aimag(transformed(:n(1)))
         end associate
       end do
       !$omp end do nowait
@@ -433,7 +486,7 @@ contains
     !$omp end parallel
   end subroutine time_transforms
 
-  impure elemental subroutine free_plans(self)
+  impure elemental subroutine free(self)
     type(convolution_t), intent(inout) :: self
 
     !$omp critical (hc_fftw_planner)
@@ -442,6 +495,8 @@ contains
     !$omp end critical (hc_fftw_planner)
     self%row_plan = c_null_ptr
     self%column_plan = c_null_ptr
-  end subroutine free_plans
+    self%spectrum => null()
+    call release(self%held)
+  end subroutine free
 
 end module hc_convolution

@@ -42,6 +42,8 @@ module hc_elastic_pair
     procedure :: beta => dundurs_beta
     !> lambda_5/lambda_1
     procedure :: gamma => tangential_gamma
+    !> The constants over lambda_1
+    procedure :: scaled
   end type elastic_pair_t
 
 contains
@@ -127,5 +129,11 @@ contains
     class(elastic_pair_t), intent(in) :: self
     tangential_gamma = self%lambda_5/self%lambda_1
   end function tangential_gamma
+
+  !> A pair of which lambda_1 is one.
+  pure type(elastic_pair_t) function scaled(self)
+    class(elastic_pair_t), intent(in) :: self
+    scaled = elastic_pair_t(1.0_wp, self%beta(), self%gamma())
+  end function scaled
 
 end module hc_elastic_pair

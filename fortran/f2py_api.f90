@@ -6,7 +6,7 @@ module hc_f2py_api
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of
+  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: along_x, along_y
@@ -113,7 +113,7 @@ contains
       else
         allocate (fft)
         slot%operator => fft
-        call new_fft_flexibility(fft, slot%lattice, pair_of(lambda), error, n_threads=n_threads)
+        call new_fft_flexibility(fft, slot%lattice, pair_of(lambda), error, n_threads=n_threads, cache=kernel_cache)
       end if
     end if
     if (allocated(error)) call free_slot(handle)
@@ -193,7 +193,7 @@ contains
       else
         allocate (slot%normal_contact)
         call new_normal_contact(slot%normal_contact, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
-                                reshape(candidate /= 0, extent), error, n_threads)
+                                reshape(candidate /= 0, extent), error, n_threads, kernel_cache)
       end if
     end if
     if (allocated(error)) call free_slot(handle)

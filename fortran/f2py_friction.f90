@@ -6,7 +6,7 @@ module hc_f2py_friction
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of
+  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
   use hc_friction_law, only: coulomb_t
@@ -100,7 +100,7 @@ contains
       else
         allocate (fft)
         slot%friction => fft
-        call new_windowed_friction(fft, problem, error, n_threads)
+        call new_windowed_friction(fft, problem, error, n_threads, kernel_cache)
       end if
     end if
     if (allocated(error)) call free_slot(handle)

@@ -2,7 +2,7 @@
 !>
 !> A handle is a slot number with a generation count, so that a stale handle is
 !> an error and never another object. A handle at work in one thread is refused
-!> in another. This is the one place with module state; it is not part of the
+!> in another. The spectra that all objects share are here, too. This is the one place with module state; it is not part of the
 !> Fortran library.
 module hc_f2py_handles
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
@@ -13,10 +13,11 @@ module hc_f2py_handles
   use hc_elastic_pair, only: elastic_pair_t
   use hc_direct_contact, only: direct_contact_t
   use hc_friction_problem, only: friction_solver_t
+  use hc_kernel_cache, only: kernel_cache_t
   implicit none
   private
 
-  public :: slot_t, take_slot, enter, leave, free_slot, report, pair_of
+  public :: slot_t, kernel_cache, take_slot, enter, leave, free_slot, report, pair_of
 
   !> Objects that may exist at a time.
   integer, parameter :: n_slot = 4096
@@ -35,6 +36,9 @@ module hc_f2py_handles
   end type slot_t
 
   type(slot_t), target :: slots(n_slot)
+
+  !> Spectra of kernels that all problems share.
+  type(kernel_cache_t), pointer :: kernel_cache => null()
 
 contains
 

@@ -8,7 +8,9 @@ module hc_flexibility_fft
   use hc_flexibility, only: flexibility_t, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, convolution_memory, kernel_source_t
-  use hc_normal_kernel, only: normal_kernel_t, new_normal_kernel
+  use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
+  use hc_kernel_cache, only: kernel_cache_t
+  use hc_normal_kernel, only: normal_kernel_t
   implicit none
   private
 
@@ -16,7 +18,7 @@ module hc_flexibility_fft
 
   !> Convolution operator over a window.
   type, extends(flexibility_t) :: fft_flexibility_t
-    !> Spectra of the blocks, that of the pressure and the gap alone or all six
+    !> Spectra of the blocks over lambda_1 and the spacing, that of the pressure and the gap alone or all six
     type(convolution_t) :: convolution
     !> Components that the operator was set up for
     integer, private :: n_component = 0
@@ -24,7 +26,7 @@ module hc_flexibility_fft
     procedure :: apply => fft_apply
   end type fft_flexibility_t
 
-  !> The blocks of the operator at lattice offsets.
+  !> The blocks of the operator at lattice offsets, over lambda_1 and the spacing.
   type, extends(kernel_source_t) :: lattice_blocks_t
     type(pyramid_t) :: pyramid
     type(elastic_pair_t) :: pair
@@ -36,7 +38,7 @@ module hc_flexibility_fft
 contains
 
   !> Plans and spectra of the operator over a window.
-  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, n_threads, kernel)
+  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, n_threads, kernel, cache)
     !> Operator to be set up
     type(fft_flexibility_t), intent(out) :: operator
     !> Lattice and window
@@ -49,12 +51,15 @@ contains
     logical, intent(in), optional :: normal_only
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
-    !> With `normal_only`: the kernel, if it is at hand
-    type(normal_kernel_t), intent(in), optional :: kernel
+    !> With `normal_only`: the kernel, as far as it is at hand
+    type(normal_kernel_t), intent(inout), optional :: kernel
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     type(lattice_blocks_t) :: source
     type(normal_kernel_t) :: made
-    logical :: only_normal
+    type(kernel_key_t) :: key
+    logical :: only_normal, found
 
     only_normal = .false.
     if (present(normal_only)) only_normal = normal_only
@@ -65,17 +70,23 @@ contains
                          merge(1, n_block, only_normal), operator%n_component, error, &
                          first_odd=first_odd_block, n_threads=n_threads)
     if (allocated(error)) return
+    operator%convolution%factor = pair%lambda_1*lattice%spacing()
+    key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, pair)
+    call operator%convolution%take_spectra(found, error, cache, key)
+    if (found .or. allocated(error)) return
     if (only_normal .and. present(kernel)) then
+      call kernel%cover(lattice, n_threads)
       call operator%convolution%transform_kernels(kernel, error)
     else if (only_normal) then
-      call new_normal_kernel(made, lattice, pair%lambda_1, n_threads)
+      call made%cover(lattice, n_threads)
       call operator%convolution%transform_kernels(made, error)
     else
-      call new_pyramid(source%pyramid, lattice%basis)
-      source%pair = pair
-      source%basis = lattice%basis
+      source%basis = lattice%unit_basis()
+      call new_pyramid(source%pyramid, source%basis)
+      source%pair = pair%scaled()
       call operator%convolution%transform_kernels(source, error)
     end if
+    if (.not. allocated(error)) call operator%convolution%share_spectra(cache, key)
   end subroutine new_fft_flexibility
 
   !> Bytes that the operator takes, for a window of the given size.

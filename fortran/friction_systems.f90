@@ -18,6 +18,7 @@ module hc_friction_systems
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_spring_blend, only: node_compliance, blend
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
   use hc_friction_law, only: magnitude
@@ -109,7 +110,7 @@ module hc_friction_systems
 contains
 
   !> Operator and preconditioners over a window.
-  subroutine new_operators(self, lattice, pair, error, n_threads)
+  subroutine new_operators(self, lattice, pair, error, n_threads, cache)
     !> Operators to be set up
     type(operators_t), intent(out) :: self
     !> Lattice and window
@@ -120,12 +121,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
 
-    call new_fft_flexibility(self%flexibility, lattice, pair, error, n_threads=n_threads)
+    call new_fft_flexibility(self%flexibility, lattice, pair, error, n_threads=n_threads, cache=cache)
     if (allocated(error)) return
-    call new_preconditioner(self%normal, lattice, pair, error, n_threads)
+    call new_preconditioner(self%normal, lattice, pair, error, n_threads, cache=cache)
     if (allocated(error)) return
-    call new_preconditioner(self%tangential, lattice, pair, error, n_threads, tangential=.true.)
+    call new_preconditioner(self%tangential, lattice, pair, error, n_threads, tangential=.true., cache=cache)
     self%n_threads = self%flexibility%convolution%n_threads
   end subroutine new_operators
 

@@ -12,6 +12,7 @@ module hc_frictional_contact
   use hc_friction_systems, only: operators_t, new_operators, operators_memory
   use hc_friction_level, only: solve_level
   use hc_friction_predictor, only: predict
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_multilevel, only: prolong_edge, prolong_shear, restrict_vector, level_count
   implicit none
   private
@@ -38,7 +39,7 @@ module hc_frictional_contact
 contains
 
   !> Operators of a problem on all its lattices.
-  subroutine new_frictional_contact(self, problem, error, n_threads)
+  subroutine new_frictional_contact(self, problem, error, n_threads, cache)
     !> Solver to be set up
     type(frictional_contact_t), intent(out) :: self
     !> The problem
@@ -47,6 +48,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
     integer :: l, n_level
 
     self%problem = problem
@@ -59,9 +62,9 @@ contains
         self%coarse(l) = self%coarse(l - 1)%coarsened()
       end if
       if (l == 1) then
-        call new_operators(self%operators(l), problem%lattice, problem%pair, error, n_threads)
+        call new_operators(self%operators(l), problem%lattice, problem%pair, error, n_threads, cache)
       else
-        call new_operators(self%operators(l), self%coarse(l)%lattice, problem%pair, error, n_threads)
+        call new_operators(self%operators(l), self%coarse(l)%lattice, problem%pair, error, n_threads, cache)
       end if
       if (allocated(error)) return
     end do

@@ -41,6 +41,8 @@ module hc_lattice
     procedure :: coordinates
     !> The lattice of every second node of this one
     procedure :: coarsened
+    !> Basis vectors over the spacing
+    procedure :: unit_basis
   end type lattice_t
 
 contains
@@ -126,6 +128,15 @@ contains
       end do
     end do
   end subroutine coordinates
+
+  !> Basis vectors over the spacing, as columns: the same to the bit for all equilateral lattices with a row along x.
+  pure function unit_basis(self) result(basis)
+    class(lattice_t), intent(in) :: self
+    real(wp) :: basis(2, 2)
+
+    basis = self%basis/self%spacing()
+    if (all(abs(basis - equilateral_basis(1.0_wp)) < 4.0_wp*epsilon(1.0_wp))) basis = equilateral_basis(1.0_wp)
+  end function unit_basis
 
   !> Node (i, j) of the coarse lattice is node (2 i, 2 j) of this one; nodes
   !> outside the window of this one are left out.

@@ -10,7 +10,8 @@ module hc_normal_contact
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_memory
   use hc_flexibility_fft, only: fft_memory
-  use hc_normal_kernel, only: normal_kernel_t, new_normal_kernel
+  use hc_normal_kernel, only: normal_kernel_t
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, new_contact_state, check_problem
   use hc_preconditioner, only: preconditioner_memory
   use hc_normal_level, only: normal_level_t
@@ -42,8 +43,10 @@ module hc_normal_contact
     type(normal_level_t), allocatable :: inner
     integer :: corner(2) = 0
     type(elastic_pair_t) :: pair
-    !> The kernel on the finest lattice
+    !> The kernel, as far as it was needed
     type(normal_kernel_t) :: kernel
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer :: cache => null()
     !> Threads to use
     integer :: n_threads = 0
   contains
@@ -54,7 +57,7 @@ module hc_normal_contact
 contains
 
   !> Operators of a problem on all its lattices.
-  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads)
+  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads, cache)
     !> Problem to be set up
     type(normal_contact_t), intent(out) :: self
     !> Lattice and window
@@ -69,12 +72,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
+    !> Spectra that are kept; it has to outlive the problem
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
 
-    type(normal_kernel_t) :: kernel
     integer :: l
 
     self%pair = pair
     if (present(n_threads)) self%n_threads = n_threads
+    if (present(cache)) self%cache => cache
     call check_problem(lattice, initial_gap, candidate, error)
     if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, smallest_side)))
@@ -91,14 +96,8 @@ contains
             level%candidate = restrict_mask(finer%lattice, finer%candidate, level%lattice)
           end associate
         end if
-        if (l == 1) then
-          call new_normal_kernel(self%kernel, lattice, pair%lambda_1, n_threads)
-          kernel = self%kernel
-        end if
-        ! the kernel grows with the spacing
-        kernel%factor = pair%lambda_1*2.0_wp**(l - 1)
         ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
-        call level%prepare(pair, kernel, l == 1, l > 1, error, threads_of(level%lattice, self%n_threads))
+        call level%prepare(pair, self%kernel, l == 1, l > 1, error, threads_of(level%lattice, self%n_threads), self%cache)
         if (allocated(error)) return
       end associate
     end do
@@ -230,7 +229,7 @@ contains
         if (state%converged .or. .not. part%converged) return
       end do
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
-      call whole%prepare(self%pair, self%kernel, .true., .true., error, threads_of(whole%lattice, self%n_threads))
+      call whole%prepare(self%pair, self%kernel, .true., .true., error, threads_of(whole%lattice, self%n_threads), self%cache)
       if (allocated(error)) return
       call solve_level(whole, control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
@@ -258,7 +257,7 @@ contains
       inner%lattice = part_of(whole%lattice, low, high)
       inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
       inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
-      call inner%prepare(self%pair, self%kernel, .true., .true., error, threads_of(inner%lattice, self%n_threads))
+      call inner%prepare(self%pair, self%kernel, .true., .true., error, threads_of(inner%lattice, self%n_threads), self%cache)
     end associate
   end subroutine take_part
 

@@ -11,6 +11,8 @@ module hc_normal_level
   use hc_fftw, only: good_size
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_normal_kernel, only: normal_kernel_t
+  use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t, threads_for
   use hc_contact_state, only: contact_state_t
   use hc_contact_residuals, only: conclude, normal_self_compliance
@@ -30,7 +32,7 @@ module hc_normal_level
     logical, allocatable :: candidate(:, :)
     type(elastic_pair_t) :: pair
     type(preconditioner_t) :: preconditioner
-    !> The flexibility in single precision, in units of that of the preconditioner
+    !> The flexibility in single precision, in the unit of the preconditioner
     type(convolution_t) :: single
     !> The flexibility in double precision; is it there, and is the rest?
     type(fft_flexibility_t) :: flexibility
@@ -55,8 +57,6 @@ module hc_normal_level
   !> The kernel of the pressure in single precision.
   type, extends(kernel_source_t) :: rounded_kernel_t
     type(normal_kernel_t), pointer :: kernel => null()
-    !> Unit that it is measured in [m/Pa]
-    real(wp) :: unit = 1.0_wp
   contains
     procedure :: row => rounded_row
   end type rounded_kernel_t
@@ -64,41 +64,55 @@ module hc_normal_level
 contains
 
   !> Operators of a problem whose lattice, gap and candidates are known; those that are there are kept.
-  subroutine prepare(self, pair, kernel, exact, iterating, error, n_threads)
+  subroutine prepare(self, pair, kernel, exact, iterating, error, n_threads, cache)
     class(normal_level_t), intent(inout) :: self
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
-    !> The kernel on this lattice
-    type(normal_kernel_t), intent(in), target :: kernel
+    !> The kernel, as far as it is at hand
+    type(normal_kernel_t), intent(inout), target :: kernel
     !> The operator in double precision is wanted; what iterations need is wanted
     logical, intent(in) :: exact, iterating
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
     type(rounded_kernel_t) :: rounded
+    type(kernel_key_t) :: key
+    logical :: found
 
     self%pair = pair
     self%compliance = normal_self_compliance(self%lattice, pair)
     self%n_threads = threads_for(self%lattice%extent, n_threads)
     if (exact .and. .not. self%exact) then
       call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., n_threads=n_threads, &
-                               kernel=kernel)
+                               kernel=kernel, cache=cache)
       if (allocated(error)) return
       self%exact = .true.
     end if
     if (self%iterating .or. .not. iterating) return
-    call new_preconditioner(self%preconditioner, self%lattice, pair, error, n_threads)
+    call new_preconditioner(self%preconditioner, self%lattice, pair, error, n_threads, cache=cache)
     if (allocated(error)) return
     call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, error, &
                          n_threads=n_threads)
     if (allocated(error)) return
     if (self%exact) then
-      self%single%spectrum = real(self%flexibility%convolution%spectrum/self%preconditioner%unit, sp)
+      ! copied as fast as it would be found
+      call self%single%take_spectra(found, error)
+      if (allocated(error)) return
+      self%single%spectrum = real(self%flexibility%convolution%spectrum, sp)
     else
-      rounded%kernel => kernel
-      rounded%unit = self%preconditioner%unit
-      call self%single%transform_kernels(rounded, error)
+      key = new_kernel_key(of_pressure_rounded, self%lattice, pair)
+      call self%single%take_spectra(found, error, cache, key)
+      if (allocated(error)) return
+      if (.not. found) then
+        call kernel%cover(self%lattice, n_threads)
+        rounded%kernel => kernel
+        call self%single%transform_kernels(rounded, error)
+        if (allocated(error)) return
+        call self%single%share_spectra(cache, key)
+      end if
     end if
     self%iterating = .true.
   end subroutine prepare
@@ -177,7 +191,7 @@ contains
     real(wp) :: row(size(k, 1), size(k, 2))
 
     call self%kernel%row(j, row)
-    k = real(row/self%unit, sp)
+    k = real(row, sp)
   end subroutine rounded_row
 
 end module hc_normal_level

@@ -13,8 +13,10 @@ module hc_preconditioner
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
+  use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_edge_extension, only: edge_extension_t
-  use hc_spring_blend, only: node_compliance, soft
+  use hc_spring_blend, only: node_ratio, soft
   use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
@@ -50,7 +52,7 @@ module hc_preconditioner
 contains
 
   !> Plans and inverse symbol over a window.
-  subroutine new_preconditioner(self, lattice, pair, error, n_threads, tangential)
+  subroutine new_preconditioner(self, lattice, pair, error, n_threads, tangential, cache)
     !> Preconditioner to be set up
     type(preconditioner_t), intent(out) :: self
     !> Lattice and window
@@ -63,11 +65,15 @@ contains
     integer, intent(in), optional :: n_threads
     !> For shear tractions instead of the pressure
     logical, intent(in), optional :: tangential
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
 
+    type(kernel_key_t) :: key
     integer, allocatable :: f(:, :)
     integer :: length(2), b, i, n_component
-    real(wp) :: scale, k(3), matrix(3), spring
+    real(wp) :: scale, k(3), matrix(3), spring, basis(2, 2), gamma
     real(wp), allocatable :: symbol(:)
+    logical :: found
 
     if (present(tangential)) self%tangential = tangential
     n_component = merge(2, 1, self%tangential)
@@ -76,8 +82,15 @@ contains
                          error, n_threads=n_threads)
     if (allocated(error)) return
     self%unit = pair%lambda_1*lattice%spacing()
-    spring = soft*node_compliance(lattice, pair)
-    scale = self%unit/product(real(length, wp))
+    self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
+    key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, pair)
+    call self%convolution%take_spectra(found, error, cache, key)
+    if (found .or. allocated(error)) return
+    ! all in units of lambda_1 and the spacing
+    basis = lattice%unit_basis()
+    gamma = pair%gamma()
+    spring = soft*node_ratio(pair)
+    scale = 1.0_wp/product(real(length, wp))
     !$omp parallel do num_threads(self%convolution%n_threads) private(f, i, k, matrix, symbol)
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
@@ -85,16 +98,15 @@ contains
         allocate (symbol(size(f, 2)))
         ! beyond length/2 there is mere filling
         f(1, :) = min(f(1, :), length(1)/2)
-        call normal_symbols(lattice%basis, length, f, symbol)
-        self%convolution%spectrum(:, b, 1) = real(scale/(pair%lambda_1*symbol), sp)
+        call normal_symbols(basis, length, f, symbol)
+        self%convolution%spectrum(:, b, 1) = real(scale/symbol, sp)
         deallocate (symbol)
       else
         do i = 1, size(f, 2)
           if (f(1, i) > length(1)/2) cycle
-          k = kernel_symbols(lattice%basis, length, f(:, i))
+          k = kernel_symbols(basis, length, f(:, i))
           ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
-          matrix = [pair%lambda_1*k(symbol_1) + pair%lambda_5*k(symbol_xx), pair%lambda_5*k(symbol_xy), &
-                    pair%lambda_1*k(symbol_1) + pair%lambda_5*(k(symbol_1) - k(symbol_xx))]
+          matrix = [k(symbol_1) + gamma*k(symbol_xx), gamma*k(symbol_xy), k(symbol_1) + gamma*(k(symbol_1) - k(symbol_xx))]
           self%convolution%spectrum(i, b, :n_tangential) = real(scale*inverse(matrix), sp)
           matrix([1, 3]) = matrix([1, 3]) + spring
           self%convolution%spectrum(i, b, n_tangential + 1:) = real(scale*inverse(matrix), sp)
@@ -102,7 +114,7 @@ contains
       end if
     end do
     !$omp end parallel do
-    self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
+    call self%convolution%share_spectra(cache, key)
   end subroutine new_preconditioner
 
   !> Inverse of a symmetric matrix.

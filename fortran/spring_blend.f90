@@ -14,7 +14,7 @@ module hc_spring_blend
   implicit none
   private
 
-  public :: node_compliance, blend, soft, loose
+  public :: node_compliance, node_ratio, blend, soft, loose
 
   !> Compliances, over that of a node, up to which a spring counts as stiff, where it counts as soft, and
   !> from where on nothing else counts.
@@ -29,8 +29,16 @@ contains
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
 
-    node_compliance = (2.0_wp*pair%lambda_1 + pair%lambda_5)*lattice%spacing()
+    node_compliance = node_ratio(pair)*pair%lambda_1*lattice%spacing()
   end function node_compliance
+
+  !> t_h over lambda_1 and the spacing.
+  pure real(wp) function node_ratio(pair)
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+
+    node_ratio = 2.0_wp + pair%gamma()
+  end function node_ratio
 
   !> sqrt(chi) of the inverse symbols without and with soft springs; the rest of the squares belongs to 1/D.
   pure function blend(ratio) result(weight)

@@ -10,6 +10,7 @@ module hc_windowed_friction
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_window_part, only: frame, is_worth, part_of
   implicit none
   private
@@ -28,6 +29,8 @@ module hc_windowed_friction
     integer :: low(2) = 0, high(2) = 0
     !> Threads to use
     integer :: n_threads = 0
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer :: cache => null()
   contains
     procedure :: solve_step
     procedure :: displacements
@@ -36,7 +39,7 @@ module hc_windowed_friction
 contains
 
   !> Operators of a problem on its window; those of parts come when they are needed.
-  subroutine new_windowed_friction(self, problem, error, n_threads)
+  subroutine new_windowed_friction(self, problem, error, n_threads, cache)
     !> Solver to be set up
     type(windowed_friction_t), intent(out) :: self
     !> The problem
@@ -45,10 +48,13 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
+    !> Spectra that are kept; it has to outlive the solver
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     self%problem = problem
     if (present(n_threads)) self%n_threads = n_threads
-    call new_frictional_contact(self%whole, problem, error, n_threads)
+    if (present(cache)) self%cache => cache
+    call new_frictional_contact(self%whole, problem, error, n_threads, self%cache)
   end subroutine new_windowed_friction
 
   !> Bytes that a problem takes, for a window of the given size.
@@ -122,7 +128,7 @@ contains
       problem%y = self%problem%y(c(1):c(2), r(1):r(2))
     end associate
     allocate (self%part)
-    call new_frictional_contact(self%part, problem, error, self%n_threads)
+    call new_frictional_contact(self%part, problem, error, self%n_threads, self%cache)
   end subroutine take_part
 
   !> A step on the part; not converged: it has to be solved on the window.

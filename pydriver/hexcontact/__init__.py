@@ -15,7 +15,15 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-from .errors import AccuracyWarning, ConvergenceError, DeckError, HexcontactError, ResourceError, StopRun
+from .errors import (
+    AccuracyWarning,
+    ConvergenceError,
+    DeckError,
+    HexcontactError,
+    KernelFolderWarning,
+    ResourceError,
+    StopRun,
+)
 
 # Threads that wait for each other keep their cores busy, by default for so long that two runs on the same
 # cores take most of each other's time. OpenMP reads this when the compiled core is loaded.
@@ -23,7 +31,7 @@ if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 if TYPE_CHECKING:
-    from . import analytic, influence, plotting, surfaces
+    from . import analytic, influence, kernel_cache, plotting, surfaces
     from .case import Case
     from .lattice import Lattice
     from .native import ElasticPair, FlexibilityOperator, NormalContact
@@ -53,7 +61,7 @@ _HOME = {
     "resume": "restart",
     "run_study": "study",
 }
-_MODULES = ("analytic", "influence", "plotting", "surfaces")
+_MODULES = ("analytic", "influence", "kernel_cache", "plotting", "surfaces")
 
 __all__ = [
     "AccuracyWarning",
@@ -65,6 +73,7 @@ __all__ = [
     "FlexibilityOperator",
     "FrictionalContact",
     "HexcontactError",
+    "KernelFolderWarning",
     "Lattice",
     "NormalContact",
     "ResourceError",
@@ -75,6 +84,7 @@ __all__ = [
     "Study",
     "analytic",
     "influence",
+    "kernel_cache",
     "open_result",
     "plotting",
     "resume",

@@ -54,6 +54,10 @@ class DeckError(HexcontactError, ValueError):
         self.faults = tuple(faults)
 
 
+class KernelFolderWarning(UserWarning):
+    """Spectra of kernels cannot be kept in a folder, or taken from it; nothing else comes of it."""
+
+
 class AccuracyWarning(UserWarning):
     """The lattice could not be refined to the accuracy asked for; the finest result is kept."""
 

@@ -42,7 +42,12 @@ def require(needed: int, what: str, advice: str) -> None:
     ResourceError
         If less than that is available.
     """
+    from . import kernel_cache
+
     there = available()
+    kernel_cache.leave(there - needed)  # what is kept for other cases must not be in the way of this one
+    if needed > there:
+        there = available()
     if needed > there:
         raise ResourceError(
             f"{what} needs {needed / GB:.3g} GB of memory and {there / GB:.3g} GB are available; {advice}"

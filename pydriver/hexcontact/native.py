@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
+from . import _core, kernel_cache
 from .arguments import number, reals
 from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
 from .lattice import Lattice
@@ -163,11 +163,13 @@ class FlexibilityOperator:
     def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
         self.lattice = lattice
         extent = [lattice.n_col, lattice.n_row]
+        kernel_cache.ready()
         self._handle, code, message = _api.create_operator(
             method_code(method), lattice.basis.T, extent, pair.as_array(), threads
         )
         raise_for(code, message)
         weakref.finalize(self, _api.free_handle, self._handle)
+        kernel_cache.told()
 
     def apply(
         self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
@@ -266,6 +268,7 @@ class NormalContact:
         gap = np.where(mask, given, 0.0)
         self._mask = mask
         self._outside = given[~mask]
+        kernel_cache.ready()
         self._handle, code, message = _api.create_normal_contact(
             method_code(method),
             lattice.basis.T,
@@ -278,6 +281,7 @@ class NormalContact:
         )
         raise_for(code, message)
         weakref.finalize(self, _api.free_handle, self._handle)
+        kernel_cache.told()
 
     def solve(
         self,
@@ -321,6 +325,7 @@ class NormalContact:
             self._handle, 1 if approach is None else 2, target, tolerance, max_sweeps, self.lattice.size
         )
         pressure, gap, zone, load, delta, residuals, sweeps, work, converged, code, message = out
+        kernel_cache.told()
         raise_for(code, message)
         shape = self.lattice.shape
         gap = gap.reshape(shape)

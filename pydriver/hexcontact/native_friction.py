@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
+from . import _core, kernel_cache
 from .arguments import number, reals
 from .errors import DeckError
 from .lattice import Lattice
@@ -174,6 +174,7 @@ class FrictionalContact:
         # nodes that can never touch may have any gap, also none at all
         self._mask = mask
         self._gap = shaped(initial_gap, lattice, "initial_gap")
+        kernel_cache.ready()
         self._handle, code, message = _api.create_frictional_contact(
             method_code(method),
             lattice.basis.T,
@@ -189,6 +190,7 @@ class FrictionalContact:
         )
         raise_for(code, message)
         weakref.finalize(self, _api_free, self._handle)
+        kernel_cache.told()
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
@@ -270,6 +272,7 @@ class FrictionalContact:
             numbers,
         )
         new_fields, zone, new_numbers, residuals, sweeps, cuts, work, flags, code, message = out
+        kernel_cache.told()
         raise_for(code, message)
         shape = self.lattice.shape
         arrays: dict[str, Any] = {

@@ -45,6 +45,7 @@ def main() -> int:
         "counts": partial(counts.measure, quick=quick, long=options.long, sizes=options.meshes),
         "operator": partial(speed.operator, program, quick=quick, sizes=sizes),
         "solves": partial(speed.solves, program, quick=quick, sizes=sizes),
+        "setups": partial(speed.setups, quick=quick, sizes=sizes),
         "peers": partial(peers.measure, options.peers, quick=quick, sizes=sizes, names=options.codes),
         "command": partial(speed.command, quick=quick),
         "direct": partial(speed.direct, quick=quick),
@@ -86,7 +87,7 @@ def parse() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--only", type=words, help="sections: counts,operator,solves,peers,command,direct,profile"
+        "--only", type=words, help="sections: counts,operator,solves,setups,peers,command,direct,profile"
     )
     parser.add_argument("--sizes", type=numbers, help="nodes on a side of the windows that are timed")
     parser.add_argument("--meshes", type=numbers, help="spacings in the contact radius for the counts")

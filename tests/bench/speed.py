@@ -134,6 +134,53 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
     return [ratio, threads, memory] if parallel else [ratio, memory]
 
 
+def setups(*, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
+    """Return the times of a set-up: from nothing, with plans, with spectra from memory and from a folder."""
+    table = Table(
+        "Set-up, one thread: milliseconds",
+        [
+            "problem and window",
+            "first in a process",
+            "again, spectra made anew",
+            "again, spectra in memory",
+            "first, spectra written",
+            "first, spectra from a folder",
+            "MB of spectra",
+        ],
+    )
+    for side in sizes or (SIZES[:2] if quick else SIZES):
+        for name in ("HERTZ", "N19") if side <= LARGEST_WITH_FRICTION else ("HERTZ",):
+            with tempfile.TemporaryDirectory() as folder:
+                task = {"problem": "setups", "name": name, "side": side, "repeats": 3}
+                ways = (
+                    {"memory": "0", "folder": ""},
+                    {"memory": "4 GB", "folder": ""},
+                    {"memory": "4 GB", "folder": folder},  # written in the first turn, read in the others
+                )
+                turns = [[worker.run(task | way) for way in ways] for _ in range(2 if quick else 4)]
+                size = sum(path.stat().st_size for path in Path(folder).iterdir())
+            failed = next((answer["failed"] for turn in turns for answer in turn if "failed" in answer), None)
+            label = f"{PROBLEMS[name]}, {side}²" if name == "HERTZ" else f"with friction, {side}²"
+            if failed:
+                table.add(label, failed)
+                continue
+            made, kept = (worker.best([turn[k] for turn in turns], "first", "again") for k in (0, 1))
+            times = (
+                min(made["first"], kept["first"]),
+                made["again"],
+                kept["again"],
+                turns[0][2]["first"],
+                min(turn[2]["first"] for turn in turns[1:]),
+            )
+            table.add(label, *(f"{1e3 * t:.1f}" for t in times), f"{size / 1e6:.1f}")
+            print(f"  {table.rows[-1]}", flush=True)
+    table.remarks.append(
+        "The folder is on a local disk, and its files are in the memory of the operating system. "
+        "The first in a process lets FFTW plan. With friction: N19, beta and gamma of unlike materials."
+    )
+    return [table]
+
+
 def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the best of several runs on one thread and, in turns, on two threads."""
     repeats = 3 if side <= 512 else 1

@@ -1,43 +1,64 @@
 !> Spectra of kernels in files: one a file, complete or not there at all.
 !>
 !> A file is written under another name and renamed; its head says what it holds and who made it, and has a
-!> checksum of the values. What is not as expected is not taken.
+!> checksum of the values. What is not as expected is not taken. Files are written by C, since Fortran's run-time
+!> library does not tell of a full disk.
 module hc_kernel_file
-  use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char, c_ptr, c_null_ptr, c_loc, c_f_pointer
+  use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char, c_size_t, c_ptr, c_null_ptr, c_loc, &
+                                         c_associated, c_f_pointer
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
   use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, kind_name
   implicit none
   private
 
-  public :: read_kernels, write_kernels, file_name, maker_length
+  public :: read_kernels, write_kernels, file_name
 
+  !> The first word of a file, and its layout: to be raised whenever that, or the order of the values, changes.
+  character(len=24), parameter :: magic = 'hexcontact kernels'
+  integer(int64), parameter :: layout = 1
   !> Length of the text that says who made a file.
   integer, parameter :: maker_length = 256
-  !> Length of a message of the system.
-  integer, parameter :: message_length = 200
-  !> Values that the checksum takes at a time.
+  !> Words of what is known of a head beforehand, and of all of it: bytes of a value, shape and checksum come after.
+  integer, parameter :: n_known = 13 + maker_length/8, n_head = n_known + 5
+  !> Words that the checksum takes at a time.
   integer, parameter :: lanes = 8
 
-  !> The beginning of a file.
-  type :: head_t
-    sequence
-    character(len=24) :: magic = 'hexcontact kernels'
-    !> Layout of file and spectra: to be raised whenever one of them changes
-    integer(int64) :: layout = 1
-    !> What the numbers depend on besides the key: program, machine
-    character(len=maker_length) :: maker = ''
-    integer(int64) :: key(9) = 0
-    !> Bytes of a value, and shape
-    integer(int64) :: value_bytes = 0, n(3) = 0
-    integer(int64) :: checksum = 0
-  end type head_t
-
+  ! of stdio.h
   interface
-    integer(c_int) function c_rename(from, onto) bind(c, name='rename')
+    type(c_ptr) function fopen(path, mode) bind(c, name='fopen')
+      import :: c_ptr, c_char
+      character(kind=c_char), intent(in) :: path(*), mode(*)
+    end function fopen
+
+    integer(c_size_t) function fread(items, bytes, n, stream) bind(c, name='fread')
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: items
+      integer(c_size_t), value :: bytes, n
+      type(c_ptr), value :: stream
+    end function fread
+
+    integer(c_size_t) function fwrite(items, bytes, n, stream) bind(c, name='fwrite')
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: items
+      integer(c_size_t), value :: bytes, n
+      type(c_ptr), value :: stream
+    end function fwrite
+
+    integer(c_int) function fclose(stream) bind(c, name='fclose')
+      import :: c_ptr, c_int
+      type(c_ptr), value :: stream
+    end function fclose
+
+    integer(c_int) function rename_file(from, onto) bind(c, name='rename')
       import :: c_int, c_char
       character(kind=c_char), intent(in) :: from(*), onto(*)
-    end function c_rename
+    end function rename_file
+
+    integer(c_int) function remove_file(path) bind(c, name='remove')
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: path(*)
+    end function remove_file
   end interface
 
 contains
@@ -50,14 +71,21 @@ contains
     character(len=*), intent(in) :: maker
     character(len=:), allocatable :: name
     character(len=64) :: text
-    integer(int64) :: word(9 + maker_length/8)
-
-    word(:9) = key%word
-    word(10:) = transfer(padded(maker), word, maker_length/8)
     write (text, '(a, "-", i0, "x", i0, "-", z16.16, ".kernels")') trim(kind_name(key%word(1))), key%word(2:3), &
-      mixed(word)
+      mixed(known_head(key, maker))
     name = trim(text)
   end function file_name
+
+  !> The part of a head that is known beforehand.
+  pure function known_head(key, maker) result(head)
+    type(kernel_key_t), intent(in) :: key
+    character(len=*), intent(in) :: maker
+    integer(int64) :: head(n_known)
+    character(len=maker_length) :: padded
+
+    padded = maker
+    head = [transfer(magic, head, 3), layout, transfer(padded, head, maker_length/8), key%word]
+  end function known_head
 
   !> Read spectra; without a complaint if there is no file.
   subroutine read_kernels(path, key, maker, spectrum, complaint)
@@ -72,64 +100,55 @@ contains
     !> Why a file that is there was not taken
     character(len=:), allocatable, intent(out) :: complaint
 
-    type(head_t) :: head, expected
-    integer(int64) :: file_bytes
-    integer :: unit, stat
-    logical :: there
-    character(len=200) :: message
+    integer(int64), target :: head(n_head)
+    type(c_ptr) :: stream
+    logical :: there, good
 
     spectrum => null()
-    inquire (file=path, exist=there)
-    if (.not. there) return
-    open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', iostat=stat, &
-          iomsg=message)
-    if (stat /= 0) then
-      complaint = path//' cannot be read ('//trim(message)//')'
+    stream = fopen(path//c_null_char, 'rb'//c_null_char)
+    if (.not. c_associated(stream)) then
+      inquire (file=path, exist=there)
+      if (there) complaint = path//' cannot be read'
       return
     end if
-    complaint = path//' is damaged, or was made by something else'
-    read (unit, iostat=stat) head
-    inquire (unit, size=file_bytes)
-    if (stat == 0) then
-      expected%maker = maker
-      if (head%magic == expected%magic .and. head%layout == expected%layout .and. head%maker == expected%maker &
-          .and. all(head%key == key%word) .and. all(head%n > 0) .and. all(head%n < huge(1)) .and. modulo(head%n(1), 4_int64) == 0 &
-          .and. (head%value_bytes == 8 .or. head%value_bytes == 4)) then
-        if (file_bytes == storage_size(head)/8 + head%value_bytes*product(head%n)) call take_values()
-      end if
-    end if
-    close (unit, iostat=stat)
-    if (stat /= 0) complaint = path//' cannot be closed'
-
-  contains
-
-    subroutine take_values()
-      real(wp), pointer, contiguous :: double(:, :, :)
-      real(sp), pointer, contiguous :: single(:, :, :)
-      integer(int64), pointer, contiguous :: words(:)
-      integer :: failed
-      logical :: complete
-
-      allocate (spectrum)
-      if (head%value_bytes == 8) then
-        call spectrum%reserve(int(head%n), double, failed)
-      else
-        call spectrum%reserve(int(head%n), single, failed)
-      end if
-      if (failed == 0) then
-        words => words_of(spectrum)
-        call read_words(unit, size(words, kind=int64), words, complete)
-        if (complete) complete = checksum(words) == head%checksum
-        if (complete) then
-          deallocate (complaint)
-          return
-        end if
-      end if
-      deallocate (spectrum)
-      spectrum => null()
-    end subroutine take_values
-
+    good = fread(c_loc(head), 8_c_size_t, int(n_head, c_size_t), stream) == n_head
+    if (good) good = all(head(:n_known) == known_head(key, maker))
+    if (good) call read_values(stream, head(n_known + 1), head(n_known + 2:n_known + 4), head(n_head), spectrum)
+    if (.not. associated(spectrum)) complaint = path//' is damaged, or was made by something else'
+    if (fclose(stream) /= 0) complaint = path//' cannot be closed'
   end subroutine read_kernels
+
+  !> Read the values of spectra, up to the end of the file; not associated if they are not as they should be.
+  subroutine read_values(stream, value_bytes, n, sum, spectrum)
+    type(c_ptr), intent(in) :: stream
+    !> Bytes of a value, shape, checksum
+    integer(int64), intent(in) :: value_bytes, n(3), sum
+    type(kernel_spectrum_t), pointer, intent(out) :: spectrum
+
+    real(wp), pointer, contiguous :: double(:, :, :)
+    real(sp), pointer, contiguous :: single(:, :, :)
+    integer(int64), pointer, contiguous :: words(:)
+    integer(int64), target :: beyond
+    integer :: stat
+    logical :: good
+
+    spectrum => null()
+    if (any(n < 1) .or. any(n > 2_int64**20) .or. modulo(n(1), 4_int64) /= 0) return
+    allocate (spectrum)
+    stat = 1
+    if (value_bytes == 8) call spectrum%reserve(int(n), double, stat)
+    if (value_bytes == 4) call spectrum%reserve(int(n), single, stat)
+    good = stat == 0
+    if (good) then
+      words => words_of(spectrum)
+      good = fread(c_loc(words), 8_c_size_t, size(words, kind=c_size_t), stream) == size(words, kind=c_size_t)
+    end if
+    if (good) good = fread(c_loc(beyond), 1_c_size_t, 1_c_size_t, stream) == 0
+    if (good) good = checksum(words) == sum
+    if (good) return
+    deallocate (spectrum)
+    spectrum => null()
+  end subroutine read_values
 
   !> Write spectra.
   subroutine write_kernels(path, key, maker, spectrum, word, bytes, complaint)
@@ -145,75 +164,40 @@ contains
     character(len=*), intent(in) :: word
     !> Bytes that were written
     integer(int64), intent(out) :: bytes
-    !> Why that failed
+    !> That it failed
     character(len=:), allocatable, intent(out) :: complaint
 
-    type(head_t) :: head
+    integer(int64), target :: head(n_head)
     integer(int64), pointer, contiguous :: words(:)
-    integer :: unit, stat, left
     character(len=:), allocatable :: while_written
-    character(len=message_length) :: message
+    type(c_ptr) :: stream
+    logical :: good
 
-    head%maker = maker
-    head%key = key%word
     words => words_of(spectrum)
-    head%checksum = checksum(words)
-    bytes = 0
-    while_written = path//'.'//word//'.part'
-    open (newunit=unit, file=while_written, access='stream', form='unformatted', status='new', action='write', &
-          iostat=stat, iomsg=message)
-    if (stat == 0) then
-      if (allocated(spectrum%double)) then
-        head%value_bytes = 8
-        head%n = shape(spectrum%double)
-      else
-        head%value_bytes = 4
-        head%n = shape(spectrum%single)
-      end if
-      write (unit, iostat=stat, iomsg=message) head
-      if (stat == 0) call write_words(unit, size(words, kind=int64), words, stat, message)
-      if (stat == 0) flush (unit, iostat=stat, iomsg=message)
-      if (stat /= 0) then
-        close (unit, status='delete', iostat=left)
-        if (left /= 0) message = trim(message)//'; a part of it is left'
-      else
-        close (unit, iostat=stat, iomsg=message)
-        if (stat == 0) then
-          stat = c_rename(while_written//c_null_char, path//c_null_char)
-          message = 'it cannot be given its name'
-        end if
-      end if
-    end if
-    if (stat /= 0) then
-      complaint = path//' cannot be written ('//trim(message)//')'
+    head(:n_known) = known_head(key, maker)
+    if (allocated(spectrum%double)) then
+      head(n_known + 1:) = [8_int64, shape(spectrum%double, kind=int64), checksum(words)]
     else
-      bytes = spectrum%bytes() + storage_size(head)/8
+      head(n_known + 1:) = [4_int64, shape(spectrum%single, kind=int64), checksum(words)]
+    end if
+    bytes = 0
+    while_written = path//'.'//word//'.part'//c_null_char
+    ! x: not if it is there
+    stream = fopen(while_written, 'wbx'//c_null_char)
+    good = c_associated(stream)
+    if (good) then
+      good = fwrite(c_loc(head), 8_c_size_t, int(n_head, c_size_t), stream) == n_head
+      if (good) good = fwrite(c_loc(words), 8_c_size_t, size(words, kind=c_size_t), stream) == size(words, kind=c_size_t)
+      if (fclose(stream) /= 0) good = .false.
+      if (good) good = rename_file(while_written, path//c_null_char) == 0
+      if (good) bytes = 8*(n_head + size(words, kind=int64))
+    end if
+    if (good) return
+    complaint = path//' cannot be written'
+    if (c_associated(stream)) then
+      if (remove_file(while_written) /= 0) complaint = complaint//', and a part of it is left'
     end if
   end subroutine write_kernels
-
-  !> As vectors, which gfortran reads in one piece.
-  subroutine read_words(unit, n, words, complete)
-    integer, intent(in) :: unit
-    integer(int64), intent(in) :: n
-    integer(int64), intent(out) :: words(n)
-    logical, intent(out) :: complete
-    integer :: stat
-
-    read (unit, iostat=stat) words
-    complete = stat == 0
-  end subroutine read_words
-
-  !> As vectors, which gfortran writes in one piece.
-  subroutine write_words(unit, n, words, stat, message)
-    integer, intent(in) :: unit
-    integer(int64), intent(in) :: n
-    integer(int64), intent(in) :: words(n)
-    integer, intent(out) :: stat
-    character(len=message_length), intent(inout) :: message
-
-    write (unit, iostat=stat, iomsg=message) words
-    if (stat == 0) message = ''
-  end subroutine write_words
 
   !> The values of spectra as whole words: their number is a multiple of four.
   function words_of(spectrum) result(words)
@@ -252,12 +236,5 @@ contains
       mixed = ieor(mixed, shiftl(mixed, 17))
     end do
   end function mixed
-
-  !> A text of fixed length.
-  pure function padded(text)
-    character(len=*), intent(in) :: text
-    character(len=maker_length) :: padded
-    padded = text
-  end function padded
 
 end module hc_kernel_file

@@ -17,6 +17,7 @@ module hexcontact
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_contact_state, only: contact_state_t, new_friction_state, separated, stick, slip, &
                               load_target_t, force_control, displacement_control, about_z, n_motion

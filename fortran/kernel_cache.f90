@@ -48,6 +48,7 @@ module hc_kernel_cache
     procedure :: keep
     !> What was wrong with the folder
     procedure :: take_complaint
+    final :: free
   end type kernel_cache_t
 
 contains
@@ -165,6 +166,16 @@ contains
     end if
     !$omp end critical (hc_kernel_cache)
   end subroutine take_complaint
+
+  !> Spectra that a problem uses stay until it is gone.
+  subroutine free(self)
+    type(kernel_cache_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, n_entry
+      call release(self%entry(i)%spectrum)
+    end do
+  end subroutine free
 
   ! What follows is called by the one thread that has the cache.
 

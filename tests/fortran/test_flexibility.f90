@@ -1,6 +1,7 @@
 !> The flexibility operators: explicit matrix and convolution.
 module test_flexibility
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
@@ -8,6 +9,7 @@ module test_flexibility
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_kernel_cache, only: kernel_cache_t
   use hc_contact_residuals, only: normal_self_compliance
   use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   use hc_triangle_integrals, only: linear_load_displacement
@@ -47,6 +49,7 @@ contains
       new_test('components', test_components), &
       new_test('positive_definite', test_positive_definite), &
       new_test('threads', test_threads), &
+      new_test('shared_spectra', test_shared_spectra), &
       new_test('wrong_shapes', test_wrong_shapes), &
       new_test('self_compliance', test_self_compliance), &
       new_test('symbol', test_symbol), &
@@ -269,6 +272,59 @@ contains
     if (allocated(error)) return
     call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'three threads')
   end subroutine test_threads
+
+  !> Operators of one window share their spectra, on any spacing; with a cache they give the same bits as without.
+  subroutine test_shared_spectra(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(kernel_cache_t), pointer :: cache
+    type(lattice_t) :: lattice, finer, oblique
+    type(fft_flexibility_t) :: alone, shared(5)
+    real(wp) :: traction(23, 21, 3), u(23, 21, 3), v(23, 21, 3), basis(2, 2)
+    type(elastic_pair_t), parameter :: pair = elastic_pair_t(3.0_wp, 0.6_wp, 1.5_wp)
+
+    allocate (cache)
+    call cache%limit(10000000_int64)
+    basis = equilateral_basis(0.7_wp)
+    call new_lattice(lattice, basis, [0, 0], [23, 21], error)
+    if (allocated(error)) return
+    call new_lattice(finer, equilateral_basis(1.9e-6_wp), [-5, 3], [23, 21], error)
+    if (allocated(error)) return
+    basis(1, 2) = 1.01_wp*basis(1, 2)
+    call new_lattice(oblique, basis, [0, 0], [23, 21], error)
+    if (allocated(error)) return
+    call new_fft_flexibility(alone, lattice, pair, error)
+    if (allocated(error)) return
+    call new_fft_flexibility(shared(1), lattice, pair, error, cache=cache)
+    if (allocated(error)) return
+    call new_fft_flexibility(shared(2), lattice, pair, error, cache=cache)
+    if (allocated(error)) return
+    call new_fft_flexibility(shared(3), finer, pair, error, cache=cache)
+    if (allocated(error)) return
+    call check_true(error, cache%found == 2 .and. cache%missed == 1, 'once made, twice found')
+    if (allocated(error)) return
+    call check_true(error, associated(shared(1)%convolution%spectrum, shared(2)%convolution%spectrum) .and. &
+                    associated(shared(1)%convolution%spectrum, shared(3)%convolution%spectrum), 'in memory once')
+    if (allocated(error)) return
+    call new_fft_flexibility(shared(4), oblique, pair, error, cache=cache)
+    if (allocated(error)) return
+    call new_fft_flexibility(shared(5), lattice, pair, error, normal_only=.true., cache=cache)
+    if (allocated(error)) return
+    call check_true(error, cache%found == 2 .and. cache%missed == 3, 'another lattice, other components')
+    if (allocated(error)) return
+    ! what is in use stays when the cache goes
+    deallocate (cache)
+    call random_number(traction)
+    call alone%apply(all_components, traction, all_components, u, error)
+    if (allocated(error)) return
+    call shared(2)%apply(all_components, traction, all_components, v, error)
+    if (allocated(error)) return
+    call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'found and made')
+    if (allocated(error)) return
+    call shared(3)%apply(all_components, traction, all_components, v, error)
+    if (allocated(error)) return
+    v = v/1.9e-6_wp*0.7_wp
+    call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 1.0e-14_wp*maxval(abs(u)), 'another spacing')
+  end subroutine test_shared_spectra
 
   subroutine test_wrong_shapes(error)
     type(error_t), allocatable, intent(out) :: error

@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from . import __version__, cli_deck, cli_show, cli_solve, plot_choices
-from .cli_guard import Commands
+from .cli_guard import Commands, warn_plainly
 
 app = typer.Typer(
     name="hexcontact",
@@ -31,6 +31,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal without µ gets a question mark, not a traceback
+    warn_plainly()
     app()
 
 

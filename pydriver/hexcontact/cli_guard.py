@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 import os
 import sys
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
 
 import typer
 from typer.core import TyperGroup
 
-from .errors import DeckError, HexcontactError, ResourceError
+from .errors import DeckError, HexcontactError, KernelFolderWarning, ResourceError
 
 if TYPE_CHECKING:
     from .errors import Fault
@@ -91,6 +92,19 @@ def complain(message: str) -> None:
     """Print a message on standard error, each line marked as ours."""
     for line in message.splitlines() or [""]:
         print(f"hexcontact: {line}", file=sys.stderr)
+
+
+def warn_plainly() -> None:
+    """From now on print warnings that are meant for users like other messages."""
+    shown = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *more: Any, **options: Any) -> None:
+        if issubclass(category, KernelFolderWarning):
+            complain(f"warning: {message}")
+        else:
+            shown(message, category, *more, **options)
+
+    warnings.showwarning = show
 
 
 def _print_json(name: str, content: Mapping[str, Any]) -> None:

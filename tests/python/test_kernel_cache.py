@@ -1,5 +1,6 @@
 """Spectra of kernels that are kept: the same answers to the bit, never a wrong one, and nobody is stopped."""
 
+import contextlib
 import os
 import re
 import resource
@@ -266,16 +267,30 @@ def test_vanished_folder_is_told_of_once(tmp_path: Path) -> None:
     assert_array_equal(quietly(), before)
 
 
+@contextlib.contextmanager
+def disk_of(size: int) -> Iterator[None]:
+    """Let no file become larger."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_file_that_fails_at_its_last_byte_is_not_kept(tmp_path: Path) -> None:
+    kernel_cache.configure(memory=0, folder=tmp_path)
+    # so small that it is written when it is closed
+    with disk_of(1000), pytest.warns(KernelFolderWarning, match="cannot be written"):
+        FlexibilityOperator(window(2, 2), PAIR)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_full_disk_is_told_of_once_and_leaves_nothing_behind(tmp_path: Path) -> None:
     before = normal()
     kernel_cache.configure(memory=0, folder=tmp_path)
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, hard))
-    try:
-        with pytest.warns(KernelFolderWarning, match="cannot be written") as told:
-            answer = normal()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with disk_of(30_000), pytest.warns(KernelFolderWarning, match="cannot be written") as told:
+        answer = normal()
     assert len(told) == 1
     assert_array_equal(answer, before)
     assert all(path.suffix == ".kernels" and path.stat().st_size < 30_000 for path in tmp_path.iterdir())

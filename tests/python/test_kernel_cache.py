@@ -116,8 +116,12 @@ def test_spectra_serve_other_spacings_and_moduli_and_nothing_else() -> None:
 
     both = frictional()
     start = kernel_cache.statistics()
-    frictional(window(spacing=1.1 * SPACING))
+    coarser = frictional(window(spacing=1.1 * SPACING))
     assert since(start).made == 0
+    kernel_cache.configure(memory=0)
+    assert_array_equal(normal(window(spacing=3.7 * SPACING)), larger)
+    assert_array_equal(frictional(window(spacing=1.1 * SPACING)), coarser)
+    kernel_cache.configure(memory="256 MB")
     for pair in (
         ElasticPair(PAIR.lambda_1, PAIR.lambda_2 / 2, PAIR.lambda_5),
         ElasticPair(PAIR.lambda_1, PAIR.lambda_2, PAIR.lambda_5 / 2),

@@ -135,6 +135,13 @@ def test_spectra_serve_other_spacings_and_moduli_and_nothing_else() -> None:
         kernel_cache.configure(memory="256 MB")
 
 
+def test_rounding_of_the_spacing_is_no_other_lattice() -> None:
+    start = kernel_cache.statistics()
+    for spacing in np.geomspace(1e-9, 1.0, 50):
+        FlexibilityOperator(window(5, 6, spacing), PAIR)
+    assert since(start)[1:] == (49, 0, 1)
+
+
 def test_threads_share_spectra() -> None:
     without = [solve() for solve in SOLVERS.values()]
     kernel_cache.configure(memory="6 MB")  # so small that spectra come and go

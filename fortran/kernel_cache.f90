@@ -188,7 +188,7 @@ contains
     place_of = 0
     do i = 1, n_entry
       if (.not. associated(self%entry(i)%spectrum)) cycle
-      if (self%entry(i)%key == key) place_of = i
+      if (self%entry(i)%key%is_same(key)) place_of = i
     end do
   end function place_of
 

@@ -23,8 +23,7 @@ module hc_kernel_spectrum
     integer(int64) :: word(9) = 0
   contains
     !> The same kernels?
-    procedure, private :: is_same
-    generic :: operator(==) => is_same
+    procedure :: is_same
   end type kernel_key_t
 
   !> Spectra that are freed when nobody uses them any more; nothing changes them once they are shared.

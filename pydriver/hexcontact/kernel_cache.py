@@ -227,6 +227,7 @@ def _maker() -> str:
             r"^(?:model name|flags|Features)\s*:.*$", Path("/proc/cpuinfo").read_text(), re.M
         )
         parts += sorted(set(processor))
-        mapped = re.findall(r"/\S*/lib(?:m|fftw3f?|gfortran)\W\S*", Path("/proc/self/maps").read_text())
+        # of the system, by these names; those that packages bring along have others
+        mapped = re.findall(r"/\S*/lib(?:m|fftw3f?|gfortran)\.so\S*", Path("/proc/self/maps").read_text())
         parts += [f"{path} {Path(path).stat().st_size}" for path in sorted(set(mapped))]
     return f"hexcontact {__version__} {hashlib.sha256(os.fsencode('; '.join(parts))).hexdigest()}"

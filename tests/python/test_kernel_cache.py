@@ -356,6 +356,15 @@ print(t.quietly().tobytes().hex())
     assert {path.suffix for path in tmp_path.iterdir()} == {".kernels"}
 
 
+def test_packages_of_others_do_not_change_who_made_a_file() -> None:
+    code = "{}from hexcontact import kernel_cache; print(kernel_cache._maker())"
+    makers = {
+        subprocess.run([sys.executable, "-c", code.format(more)], capture_output=True, check=True).stdout
+        for more in ("", "import scipy.linalg, scipy.special, matplotlib.pyplot; ")
+    }
+    assert makers == {f"{kernel_cache._maker()}\n".encode()}
+
+
 # --- settings -----------------------------------------------------------------------------------------------
 
 

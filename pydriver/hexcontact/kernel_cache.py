@@ -77,6 +77,8 @@ def configure(
 ) -> None:
     """Say what this process keeps; what is not given stays as it is.
 
+    Processes that are started from here, as those of a study, go by the environment.
+
     Parameters
     ----------
     memory : number or str, optional
@@ -192,7 +194,7 @@ def _open_folder() -> None:
         except OSError as error:
             _settings.folder = folder = None
             _warn(f"no kernels are kept in {error.filename}: {error.strerror}")
-    _cache.use_kernel_folder(str(folder or ""), _maker(), uuid.uuid4().hex[:12], room)
+    _cache.use_kernel_folder(os.fsencode(folder or ""), _maker(), uuid.uuid4().hex[:12], room)
 
 
 def _pruned(folder: Path, bound: int) -> int:

@@ -5,12 +5,14 @@ module hc_contact_residuals
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control, normal, separated, slip
-  use hc_friction_law, only: coulomb_t, on_cone, magnitude
+  use hc_friction_law, only: coulomb_t
+  use hc_friction_rows, only: residual_row, unbounded
   implicit none
   private
 
   public :: normal_self_compliance, tangential_self_compliance
-  public :: normal_residual, tangential_residual, force_residual, conclude, least_traction
+  public :: normal_residual, tangential_residual, tangential_scale, largest_pressure, force_residual, conclude, &
+            least_traction
 
   !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
   real(wp), parameter :: least_traction = 1.0e-3_wp
@@ -52,25 +54,29 @@ contains
   !> Bounds tension, penetration and pressure across a gap at once. Without
   !> pressure anywhere the penetration is all there can be: it is 0 if the gap is nowhere
   !> negative, and else infinite.
-  pure real(wp) function normal_residual(pressure, gap, candidate, compliance)
+  real(wp) function normal_residual(pressure, gap, candidate, compliance, n_threads)
     !> Pressure [Pa] and gap [m]
     real(wp), intent(in) :: pressure(:, :), gap(:, :)
     !> Nodes that may come into contact
     logical, intent(in) :: candidate(:, :)
     !> Self-compliance d_n [m/Pa]
     real(wp), intent(in) :: compliance
+    !> Threads to use
+    integer, intent(in) :: n_threads
     real(wp) :: p_max, worst
     integer :: col, row
 
     p_max = 0.0_wp
     worst = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(n_threads) private(col) reduction(max: p_max, worst)
     do row = 1, size(pressure, 2)
+      !$omp simd reduction(max: p_max, worst)
       do col = 1, size(pressure, 1)
         p_max = max(p_max, pressure(col, row))
-        if (.not. candidate(col, row)) cycle
-        worst = max(worst, abs(pressure(col, row) - max(0.0_wp, pressure(col, row) - gap(col, row)/compliance)))
+        worst = max(worst, merge(abs(min(pressure(col, row), gap(col, row)/compliance)), 0.0_wp, candidate(col, row)))
       end do
     end do
+    !$omp end parallel do
     if (p_max > 0.0_wp) then
       normal_residual = worst/p_max
     else
@@ -83,36 +89,65 @@ contains
   !> Bounds tractions outside of the cone, slip in stick and a wrong direction
   !> of slip at once. The scale tau is mu p_max; the largest traction, but
   !> not less than a thousandth of p_max, without slip; without friction there is nothing to fulfil.
-  pure real(wp) function tangential_residual(traction, slip_increment, pressure, friction, compliance)
+  real(wp) function tangential_residual(traction, slip_increment, pressure, friction, compliance, n_threads)
     !> Traction (n_col, n_row, 2) [Pa] and slip of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: traction(:, :, :), slip_increment(:, :, :)
+    real(wp), intent(in), contiguous :: traction(:, :, :), slip_increment(:, :, :)
     !> Pressure (n_col, n_row) [Pa]
-    real(wp), intent(in) :: pressure(:, :)
+    real(wp), intent(in), contiguous :: pressure(:, :)
     !> Law of friction
     type(coulomb_t), intent(in) :: friction
     !> Self-compliance d_t [m/Pa]
     real(wp), intent(in) :: compliance
-    real(wp) :: scale, worst, q(2), p_max, q_max
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    real(wp) :: p_max, slope, largest, worst
+    integer :: row
+
+    tangential_residual = 0.0_wp
+    p_max = largest_pressure(pressure, n_threads)
+    if (.not. (p_max > 0.0_wp .and. friction%resists())) return
+    slope = friction%coefficient
+    if (friction%no_slip) slope = unbounded
+    largest = 0.0_wp
+    worst = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(n_threads) reduction(max: largest, worst)
+    do row = 1, size(pressure, 2)
+      call residual_row(size(pressure, 1), 1.0_wp/p_max, slope, 1.0_wp/compliance, pressure(:, row), traction(:, row, 1), &
+                        traction(:, row, 2), slip_increment(:, row, 1), slip_increment(:, row, 2), largest, worst)
+    end do
+    !$omp end parallel do
+    tangential_residual = sqrt(worst)/tangential_scale(friction, largest)
+  end function tangential_residual
+
+  !> The scale tau of R_t over p_max.
+  elemental real(wp) function tangential_scale(friction, largest)
+    !> Law of friction
+    class(coulomb_t), intent(in) :: friction
+    !> Square of the largest traction over p_max
+    real(wp), intent(in) :: largest
+
+    tangential_scale = friction%coefficient
+    if (friction%no_slip) tangential_scale = max(sqrt(largest), least_traction)
+  end function tangential_scale
+
+  !> p_max, 0 without pressure [Pa].
+  real(wp) function largest_pressure(pressure, n_threads)
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in), contiguous :: pressure(:, :)
+    !> Threads to use
+    integer, intent(in) :: n_threads
     integer :: col, row
 
-    p_max = 0.0_wp
-    q_max = 0.0_wp
-    worst = 0.0_wp
+    largest_pressure = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(n_threads) private(col) reduction(max: largest_pressure)
     do row = 1, size(pressure, 2)
+      !$omp simd reduction(max: largest_pressure)
       do col = 1, size(pressure, 1)
-        if (.not. pressure(col, row) > 0.0_wp) cycle
-        q = traction(col, row, :)
-        p_max = max(p_max, pressure(col, row))
-        q_max = max(q_max, magnitude(q))
-        q = q - on_cone(q - slip_increment(col, row, :)/compliance, friction%bound(pressure(col, row)))
-        worst = max(worst, magnitude(q))
+        largest_pressure = max(largest_pressure, pressure(col, row))
       end do
     end do
-    scale = friction%coefficient*p_max
-    if (friction%no_slip) scale = max(q_max, least_traction*p_max)
-    tangential_residual = 0.0_wp
-    if (scale > 0.0_wp) tangential_residual = worst/scale
-  end function tangential_residual
+    !$omp end parallel do
+  end function largest_pressure
 
   !> R_P = |sum A_p p - P|/P.
   elemental real(wp) function force_residual(carried, load)
@@ -127,7 +162,7 @@ contains
   end function force_residual
 
   !> Zones, load and residuals of a state whose pressure and gap are known.
-  pure subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance)
+  subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance, n_threads)
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
     !> Lattice and window
@@ -142,10 +177,19 @@ contains
     real(wp), intent(in) :: target
     !> Bound of the residuals
     real(wp), intent(in) :: tolerance
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    real(wp) :: row_sum(size(state%pressure, 2))
+    integer :: row
 
-    state%zone = merge(slip, separated, state%pressure > 0.0_wp)
-    state%load(normal) = lattice%cell_area()*sum(state%pressure)
-    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance)
+    !$omp parallel do schedule(static) num_threads(n_threads)
+    do row = 1, size(row_sum)
+      state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
+      row_sum(row) = sum(state%pressure(:, row))
+    end do
+    !$omp end parallel do
+    state%load(normal) = lattice%cell_area()*sum(row_sum)
+    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, n_threads)
     state%residual_force = 0.0_wp
     if (control == force_control) state%residual_force = force_residual(state%load(normal), target)
     state%converged = max(state%residual_normal, state%residual_force) <= tolerance

@@ -7,7 +7,7 @@ module hc_contact_state
   implicit none
   private
 
-  public :: contact_state_t, new_contact_state, new_friction_state, check_problem
+  public :: contact_state_t, new_contact_state, new_friction_state, take_tractions, check_problem
   public :: separated, stick, slip
   public :: load_target_t, force_control, displacement_control
   public :: normal, along_x, along_y, about_z, n_motion
@@ -99,6 +99,28 @@ contains
     allocate (state%slip_increment, source=state%traction)
     allocate (state%accumulated_slip, source=state%pressure)
   end subroutine new_friction_state
+
+  !> Tractions and motions of a state, and nothing else: what an iteration starts from.
+  subroutine take_tractions(state, start, n_threads)
+    !> State they come from
+    type(contact_state_t), intent(in) :: state
+    !> State to be set up
+    type(contact_state_t), intent(out) :: start
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    integer :: row
+
+    allocate (start%pressure, mold=state%pressure)
+    allocate (start%traction, mold=state%traction)
+    !$omp parallel do schedule(static) num_threads(n_threads)
+    do row = 1, size(state%pressure, 2)
+      start%pressure(:, row) = state%pressure(:, row)
+      start%traction(:, row, :) = state%traction(:, row, :)
+    end do
+    !$omp end parallel do
+    start%motion = state%motion
+    start%load = state%load
+  end subroutine take_tractions
 
   !> Does a problem make sense?
   pure subroutine check_problem(lattice, initial_gap, candidate, error)

@@ -125,7 +125,7 @@ contains
     if (allocated(error)) return
     state%gap = reshape(gap, shape(state%gap))
     state%motion(normal) = delta
-    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance)
+    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance, 1)
     state%operator_applications = self%flexibility%applications
   end subroutine solve
 

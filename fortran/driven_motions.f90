@@ -23,7 +23,7 @@ module hc_driven_motions
     real(wp) :: arm = 1.0_wp
   contains
     !> Tangential displacement of a unit motion
-    procedure :: direction
+    procedure :: direction, direction_row
     !> Load of a motion over the cell area
     procedure :: load
     !> Multipliers of the constraints from the motions, and back
@@ -33,7 +33,7 @@ module hc_driven_motions
 contains
 
   !> The driven motions of a contact.
-  pure subroutine new_driven_motions(self, problem, target, contact)
+  subroutine new_driven_motions(self, problem, target, contact)
     !> Motions to be set up
     type(driven_motions_t), intent(out) :: self
     !> The problem
@@ -41,42 +41,70 @@ contains
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Nodes in contact (n_col, n_row)
-    logical, intent(in) :: contact(:, :)
-    integer :: n_contact
+    logical, intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
+    real(wp) :: part(2, problem%lattice%extent(2))
+    integer :: n_contact, row
 
-    n_contact = max(count(contact), 1)
+    n_contact = 0
+    !$omp parallel do schedule(static) num_threads(problem%n_threads) reduction(+: n_contact)
+    do row = 1, size(contact, 2)
+      n_contact = n_contact + count(contact(:, row))
+      part(1, row) = sum(problem%x(:, row), mask=contact(:, row))
+      part(2, row) = sum(problem%y(:, row), mask=contact(:, row))
+    end do
+    !$omp end parallel do
+    n_contact = max(n_contact, 1)
     associate (control => target%control)
       ! nothing turns a single node
       self%motion = pack([along_x, along_y, about_z], control(along_x:) == force_control .and. &
                          [.true., .true., n_contact > 1])
-      if (control(along_y) == force_control) self%center(1) = sum(problem%x, mask=contact)/n_contact
-      if (control(along_x) == force_control) self%center(2) = sum(problem%y, mask=contact)/n_contact
+      if (control(along_y) == force_control) self%center(1) = sum(part(1, :))/n_contact
+      if (control(along_x) == force_control) self%center(2) = sum(part(2, :))/n_contact
     end associate
     self%arm = sqrt(problem%lattice%cell_area()*n_contact/pi)
   end subroutine new_driven_motions
 
-  !> Tangential displacement of a unit motion, all x components first (2 n).
-  pure function direction(self, k, problem)
+  !> Tangential displacement of a unit motion (n_col, n_row, 2).
+  function direction(self, k, problem)
     class(driven_motions_t), intent(in) :: self
     !> Which of the driven motions
     integer, intent(in) :: k
     !> The problem
     type(friction_problem_t), intent(in) :: problem
-    real(wp), allocatable :: direction(:)
-    integer :: n
+    real(wp), allocatable :: direction(:, :, :)
+    integer :: row
 
-    n = problem%lattice%size()
-    allocate (direction(2*n), source=0.0_wp)
+    allocate (direction(problem%lattice%extent(1), problem%lattice%extent(2), 2))
+    !$omp parallel do schedule(static) num_threads(problem%n_threads)
+    do row = 1, size(direction, 2)
+      call self%direction_row(k, problem, row, direction(:, row, 1), direction(:, row, 2))
+    end do
+    !$omp end parallel do
+  end function direction
+
+  !> The same along one row of nodes.
+  pure subroutine direction_row(self, k, problem, row, ux, uy)
+    class(driven_motions_t), intent(in) :: self
+    !> Which of the driven motions
+    integer, intent(in) :: k
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    integer, intent(in) :: row
+    !> Components along x and y (n_col)
+    real(wp), intent(out), contiguous :: ux(:), uy(:)
+
+    ux = 0.0_wp
+    uy = 0.0_wp
     select case (self%motion(k))
     case (along_x)
-      direction(:n) = 1.0_wp
+      ux = 1.0_wp
     case (along_y)
-      direction(n + 1:) = 1.0_wp
+      uy = 1.0_wp
     case default
-      direction(:n) = -reshape(problem%y - self%center(2), [n])/self%arm
-      direction(n + 1:) = reshape(problem%x - self%center(1), [n])/self%arm
+      ux = -(problem%y(:, row) - self%center(2))/self%arm
+      uy = (problem%x(:, row) - self%center(1))/self%arm
     end select
-  end function direction
+  end subroutine direction_row
 
   !> Prescribed load of a motion over the cell area [Pa].
   pure real(wp) function load(self, k, problem, target)

@@ -68,18 +68,15 @@ contains
     !> those of the rings, `free` elsewhere and `outside` around
     integer, allocatable :: mark(:)
     integer, allocatable :: frontier(:), next(:), node(:)
-    integer :: n_ring, n_col, width, step(6), r, n, k
+    integer :: n_ring, n_col, width, step(6), n_active, r, n, k
 
-    call find_edge(active, frontier)
-    n_ring = 0
-    if (size(frontier) > 0) then
-      n_ring = min(most_rings, int(ring_factor*(real(count(active), wp)/size(frontier))**ring_power))
-    end if
     n_col = size(active, 1)
     width = n_col + 2
     step = neighbors(1, :) + width*neighbors(2, :)
-    call mark_window(active, mark)
-    frontier = frontier + width + 1 + 2*((frontier - 1)/n_col)
+    call mark_window(active, n_threads, mark, n_active)
+    call find_edge(mark, step, shape(active), n_threads, frontier)
+    n_ring = 0
+    if (size(frontier) > 0) n_ring = min(most_rings, int(ring_factor*(real(n_active, wp)/size(frontier))**ring_power))
     allocate (node(0), self%ring(1))
     self%ring(1) = 1
     do r = 1, n_ring
@@ -121,21 +118,29 @@ contains
   end subroutine new_edge_extension
 
   !> Marks of all nodes before there are rings.
-  pure subroutine mark_window(active, mark)
+  subroutine mark_window(active, n_threads, mark, n_active)
     logical, intent(in) :: active(:, :)
+    !> Threads to use
+    integer, intent(in) :: n_threads
     integer, allocatable, intent(out) :: mark(:)
+    !> Number of active nodes
+    integer, intent(out) :: n_active
     integer :: row, width, start
 
     width = size(active, 1) + 2
     allocate (mark(width*(size(active, 2) + 2)))
     mark(:width) = outside
     mark(size(mark) - width + 1:) = outside
+    n_active = 0
+    !$omp parallel do schedule(static) num_threads(n_threads) private(start) reduction(+: n_active)
     do row = 1, size(active, 2)
       start = row*width + 1
       mark(start) = outside
       mark(start + 1:start + width - 2) = merge(0, free, active(:, row))
       mark(start + width - 1) = outside
+      n_active = n_active + count(active(:, row))
     end do
+    !$omp end parallel do
   end subroutine mark_window
 
   !> Height of the continuation in a ring.
@@ -146,33 +151,45 @@ contains
   end function profile
 
   !> Active nodes with a neighbour that is not; a node at the rim of the window has none there.
-  pure subroutine find_edge(active, edge)
-    logical, intent(in) :: active(:, :)
-    !> The nodes
+  subroutine find_edge(mark, step, extent, n_threads, edge)
+    !> Marks of all nodes, and steps to the neighbours of a node
+    integer, intent(in) :: mark(:), step(6)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    !> The nodes, as places in the marks
     integer, allocatable, intent(out) :: edge(:)
-    integer, allocatable :: found(:)
-    logical :: inside(size(active, 1))
-    integer :: col, row, k, c, r, n, from, to
 
-    allocate (found(count(active)))
-    n = 0
-    do row = 1, size(active, 2)
-      inside = .true.
-      do k = 1, size(neighbors, 2)
-        c = neighbors(1, k)
-        r = row + neighbors(2, k)
-        if (r < 1 .or. r > size(active, 2)) cycle
-        from = max(1, 1 - c)
-        to = min(size(active, 1), size(active, 1) - c)
-        inside(from:to) = inside(from:to) .and. active(from + c:to + c, r)
+    type :: list_t
+      integer, allocatable :: node(:)
+    end type list_t
+    type(list_t) :: found(extent(2))
+    integer :: is_edge(extent(1)), first(extent(2) + 1), col, row, k, place
+
+    !$omp parallel do schedule(static) num_threads(n_threads) private(is_edge, col, k, place)
+    do row = 1, extent(2)
+      place = row*(extent(1) + 2) + 1
+      is_edge = 0
+      do k = 1, size(step)
+        do col = 1, extent(1)
+          is_edge(col) = merge(1, is_edge(col), mark(place + col + step(k)) == free)
+        end do
       end do
-      do col = 1, size(active, 1)
-        if (.not. active(col, row) .or. inside(col)) cycle
-        n = n + 1
-        found(n) = col + (row - 1)*size(active, 1)
+      do col = 1, extent(1)
+        is_edge(col) = merge(is_edge(col), 0, mark(place + col) == 0)
       end do
+      found(row)%node = pack([(place + col, col=1, extent(1))], is_edge == 1)
     end do
-    edge = found(:n)
+    !$omp end parallel do
+    first(1) = 1
+    do row = 1, extent(2)
+      first(row + 1) = first(row) + size(found(row)%node)
+    end do
+    allocate (edge(first(extent(2) + 1) - 1))
+    do row = 1, extent(2)
+      edge(first(row):first(row + 1) - 1) = found(row)%node
+    end do
   end subroutine find_edge
 
   !> Nodes next to a ring that have no ring yet.

@@ -9,16 +9,18 @@ module hc_friction_iterate
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, separated, stick, slip, &
     normal, along_x, along_y, about_z, n_motion, force_control
-  use hc_contact_residuals, only: normal_residual, tangential_residual, least_traction
-  use hc_friction_law, only: linearize, on_cone, normal_to
+  use hc_contact_residuals, only: normal_residual, tangential_scale
+  use hc_friction_law, only: linearize, normal_to
+  use hc_friction_rows, only: residual_row, cone_row, unbounded
   use hc_friction_problem, only: friction_problem_t, classification_scale
   use hc_spring_blend, only: soft
   use hc_driven_motions, only: driven_motions_t, new_driven_motions
   use hc_friction_systems, only: operators_t, pressure_system_t, shear_system_t, new_shear_system
+  use hc_vectors, only: fill, copy, add, maximum
   implicit none
   private
 
-  public :: iterate_t, gap_residual, cautious
+  public :: iterate_t, cautious
 
   !> The first guess of a shear traction from nothing: this much less of the slip counts.
   real(wp), parameter :: cautious = 0.2_wp
@@ -73,18 +75,20 @@ module hc_friction_iterate
     procedure :: begin
     !> Displacements of the present tractions, from scratch
     procedure :: refresh
+    !> Gap of the present tractions and approach, and its residual
+    procedure :: find_gap, gap_residual
     !> Contact area that the present tractions call for
-    procedure :: contact_area
+    procedure :: find_contact
     !> Stick, slip and frames that the present tractions call for
     procedure :: classify
     !> Prescribed tangential loads as constraints
     procedure :: constraints
-    !> Displacement of the motions that are prescribed
-    procedure :: prescribed_displacement
-    !> Relative displacement since the beginning of the step
-    procedure :: slip_increment
+    !> Displacements that sticking nodes should have
+    procedure :: wanted_displacement
+    !> Relative displacement since the beginning of the step, along one row
+    procedure :: slip_row
     !> Shear traction cut to the cone
-    procedure :: on_cone => traction_on_cone
+    procedure :: cut_to_cone
     !> Largest shear traction that there can be
     procedure :: traction_scale
     !> Residuals of the present tractions
@@ -113,7 +117,8 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(driven_motions_t) :: driven
-    integer :: n
+    real(wp) :: highest
+    integer :: n, row, from, to
 
     n = problem%lattice%size()
     self%problem => problem
@@ -123,24 +128,31 @@ contains
     self%pressure%operators => operators
     self%pressure%n_threads = operators%n_threads
     call new_shear_system(self%shear, operators)
-    self%h = reshape(problem%initial_gap, [n])
-    self%origin = reshape(reference, [2*n])
-    self%candidate = reshape(problem%candidate, [n])
     self%dragging = abs(problem%pair%lambda_2) > 0.0_wp
     self%pressing = self%dragging .and. problem%friction%resists() .and. .not. problem%goodman
-    if (target%control(normal) /= force_control .and. .not. self%pressing) then
-      ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-      self%candidate = self%candidate .and. self%h < target%value(normal)
-    end if
-
-    self%p = reshape(start%pressure, [n])
-    self%q = reshape(start%traction, [2*n])
-    allocate (self%w(n), self%closing(n), self%u(2*n), source=0.0_wp)
-    self%contact = self%p > 0.0_wp .and. self%candidate
+    highest = huge(1.0_wp)
+    ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
+    if (target%control(normal) /= force_control .and. .not. self%pressing) highest = target%value(normal)
+    allocate (self%h(n), self%origin(2*n), self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
+    allocate (self%candidate(n), self%contact(n))
+    !$omp parallel do schedule(static) num_threads(operators%n_threads) private(from, to)
+    do row = 1, problem%lattice%extent(2)
+      to = row*problem%lattice%extent(1)
+      from = to - problem%lattice%extent(1) + 1
+      self%h(from:to) = problem%initial_gap(:, row)
+      self%origin(from:to) = reference(:, row, 1)
+      self%origin(n + from:n + to) = reference(:, row, 2)
+      self%p(from:to) = start%pressure(:, row)
+      self%q(from:to) = start%traction(:, row, 1)
+      self%q(n + from:n + to) = start%traction(:, row, 2)
+      self%candidate(from:to) = problem%candidate(:, row) .and. self%h(from:to) < highest
+      self%contact(from:to) = self%p(from:to) > 0.0_wp .and. self%candidate(from:to)
+    end do
+    !$omp end parallel do
     self%motion = merge(start%motion, target%value, target%control == force_control)
     if (any(self%contact)) then
       ! a twist turns about the middle of the contact, as far as the shifts are free
-      call new_driven_motions(driven, problem, target, reshape(self%contact, problem%lattice%extent))
+      call new_driven_motions(driven, problem, target, self%contact)
       associate (turned => self%motion(about_z) - start%motion(about_z))
         if (any(driven%motion == along_x)) self%motion(along_x) = self%motion(along_x) + turned*driven%center(2)
         if (any(driven%motion == along_y)) self%motion(along_y) = self%motion(along_y) - turned*driven%center(1)
@@ -162,29 +174,32 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: moved(:)
-    integer :: n
+    integer :: n, n_threads
 
     n = size(self%p)
+    n_threads = self%operators%n_threads
     allocate (moved(3*n))
-    self%u = 0.0_wp
     if (self%dragging .and. .not. (self%cold .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
-      self%u = moved(n + 1:)
+      if (allocated(error)) return
+      call copy(moved(:n), self%w, n_threads)
+      call copy(moved(n + 1:), self%u, n_threads)
     else
-      call self%operators%apply([normal], self%p, [normal], moved(:n), error)
+      call self%operators%apply([normal], self%p, [normal], self%w, error)
+      if (allocated(error)) return
+      call fill(self%u, 0.0_wp, n_threads)
     end if
-    if (allocated(error)) return
-    self%w = moved(:n)
-    self%closing = 0.0_wp
+    call fill(self%closing, 0.0_wp, n_threads)
     if (all_zero(self%q)) return
     if (self%pressing) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
-      self%closing = moved(:n)
+      if (allocated(error)) return
+      call copy(moved(:n), self%closing, n_threads)
     else
       call self%operators%apply([along_x, along_y], self%q, [along_x, along_y], moved(n + 1:), error)
+      if (allocated(error)) return
     end if
-    if (allocated(error)) return
-    self%u = self%u + moved(n + 1:)
+    call add(moved(n + 1:), self%u, n_threads)
   end subroutine refresh
 
   pure logical function all_zero(values)
@@ -192,20 +207,44 @@ contains
     all_zero = .not. any(abs(values) > 0.0_wp)
   end function all_zero
 
+  !> Gap of the present tractions and approach.
+  subroutine find_gap(self, gap)
+    class(iterate_t), intent(in) :: self
+    !> The gap (n) [m]
+    real(wp), allocatable, intent(out) :: gap(:)
+    integer :: i
+
+    allocate (gap(size(self%p)))
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads)
+    do i = 1, size(gap)
+      gap(i) = self%h(i) + self%closing(i) + self%w(i) - self%motion(normal)
+    end do
+    !$omp end parallel do
+  end subroutine find_gap
+
   !> Nodes with p - r g > 0: one step of a projected gradient map, which contracts
   !> because r is scaled with the size of the contact.
-  pure function contact_area(self, gap) result(contact)
+  subroutine find_contact(self, gap, contact)
     class(iterate_t), intent(in) :: self
     !> Gap of the present tractions [m]
-    real(wp), intent(in) :: gap(:)
-    logical, allocatable :: contact(:)
+    real(wp), intent(in), contiguous :: gap(:)
+    !> The nodes (n)
+    logical, allocatable, intent(out) :: contact(:)
     real(wp) :: r
+    integer :: i, n_contact
 
     r = classification_scale/(2.0_wp*pi*self%problem%pair%lambda_1 &
                               *sqrt(self%problem%lattice%cell_area()*max(count(self%contact), 1)/pi))
-    contact = self%candidate .and. self%p - r*gap > 0.0_wp
-    if (.not. any(contact)) contact = self%candidate .and. gap <= minval(gap, mask=self%candidate)
-  end function contact_area
+    allocate (contact(size(gap)))
+    n_contact = 0
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) reduction(+: n_contact)
+    do i = 1, size(gap)
+      contact(i) = self%candidate(i) .and. self%p(i) - r*gap(i) > 0.0_wp
+      n_contact = n_contact + merge(1, 0, contact(i))
+    end do
+    !$omp end parallel do
+    if (n_contact == 0) contact = self%candidate .and. gap <= minval(gap, mask=self%candidate)
+  end subroutine find_contact
 
   !> Stick, slip and frames that the present tractions call for.
   !>
@@ -217,32 +256,36 @@ contains
     logical, intent(in) :: holding
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
     logical, allocatable, intent(out) :: active(:)
-    real(wp), allocatable :: ds(:)
     integer, allocatable :: zone(:)
-    real(wp) :: r, bound, largest, across, e(2)
-    integer :: n, i
+    real(wp) :: ds(self%problem%lattice%extent(1), 2), r, bound, largest, across, e(2)
+    integer :: n, n_stick, row, col, i
 
     n = size(self%p)
-    allocate (ds, source=self%slip_increment())
-    allocate (zone(n), source=separated)
-    allocate (active(2*n), source=.false.)
+    allocate (zone(n), active(2*n))
     r = self%caution*self%problem%classification_parameter(count(self%contact))
     if (self%first .and. all_zero(self%q)) r = cautious*r
     associate (friction => self%problem%friction)
-      largest = friction%bound(maxval(self%p))
-      !$omp parallel do schedule(static) num_threads(self%operators%n_threads)
-      do i = 1, n
-        if (self%contact(i)) then
-          call linearize([self%q(i), self%q(n + i)], [ds(i), ds(n + i)], friction%bound(self%p(i)), largest, r, zone(i), &
-                         self%shear%direction(:, i), self%shear%compliance(i))
-        else
-          self%q([i, n + i]) = 0.0_wp
-          self%shear%direction(:, i) = [1.0_wp, 0.0_wp]
-          self%shear%compliance(i) = 0.0_wp
-        end if
+      largest = friction%bound(maximum(self%p, self%operators%n_threads))
+      n_stick = 0
+      !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(ds, col, i) reduction(+: n_stick)
+      do row = 1, self%problem%lattice%extent(2)
+        call self%slip_row(row, ds(:, 1), ds(:, 2))
+        do col = 1, size(ds, 1)
+          i = (row - 1)*size(ds, 1) + col
+          if (self%contact(i)) then
+            call linearize([self%q(i), self%q(n + i)], ds(col, :), friction%bound(self%p(i)), largest, r, zone(i), &
+                           self%shear%direction(:, i), self%shear%compliance(i))
+            if (zone(i) == stick) n_stick = n_stick + 1
+          else
+            zone(i) = separated
+            self%q([i, n + i]) = 0.0_wp
+            self%shear%direction(:, i) = [1.0_wp, 0.0_wp]
+            self%shear%compliance(i) = 0.0_wp
+          end if
+        end do
       end do
       !$omp end parallel do
-      self%held = holding .and. .not. any(zone == stick)
+      self%held = holding .and. n_stick == 0
       if (self%held) call hold(self%shear%compliance, zone)
 
       !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(bound, across, e)
@@ -302,134 +345,183 @@ contains
     real(wp), allocatable, intent(out) :: constraint(:, :)
     !> What the present traction lacks of the loads, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
-    real(wp) :: plane(size(self%q))
-    integer :: k
+    real(wp) :: part(self%problem%lattice%extent(2)), unit(self%problem%lattice%extent(1), 2), t, e
+    integer :: n, k, row, col, i
 
-    call new_driven_motions(driven, self%problem, self%target, reshape(self%contact, self%problem%lattice%extent))
-    allocate (constraint(size(self%q), size(driven%motion)), missing(size(driven%motion)))
+    n = size(self%p)
+    call new_driven_motions(driven, self%problem, self%target, self%contact)
+    allocate (constraint(2*n, size(driven%motion)), missing(size(driven%motion)))
     do k = 1, size(driven%motion)
-      plane = driven%direction(k, self%problem)
-      missing(k) = driven%load(k, self%problem, self%target) - dot_product(plane, self%q)
-      call self%shear%to_frame(plane, constraint(:, k))
-      where (.not. active) constraint(:, k) = 0.0_wp
+      !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(unit, t, e, col, i)
+      do row = 1, size(part)
+        call driven%direction_row(k, self%problem, row, unit(:, 1), unit(:, 2))
+        part(row) = 0.0_wp
+        do col = 1, size(unit, 1)
+          i = (row - 1)*size(unit, 1) + col
+          part(row) = part(row) + unit(col, 1)*self%q(i) + unit(col, 2)*self%q(n + i)
+          t = -self%shear%direction(2, i)*unit(col, 1) + self%shear%direction(1, i)*unit(col, 2)
+          e = self%shear%direction(1, i)*unit(col, 1) + self%shear%direction(2, i)*unit(col, 2)
+          constraint(i, k) = merge(t, 0.0_wp, active(i))
+          constraint(n + i, k) = merge(e, 0.0_wp, active(n + i))
+        end do
+      end do
+      !$omp end parallel do
+      missing(k) = driven%load(k, self%problem, self%target) - sum(part)
     end do
   end subroutine constraints
 
-  !> Displacement of the motions that are prescribed, x components first.
-  pure function prescribed_displacement(self) result(displacement)
+  !> Displacements that sticking nodes should have as far as it is known: where they stood, and the motions that
+  !> are prescribed.
+  subroutine wanted_displacement(self, frame)
     class(iterate_t), intent(in) :: self
-    real(wp), allocatable :: displacement(:)
-
-    displacement = rigid(self%problem, merge(self%motion, 0.0_wp, self%target%control /= force_control))
-  end function prescribed_displacement
-
-  !> shift + twist x r at every node, x components first.
-  pure function rigid(problem, motion)
-    type(friction_problem_t), intent(in) :: problem
-    real(wp), intent(in) :: motion(n_motion)
-    real(wp), allocatable :: rigid(:)
-
-    rigid = reshape(problem%rigid_displacement(motion), [2*problem%lattice%size()])
-  end function rigid
-
-  !> ds of the present tractions and motions at the nodes in contact, zero elsewhere.
-  function slip_increment(self) result(ds)
-    class(iterate_t), intent(in) :: self
-    real(wp), allocatable :: ds(:)
-    integer :: i, n, col, row, n_col
+    !> In the frames (2 n)
+    real(wp), intent(out), contiguous :: frame(:)
+    real(wp) :: motion(n_motion), x, y
+    integer :: n, row, col, i
 
     n = size(self%p)
-    n_col = self%problem%lattice%extent(1)
-    allocate (ds(2*n))
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(i, col)
-    do row = 1, n/n_col
-      do col = 1, n_col
-        i = (row - 1)*n_col + col
-        ds(i) = 0.0_wp
-        ds(n + i) = 0.0_wp
-        if (.not. (self%contact(i) .or. self%p(i) > 0.0_wp)) cycle
-        ds(i) = self%u(i) - self%origin(i) &
-                - (self%motion(along_x) - self%motion(about_z)*self%problem%y(col, row))
-        ds(n + i) = self%u(n + i) - self%origin(n + i) &
-                    - (self%motion(along_y) + self%motion(about_z)*self%problem%x(col, row))
+    motion = merge(self%motion, 0.0_wp, self%target%control /= force_control)
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(x, y, col, i)
+    do row = 1, self%problem%lattice%extent(2)
+      do col = 1, self%problem%lattice%extent(1)
+        i = (row - 1)*self%problem%lattice%extent(1) + col
+        x = self%origin(i) + (motion(along_x) - motion(about_z)*self%problem%y(col, row))
+        y = self%origin(n + i) + (motion(along_y) + motion(about_z)*self%problem%x(col, row))
+        frame(i) = -self%shear%direction(2, i)*x + self%shear%direction(1, i)*y
+        frame(n + i) = self%shear%direction(1, i)*x + self%shear%direction(2, i)*y
       end do
     end do
     !$omp end parallel do
-  end function slip_increment
+  end subroutine wanted_displacement
+
+  !> ds of the present tractions and motions at the nodes of a row in contact, zero elsewhere.
+  pure subroutine slip_row(self, row, dsx, dsy)
+    class(iterate_t), intent(in) :: self
+    integer, intent(in) :: row
+    !> Components along x and y (n_col)
+    real(wp), intent(out), contiguous :: dsx(:), dsy(:)
+    integer :: i, n, col
+    logical :: touches
+
+    n = size(self%p)
+    do col = 1, size(dsx)
+      i = (row - 1)*size(dsx) + col
+      touches = self%contact(i) .or. self%p(i) > 0.0_wp
+      dsx(col) = self%u(i) - self%origin(i) - (self%motion(along_x) - self%motion(about_z)*self%problem%y(col, row))
+      dsy(col) = self%u(n + i) - self%origin(n + i) - (self%motion(along_y) + self%motion(about_z)*self%problem%x(col, row))
+      dsx(col) = merge(dsx(col), 0.0_wp, touches)
+      dsy(col) = merge(dsy(col), 0.0_wp, touches)
+    end do
+  end subroutine slip_row
 
   !> Largest shear traction that there can be.
-  pure real(wp) function traction_scale(self)
+  real(wp) function traction_scale(self)
     class(iterate_t), intent(in) :: self
+    real(wp) :: largest
     integer :: n
 
     n = size(self%p)
-    if (self%problem%friction%no_slip) then
-      traction_scale = max(sqrt(maxval(self%q(:n)**2 + self%q(n + 1:)**2)), least_traction*maxval(self%p))
-    else
-      traction_scale = self%problem%friction%coefficient*maxval(self%p)
-    end if
+    largest = 0.0_wp
+    traction_scale = maximum(self%p, self%operators%n_threads)
+    if (self%problem%friction%no_slip) largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
+    traction_scale = tangential_scale(self%problem%friction, largest)*traction_scale
   end function traction_scale
 
   !> Shear traction cut to the cone.
-  function traction_on_cone(self) result(q)
+  subroutine cut_to_cone(self, q)
     class(iterate_t), intent(in) :: self
-    real(wp), allocatable :: q(:)
-    integer :: i, n
+    !> The traction, components along x and y (2 n) [Pa]
+    real(wp), allocatable, intent(out) :: q(:)
+    real(wp) :: unit, slope
+    integer :: n, n_col, row, from, to
 
     n = size(self%p)
+    n_col = self%problem%lattice%extent(1)
     allocate (q(2*n))
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads)
-    do i = 1, n
-      if (self%p(i) > 0.0_wp) then
-        q([i, n + i]) = on_cone([self%q(i), self%q(n + i)], self%problem%friction%bound(self%p(i)))
-      else
-        q([i, n + i]) = 0.0_wp
-      end if
+    call law(self, unit, slope)
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(from, to)
+    do row = 1, n/n_col
+      from = (row - 1)*n_col + 1
+      to = row*n_col
+      call cone_row(n_col, unit, slope, self%p(from:to), self%q(from:to), self%q(n + from:n + to), q(from:to), &
+                    q(n + from:n + to))
     end do
     !$omp end parallel do
-  end function traction_on_cone
+  end subroutine cut_to_cone
+
+  !> Coulomb's law as passes over a row take it.
+  subroutine law(self, unit, slope)
+    class(iterate_t), intent(in) :: self
+    !> Inverse of the largest pressure, 0 without pressure [1/Pa]; coefficient of friction, or `unbounded`
+    real(wp), intent(out) :: unit, slope
+
+    unit = max(maximum(self%p, self%operators%n_threads), 0.0_wp)
+    if (unit > 0.0_wp) unit = 1.0_wp/unit
+    slope = self%problem%friction%coefficient
+    if (self%problem%friction%no_slip) slope = unbounded
+  end subroutine law
 
   !> Residuals of the present tractions; nothing is multiplied for them.
   subroutine find_residuals(self)
     class(iterate_t), intent(inout) :: self
+    real(wp), allocatable :: gap(:)
 
-    self%residual_normal = gap_residual(self%problem, self%p, self%h + self%closing + self%w - self%motion(normal))
+    call self%find_gap(gap)
+    self%residual_normal = self%gap_residual(gap)
     call self%find_tangential_residual()
   end subroutine find_residuals
 
   !> R_t alone.
   subroutine find_tangential_residual(self)
-    class(iterate_t), intent(inout), target :: self
-    real(wp), allocatable, target :: slipped(:)
-    real(wp), pointer, contiguous :: p(:, :), q(:, :, :), ds(:, :, :)
+    class(iterate_t), intent(inout) :: self
+    real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, slope, largest, worst
+    integer :: n, row, from, to
 
-    allocate (slipped, source=self%slip_increment())
-    associate (n => self%problem%lattice%extent)
-      p(1:n(1), 1:n(2)) => self%p
-      q(1:n(1), 1:n(2), 1:2) => self%q
-      ds(1:n(1), 1:n(2), 1:2) => slipped
-    end associate
-    self%residual_tangential = tangential_residual(q, ds, p, self%problem%friction, self%problem%tangential_compliance)
+    n = size(self%p)
+    self%residual_tangential = 0.0_wp
+    call law(self, unit, slope)
+    if (.not. (unit > 0.0_wp .and. self%problem%friction%resists())) return
+    largest = 0.0_wp
+    worst = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(ds, from, to) &
+    !$omp& reduction(max: largest, worst)
+    do row = 1, self%problem%lattice%extent(2)
+      from = (row - 1)*size(ds, 1) + 1
+      to = row*size(ds, 1)
+      call self%slip_row(row, ds(:, 1), ds(:, 2))
+      call residual_row(size(ds, 1), unit, slope, 1.0_wp/self%problem%tangential_compliance, self%p(from:to), &
+                        self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
+    end do
+    !$omp end parallel do
+    self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, largest)
   end subroutine find_tangential_residual
 
   !> Are all tractions and motions finite numbers?
-  pure logical function is_finite(self)
+  logical function is_finite(self)
     class(iterate_t), intent(in) :: self
+    integer :: n, i
 
-    is_finite = all(ieee_is_finite(self%p)) .and. all(ieee_is_finite(self%q)) .and. all(ieee_is_finite(self%motion))
+    n = size(self%p)
+    is_finite = all(ieee_is_finite(self%motion))
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) reduction(.and.: is_finite)
+    do i = 1, n
+      is_finite = is_finite .and. ieee_is_finite(self%p(i)) .and. ieee_is_finite(self%q(i)) .and. ieee_is_finite(self%q(n + i))
+    end do
+    !$omp end parallel do
   end function is_finite
 
-  !> R_n of vectors.
-  real(wp) function gap_residual(problem, pressure, gap)
-    type(friction_problem_t), intent(in) :: problem
-    real(wp), intent(in), contiguous, target :: pressure(:), gap(:)
+  !> R_n of a gap under the present pressure.
+  real(wp) function gap_residual(self, gap)
+    class(iterate_t), intent(in), target :: self
+    !> Gap (n) [m]
+    real(wp), intent(in), contiguous, target :: gap(:)
     real(wp), pointer, contiguous :: p(:, :), g(:, :)
 
-    associate (n => problem%lattice%extent)
-      p(1:n(1), 1:n(2)) => pressure
+    associate (n => self%problem%lattice%extent)
+      p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate
-    gap_residual = normal_residual(p, g, problem%candidate, problem%normal_compliance)
+    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%n_threads)
   end function gap_residual
 
 end module hc_friction_iterate

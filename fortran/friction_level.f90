@@ -74,14 +74,15 @@ contains
       if (allocated(error)) return
       if (.not. now%is_finite()) exit
       if (now%held) held = held + 1
-      if (now%held .and. problem%overloads(target, sum(now%p))) held = max_held
+      if (now%held) then
+        if (problem%overloads(target, sum(now%p))) held = max_held
+      end if
       state%sweeps = sweep
       if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
           .and. .not. now%sliding .and. held < max_held) cycle
 
       ! what is recorded fulfils the bounds exactly, and is judged by a product of its own
-      state%pressure = reshape(max(now%p, 0.0_wp), shape(state%pressure))
-      state%traction = reshape(now%on_cone(), shape(state%traction))
+      call record(now, state)
       state%motion = now%motion
       call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
       if (allocated(error)) return
@@ -94,5 +95,25 @@ contains
                     (now%sliding .or. held > 1)
     state%operator_applications = operators%work()
   end subroutine solve_level
+
+  !> Tractions of an iterate, without tension and cut to the cone.
+  subroutine record(now, state)
+    type(iterate_t), intent(in) :: now
+    type(contact_state_t), intent(inout) :: state
+    real(wp), allocatable :: q(:)
+    integer :: n, row, from, to
+
+    n = size(now%p)
+    call now%cut_to_cone(q)
+    !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(from, to)
+    do row = 1, size(state%pressure, 2)
+      to = row*size(state%pressure, 1)
+      from = to - size(state%pressure, 1) + 1
+      state%pressure(:, row) = max(now%p(from:to), 0.0_wp)
+      state%traction(:, row, 1) = q(from:to)
+      state%traction(:, row, 2) = q(n + from:n + to)
+    end do
+    !$omp end parallel do
+  end subroutine record
 
 end module hc_friction_level

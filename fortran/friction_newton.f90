@@ -36,7 +36,8 @@ contains
     type(coupled_system_t) :: system
     real(wp), allocatable :: x(:), ax(:), rhs(:), weight(:), columns(:, :), mb(:, :), rows(:, :)
     real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:)
-    logical, allocatable :: active(:), shear_active(:)
+    real(wp), allocatable :: gap(:)
+    logical, allocatable :: active(:), shear_active(:), contact(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
     real(wp) :: missing(4), multiplier(4), goal
@@ -44,7 +45,9 @@ contains
     logical :: independent
 
     n = size(now%p)
-    now%contact = now%contact_area(now%h + now%closing + now%w - now%motion(normal))
+    call now%find_gap(gap)
+    call now%find_contact(gap, contact)
+    call move_alloc(contact, now%contact)
     now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
     call now%classify(.false., shear_active)
     system%operators => now%operators
@@ -74,7 +77,7 @@ contains
     rows(n + 1:, :n_shear) = shear_columns
     do k = 1, n_shear
       ! the traction mu p e belongs to the pressure
-      plane = driven%direction(k, now%problem)
+      plane = reshape(driven%direction(k, now%problem), [2*n])
       rows(:n, k) = system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
     end do
     missing(:n_shear) = shear_missing
@@ -99,8 +102,7 @@ contains
       call system%product(x, ax, error)
       if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
-      plane = now%origin + now%prescribed_displacement()
-      call now%shear%to_frame(plane, rhs(n + 1:))
+      call now%wanted_displacement(rhs(n + 1:))
       weight(:n) = 1.0_wp/(now%problem%normal_compliance*maxval(now%p))
       weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &

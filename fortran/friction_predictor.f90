@@ -15,7 +15,7 @@
 module hc_friction_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, slip, normal, force_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t, slip, normal, force_control
   use hc_friction_law, only: magnitude
   use hc_friction_problem, only: friction_problem_t
   use hc_friction_systems, only: operators_t
@@ -49,7 +49,7 @@ contains
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> State to start from: the old one with new tractions and motions; the old one itself if nothing better is found
-    type(contact_state_t), intent(inout) :: guess
+    type(contact_state_t), intent(out) :: guess
     !> There is something better
     logical, intent(out) :: predicted
     !> Work, in applications of the full operator
@@ -66,7 +66,7 @@ contains
 
     work = 0.0_wp
     predicted = .false.
-    guess = start
+    call take_tractions(start, guess, problem%n_threads)
     if (size(coarse) == 0) return
     model = coarse(1)
     call restrict_state(problem, start, model, before)
@@ -128,20 +128,26 @@ contains
     allocate (change_of_traction, mold=state%traction)
     call prolong(coarse_problem%lattice, after%pressure - before%pressure, problem%lattice, change)
     call prolong_vector(coarse_problem%lattice, after%traction - before%traction, problem%lattice, change_of_traction)
-    state%pressure = merge(max(state%pressure + change, 0.0_wp), 0.0_wp, problem%candidate)
-    state%traction = state%traction + change_of_traction
-    where (spread(state%pressure <= 0.0_wp, 3, 2)) state%traction = 0.0_wp
-    ! what is interpolated between tractions on the cone lies inside, and would stick
     allocate (slipping, mold=state%pressure)
     call prolong(coarse_problem%lattice, merge(1.0_wp, 0.0_wp, after%zone == slip), problem%lattice, slipping)
+    !$omp parallel do schedule(static) num_threads(problem%n_threads) private(col, bound, length)
     do row = 1, size(slipping, 2)
       do col = 1, size(slipping, 1)
+        state%pressure(col, row) = merge(max(state%pressure(col, row) + change(col, row), 0.0_wp), 0.0_wp, &
+                                         problem%candidate(col, row))
+        if (state%pressure(col, row) <= 0.0_wp) then
+          state%traction(col, row, :) = 0.0_wp
+          cycle
+        end if
+        state%traction(col, row, :) = state%traction(col, row, :) + change_of_traction(col, row, :)
+        ! what is interpolated between tractions on the cone lies inside, and would stick
         if (slipping(col, row) < 1.0_wp) cycle
         bound = problem%friction%bound(state%pressure(col, row))
         length = magnitude(state%traction(col, row, :))
         if (length > 0.0_wp .and. length < bound) state%traction(col, row, :) = state%traction(col, row, :)*(bound/length)
       end do
     end do
+    !$omp end parallel do
     state%motion = state%motion + (after%motion - before%motion)
   end subroutine add_change
 

@@ -17,8 +17,9 @@ module hc_friction_problem
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, separated, slip, &
     normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
-    tangential_residual, force_residual, least_traction
-  use hc_friction_law, only: coulomb_t, linearize
+    tangential_residual, largest_pressure, force_residual, least_traction
+  use hc_friction_law, only: coulomb_t
+  use hc_friction_rows, only: zone_row, unbounded
   use hc_multilevel, only: restrict_field, restrict_mask
   implicit none
   private
@@ -53,6 +54,8 @@ module hc_friction_problem
     real(wp), allocatable :: x(:, :), y(:, :)
     !> Self-compliances d_n and d_t of a node [m/Pa]
     real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
+    !> Threads that share the passes over its nodes
+    integer :: n_threads = 1
   contains
     !> The same problem on the lattice of every second node
     procedure :: coarsened
@@ -171,6 +174,7 @@ contains
     coarse%pair = self%pair
     coarse%friction = self%friction
     coarse%goodman = self%goodman
+    coarse%n_threads = self%n_threads
     allocate (coarse%initial_gap, source=restrict_field(self%lattice, self%initial_gap, coarse%lattice))
     allocate (coarse%candidate, source=restrict_mask(self%lattice, self%candidate, coarse%lattice))
     allocate (coarse%x, coarse%y, mold=coarse%initial_gap)
@@ -251,10 +255,15 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: tractions(:, :, :)
+    integer :: row
 
     allocate (tractions(size(pressure, 1), size(pressure, 2), 3))
-    tractions(:, :, 1) = pressure
-    tractions(:, :, 2:) = traction
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do row = 1, size(pressure, 2)
+      tractions(:, row, 1) = pressure(:, row)
+      tractions(:, row, 2:) = traction(:, row, :)
+    end do
+    !$omp end parallel do
     call flexibility%apply([normal, along_x, along_y], tractions, [normal, along_x, along_y], displacement, error)
     if (allocated(error)) return
     if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
@@ -273,17 +282,22 @@ contains
   end function rigid_displacement
 
   !> Normal load, tangential loads [N] and torque [N m] of given tractions.
-  pure function resultants(self, pressure, traction) result(load)
+  function resultants(self, pressure, traction) result(load)
     class(friction_problem_t), intent(in) :: self
     !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
-    real(wp) :: load(n_motion)
+    real(wp) :: load(n_motion), part(n_motion, size(pressure, 2))
+    integer :: row
 
-    load(normal) = sum(pressure)
-    load(along_x) = sum(traction(:, :, 1))
-    load(along_y) = sum(traction(:, :, 2))
-    load(about_z) = sum(self%x*traction(:, :, 2) - self%y*traction(:, :, 1))
-    load = load*self%lattice%cell_area()
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do row = 1, size(pressure, 2)
+      part(normal, row) = sum(pressure(:, row))
+      part(along_x, row) = sum(traction(:, row, 1))
+      part(along_y, row) = sum(traction(:, row, 2))
+      part(about_z, row) = dot_product(self%x(:, row), traction(:, row, 2)) - dot_product(self%y(:, row), traction(:, row, 1))
+    end do
+    !$omp end parallel do
+    load = self%lattice%cell_area()*sum(part, dim=2)
   end function resultants
 
   !> r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius [Pa/m].
@@ -310,30 +324,47 @@ contains
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
 
-    real(wp) :: r, e(2), compliance, scale, missing(n_motion)
-    integer :: col, row
+    real(wp) :: r, unit, slope, scale, missing(n_motion)
+    integer :: col, row, m, n_contact
+    logical :: finite
 
-    state%gap = self%initial_gap + displacement(:, :, 1) - state%motion(normal)
-    state%relative_displacement = displacement(:, :, 2:) - self%rigid_displacement(state%motion)
-    state%slip_increment = state%relative_displacement - reference
-    state%zone = separated
-    r = self%classification_parameter(count(state%pressure > 0.0_wp))
+    n_contact = count(state%pressure > 0.0_wp)
+    r = self%classification_parameter(n_contact)
+    unit = largest_pressure(state%pressure, self%n_threads)
+    if (unit > 0.0_wp) unit = 1.0_wp/unit
+    slope = self%friction%coefficient
+    if (self%friction%no_slip) slope = unbounded
+    finite = .true.
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(col, m) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
       do col = 1, size(state%pressure, 1)
-        if (state%pressure(col, row) > 0.0_wp) then
-          call linearize(state%traction(col, row, :), state%slip_increment(col, row, :), &
-                         self%friction%bound(state%pressure(col, row)), 1.0_wp, r, state%zone(col, row), e, compliance)
-        else
-          state%slip_increment(col, row, :) = 0.0_wp
-        end if
+        state%gap(col, row) = self%initial_gap(col, row) + displacement(col, row, 1) - state%motion(normal)
+        state%relative_displacement(col, row, 1) = displacement(col, row, 2) &
+                                                   - (state%motion(along_x) - state%motion(about_z)*self%y(col, row))
+        state%relative_displacement(col, row, 2) = displacement(col, row, 3) &
+                                                   - (state%motion(along_y) + state%motion(about_z)*self%x(col, row))
       end do
+      do m = 1, 2
+        state%slip_increment(:, row, m) = merge(state%relative_displacement(:, row, m) - reference(:, row, m), 0.0_wp, &
+                                                state%pressure(:, row) > 0.0_wp)
+      end do
+      if (self%friction%resists()) then
+        call zone_row(size(state%zone, 1), unit, slope, r, state%pressure(:, row), state%traction(:, row, 1), &
+                      state%traction(:, row, 2), state%slip_increment(:, row, 1), state%slip_increment(:, row, 2), &
+                      state%zone(:, row))
+      else
+        state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
+      end if
+      finite = finite .and. all(ieee_is_finite(state%gap(:, row)) .or. .not. self%candidate(:, row)) .and. &
+               all(ieee_is_finite(state%relative_displacement(:, row, :)))
     end do
-    if (.not. self%friction%resists()) state%zone = merge(slip, separated, state%pressure > 0.0_wp)
+    !$omp end parallel do
 
     state%load = self%resultants(state%pressure, state%traction)
-    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance)
+    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, &
+                                            self%n_threads)
     state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
-                                                    self%friction, self%tangential_compliance)
+                                                    self%friction, self%tangential_compliance, self%n_threads)
     missing = merge(abs(state%load - target%value), 0.0_wp, target%control == force_control)
     state%residual_force = merge(force_residual(state%load(normal), target%value(normal)), 0.0_wp, &
                                  target%control(normal) == force_control)
@@ -345,13 +376,11 @@ contains
     end if
     state%residual_shear_force = relative(norm2(missing(along_x:along_y)), scale)
     state%residual_torque = relative(missing(about_z), &
-                                     scale*sqrt(self%lattice%cell_area()*count(state%pressure > 0.0_wp)/pi))
+                                     scale*sqrt(self%lattice%cell_area()*n_contact/pi))
     ! one by one: the largest of several numbers hides one that is not a number
     state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
                            state%residual_shear_force, state%residual_torque] <= tolerance) .and. &
-                      all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion)) .and. &
-                      all(ieee_is_finite(state%gap) .or. .not. self%candidate) .and. &
-                      all(ieee_is_finite(state%relative_displacement))
+                      all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion)) .and. finite
   end subroutine conclude
 
   !> A missing load relative to a scale; any at all is too much where the scale vanishes.

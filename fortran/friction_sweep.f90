@@ -11,8 +11,9 @@ module hc_friction_sweep
   use hc_error, only: error_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_driven_motions, only: driven_motions_t
-  use hc_friction_iterate, only: iterate_t, gap_residual, cautious
+  use hc_friction_iterate, only: iterate_t, cautious
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil
+  use hc_vectors, only: copy, maximum, total
   implicit none
   private
 
@@ -48,6 +49,7 @@ contains
     type(iterate_t), intent(inout) :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: q(:)
 
     call press(now, error)
     if (allocated(error)) return
@@ -60,7 +62,8 @@ contains
     call shear_off(now, error)
     if (allocated(error)) return
     if (now%pressing) then
-      call now%operators%apply([along_x, along_y], now%on_cone(), [normal], now%closing, error)
+      call now%cut_to_cone(q)
+      call now%operators%apply([along_x, along_y], q, [normal], now%closing, error)
       if (allocated(error)) return
     end if
     call now%find_residuals()
@@ -76,50 +79,52 @@ contains
 
     real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
     logical, allocatable :: contact(:)
-    real(wp) :: goal, residual, multiplier(1), missing(1), cell_area
-    integer :: n, area, n_constraint, iterations
+    real(wp) :: goal, residual, multiplier(1), missing(1), cell_area, carried, level
+    integer :: n, i, area, n_constraint, iterations
     logical :: changed, independent
 
     n = size(now%p)
     cell_area = now%problem%lattice%cell_area()
     n_constraint = merge(1, 0, now%target%control(normal) == force_control)
-    allocate (constraint(n, n_constraint))
+    allocate (constraint(n, n_constraint), rhs(n))
+    level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
     do area = 1, merge(max_areas, max_areas_alone, now%pressing)
-      gap = now%h + now%closing + now%w - now%motion(normal)
-      now%residual_normal = gap_residual(now%problem, now%p, gap)
+      call now%find_gap(gap)
+      now%residual_normal = now%gap_residual(gap)
       missing = 0.0_wp
-      if (n_constraint == 1) missing = now%target%value(normal)/cell_area - sum(now%p)
+      carried = total(now%p, now%pressure%n_threads)
+      if (n_constraint == 1) missing = now%target%value(normal)/cell_area - carried
       if (now%residual_normal <= final_accuracy*now%tolerance .and. &
-          abs(missing(1)) <= final_accuracy*now%tolerance*sum(now%p)) return
-      if (now%first .and. area == 1) then
-        contact = now%contact
-        if (.not. now%cold) contact = now%contact_area(gap)
-        changed = .true.
-      else
-        contact = now%contact_area(gap)
-        changed = any(contact .neqv. now%contact)
+          abs(missing(1)) <= final_accuracy*now%tolerance*carried) return
+      changed = now%first .and. area == 1
+      if (.not. (changed .and. now%cold)) then
+        call now%find_contact(gap, contact)
+        if (.not. changed) changed = count(contact .neqv. now%contact) > 0
+        call move_alloc(contact, now%contact)
       end if
 
-      now%contact = contact
-      if (changed) call now%pressure%take(contact)
-      if (n_constraint == 1) constraint(:, 1) = merge(1.0_wp, 0.0_wp, contact)
+      if (changed) call now%pressure%take(now%contact)
+      !$omp parallel do schedule(static) num_threads(now%pressure%n_threads)
+      do i = 1, n
+        if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))
+        rhs(i) = level - now%h(i) - now%closing(i)
+        if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
+      end do
+      !$omp end parallel do
       call lift_pressure(now, constraint, mb, error)
       if (allocated(error)) return
       if (changed) then
-        now%p = merge(max(now%p, 0.0_wp), 0.0_wp, contact)
         if (n_constraint == 1) then
-          missing = now%target%value(normal)/cell_area - sum(now%p)
+          missing = now%target%value(normal)/cell_area - total(now%p, now%pressure%n_threads)
           call fulfil(constraint, mb, missing, now%p, independent, now%pressure%n_threads)
         end if
         call now%pressure%product(now%p, now%w, error)
         if (allocated(error)) return
       end if
-      rhs = -now%h - now%closing
-      if (n_constraint == 0) rhs = rhs + now%motion(normal)
       goal = final_accuracy*now%tolerance
       if (changed .or. now%pressing) goal = max(press_accuracy*min(now%residual_normal, 1.0_wp), goal)
-      call projected_cg(now%pressure, contact, constraint, mb, rhs, now%p, now%w, &
-                        goal*now%problem%normal_compliance*maxval(abs(now%p)), max_iterations, &
+      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, &
+                        goal*now%problem%normal_compliance*maximum(now%p, now%pressure%n_threads), max_iterations, &
                         multiplier(:n_constraint), residual, iterations, error)
       if (allocated(error)) return
       if (n_constraint == 1) now%motion(normal) = multiplier(1)
@@ -133,7 +138,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :), moved(:), q(:)
+    real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :), q(:)
     logical, allocatable :: active(:)
     real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
@@ -146,8 +151,8 @@ contains
       now%q = 0.0_wp
       return
     end if
-    allocate (x(2*n), ax(2*n), rhs(2*n), moved(2*n), q(2*n))
-    q = now%q
+    allocate (x(2*n), ax(2*n), rhs(2*n), q(2*n))
+    call copy(now%q, q, now%shear%n_threads)
     holding = .false.
     do
       call now%classify(holding, active)
@@ -166,8 +171,7 @@ contains
         call displace(now, x, ax, error)
         if (allocated(error)) return
         ! motions that are prescribed are known; the others are multipliers
-        moved = now%origin + now%prescribed_displacement()
-        call now%shear%to_frame(moved, rhs)
+        call now%wanted_displacement(rhs)
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
         goal = goal*min(inner_accuracy, max(goal, merge(late_accuracy, 1.0e-3_wp, now%pressing)))
@@ -180,7 +184,9 @@ contains
       now%sliding = .not. independent
       if (size(missing) == 0 .or. holding .or. any(active(n + 1:))) exit
       ! where all nodes slip, only their directions resist a load: not beyond reason
-      if (independent .and. maxval(abs(x(:n))) <= beyond_reason*now%traction_scale()) exit
+      if (independent) then
+        if (maxval(abs(x(:n))) <= beyond_reason*now%traction_scale()) exit
+      end if
       holding = .true.
       now%caution = max(cautious*now%caution, least_caution)
       now%q = q
@@ -189,7 +195,7 @@ contains
     motion = now%motion
     call driven%set_motions(multiplier, now%motion)
     call now%shear%to_plane(x, now%q)
-    ax(:n) = ax(:n) - now%shear%compliance*x(:n)
+    call now%shear%take_springs_off(x, ax)
     call now%shear%to_plane(ax, now%u)
     call now%find_tangential_residual()
     now%n_sweep = now%n_sweep + 1
@@ -208,7 +214,7 @@ contains
       call now%shear%to_frame(now%q, x)
       call displace(now, x, ax, error)
       if (allocated(error)) return
-      ax(:n) = ax(:n) - now%shear%compliance*x(:n)
+      call now%shear%take_springs_off(x, ax)
       call now%shear%to_plane(ax, now%u)
     end if
   end subroutine shear_off
@@ -224,7 +230,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: traction(:), moved(:)
-    integer :: n
+    integer :: n, i
 
     if (.not. now%dragging) then
       call now%shear%product(x, ax, error)
@@ -232,12 +238,16 @@ contains
     end if
     n = size(now%p)
     allocate (traction(3*n), moved(2*n))
-    traction(:n) = now%p
+    call copy(now%p, traction(:n), now%shear%n_threads)
     call now%shear%to_plane(x, traction(n + 1:))
     call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], moved, error)
     if (allocated(error)) return
     call now%shear%to_frame(moved, ax)
-    ax(:n) = ax(:n) + now%shear%compliance*x(:n)
+    !$omp parallel do schedule(static) num_threads(now%shear%n_threads)
+    do i = 1, n
+      ax(i) = ax(i) + now%shear%compliance(i)*x(i)
+    end do
+    !$omp end parallel do
   end subroutine displace
 
   !> About the pressure that an approach of the nodes in contact causes: worked out once a step.
@@ -250,7 +260,7 @@ contains
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    integer :: k
+    integer :: i, k
 
     if (.not. allocated(now%lift)) then
       call precondition_constraints(now%pressure, now%contact, constraint, now%lift, error)
@@ -258,7 +268,11 @@ contains
     end if
     allocate (mb, mold=now%lift)
     do k = 1, size(mb, 2)
-      mb(:, k) = merge(now%lift(:, k), 0.0_wp, now%contact)
+      !$omp parallel do schedule(static) num_threads(now%pressure%n_threads)
+      do i = 1, size(mb, 1)
+        mb(i, k) = merge(now%lift(i, k), 0.0_wp, now%contact(i))
+      end do
+      !$omp end parallel do
     end do
   end subroutine lift_pressure
 
@@ -267,9 +281,9 @@ contains
     !> Tractions and motions
     type(iterate_t), intent(inout) :: now
     !> Unknowns, in the frames (2 n)
-    logical, intent(in) :: active(:)
+    logical, intent(in), contiguous :: active(:)
     !> Constraint vectors, in the frames (2 n, number of constraints)
-    real(wp), intent(in) :: constraint(:, :)
+    real(wp), intent(in), contiguous :: constraint(:, :)
     !> Work it out again
     logical, intent(in) :: afresh
     !> The traction, in the frames (2 n, number of constraints)
@@ -284,9 +298,7 @@ contains
     if (known) then
       allocate (mb, mold=constraint)
       do k = 1, size(mb, 2)
-        call now%shear%to_frame(now%drag(:, k), mb(:, k))
-        call now%shear%soften(constraint(:, k), mb(:, k))
-        where (.not. active) mb(:, k) = 0.0_wp
+        call now%shear%soften(constraint(:, k), now%drag(:, k), active, mb(:, k))
       end do
     else
       call precondition_constraints(now%shear, active, constraint, mb, error)

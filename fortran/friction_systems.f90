@@ -21,9 +21,10 @@ module hc_friction_systems
   use hc_kernel_cache, only: kernel_cache_t
   use hc_spring_blend, only: node_compliance, blend
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
-  use hc_friction_law, only: magnitude
+  use hc_friction_rows, only: soften_row
   use hc_krylov, only: linear_system_t
   use hc_packing, only: packing_t, new_packing
+  use hc_vectors, only: fill, copy
   implicit none
   private
 
@@ -32,6 +33,8 @@ module hc_friction_systems
 
   !> Components of the shear traction
   integer, parameter :: shear(2) = [along_x, along_y]
+  !> Nodes that one thread takes at a time
+  integer, parameter :: row_block = 4096
 
   !> Operator and preconditioners over one window, and the work they did.
   type :: operators_t
@@ -89,6 +92,8 @@ module hc_friction_systems
     procedure :: weigh
     !> Let the traction of a slipping node be the smaller the softer it is
     procedure :: soften
+    !> Take the stretch of the springs off displacements
+    procedure :: take_springs_off
   end type shear_system_t
 
   !> Pressure and shear traction together: the pressure of a slipping node carries mu p e along.
@@ -222,17 +227,25 @@ contains
     !> Operator and preconditioners
     type(operators_t), intent(inout), target :: operators
     integer :: n, i
+    logical :: all_nodes(operators%flexibility%lattice%size())
 
     n = operators%flexibility%lattice%size()
     self%operators => operators
     self%n_threads = operators%n_threads
     self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%pair)
-    allocate (self%direction(2, n), self%compliance(n), source=0.0_wp)
-    allocate (self%weight(n, 2), source=spread([1.0_wp, 0.0_wp], 1, n))
-    allocate (self%from(2*n), self%onto(2*n), source=0.0_wp)
-    allocate (self%displacement(2*n), self%traction(2*n), source=0.0_sp)
-    self%direction(1, :) = 1.0_wp
-    call new_packing(self%nodes, [(.true., i=1, n)], self%n_threads)
+    allocate (self%direction(2, n), self%compliance(n), self%weight(n, 2), self%from(2*n), self%onto(2*n), &
+              self%displacement(2*n), self%traction(2*n))
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, n
+      self%direction(:, i) = [1.0_wp, 0.0_wp]
+      self%compliance(i) = 0.0_wp
+      self%weight(i, :) = [1.0_wp, 0.0_wp]
+      self%from([i, n + i]) = 0.0_wp
+      self%displacement([i, n + i]) = 0.0_sp
+      all_nodes(i) = .true.
+    end do
+    !$omp end parallel do
+    call new_packing(self%nodes, all_nodes, self%n_threads)
   end subroutine new_shear_system
 
   !> Take the nodes in contact; weigh the preconditioners by the compliances.
@@ -241,43 +254,68 @@ contains
     !> Nodes in contact (n)
     logical, intent(in) :: contact(:)
     integer :: i
-    logical :: known
+    logical :: known, used(2)
 
     known = allocated(self%contact)
-    if (known) known = all(self%contact .eqv. contact)
+    if (known) known = count(self%contact .neqv. contact) == 0
     if (.not. known) then
       self%contact = contact
       call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%n_threads)
       call new_packing(self%nodes, contact, self%n_threads)
-      self%from = 0.0_wp
+      call fill(self%from, 0.0_wp, self%n_threads)
     end if
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    used = .false.
+    !$omp parallel do schedule(static) num_threads(self%n_threads) reduction(.or.: used)
     do i = 1, size(contact)
       self%weight(i, :) = blend(self%compliance(i)/self%elastic_compliance)
+      if (contact(i)) used = used .or. self%weight(i, :) > 0.0_wp
     end do
     !$omp end parallel do
-    self%used = [any(contact .and. self%weight(:, 1) > 0.0_wp), any(contact .and. self%weight(:, 2) > 0.0_wp)]
+    self%used = used
   end subroutine weigh
 
   !> A spring in series with the stiffness that a node was found to have in stick: what it leaves of the traction.
-  pure subroutine soften(self, displacement, traction)
+  subroutine soften(self, displacement, plane, active, traction)
     class(shear_system_t), intent(in) :: self
     !> Displacement, in the frames (2 n)
-    real(wp), intent(in) :: displacement(:)
-    !> Its traction if all nodes stuck, in the frames (2 n)
-    real(wp), intent(inout) :: traction(:)
-    real(wp) :: moved, stretch
-    integer :: i, n
+    real(wp), intent(in), contiguous :: displacement(:)
+    !> Its traction if all nodes stuck, along x and y (2 n)
+    real(wp), intent(in), contiguous :: plane(:)
+    !> Components that are wanted (2 n)
+    logical, intent(in), contiguous :: active(:)
+    !> The traction, in the frames; zero where it is not wanted (2 n)
+    real(wp), intent(out), contiguous :: traction(:)
+    integer :: i, n, from, to
 
     n = size(self%compliance)
-    do i = 1, n
-      ! what the spring gives way under that traction
-      stretch = self%compliance(i)*magnitude(traction([i, n + i]))
-      if (.not. stretch > 0.0_wp) cycle
-      moved = magnitude(displacement([i, n + i]))
-      traction(i) = traction(i)*moved/(moved + stretch)
+    call self%to_frame(plane, traction)
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, to)
+    do from = 1, n, row_block
+      to = min(from + row_block - 1, n)
+      call soften_row(to - from + 1, self%compliance(from:to), displacement(from:to), displacement(n + from:n + to), &
+                      traction(from:to), traction(n + from:n + to))
+      do i = from, to
+        if (.not. active(i)) traction(i) = 0.0_wp
+        if (.not. active(n + i)) traction(n + i) = 0.0_wp
+      end do
     end do
+    !$omp end parallel do
   end subroutine soften
+
+  !> Displacements of the nodes themselves, without the stretch of their springs.
+  subroutine take_springs_off(self, traction, displacement)
+    class(shear_system_t), intent(in) :: self
+    !> Traction, and displacement with the springs, in the frames (2 n)
+    real(wp), intent(in) :: traction(:)
+    real(wp), intent(inout) :: displacement(:)
+    integer :: i
+
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, size(self%compliance)
+      displacement(i) = displacement(i) - self%compliance(i)*traction(i)
+    end do
+    !$omp end parallel do
+  end subroutine take_springs_off
 
   !> Components along x and y from those along t and e.
   subroutine to_plane(self, frame, plane)
@@ -364,8 +402,13 @@ contains
     do m = 1, size(self%used)
       if (.not. self%used(m)) cycle
       ! the continuation beyond the contact is made afresh
-      self%displacement = 0.0_sp
-      !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
+      !$omp parallel num_threads(self%n_threads) private(i, t, e)
+      !$omp do schedule(static)
+      do i = 1, size(self%displacement)
+        self%displacement(i) = 0.0_sp
+      end do
+      !$omp end do
+      !$omp do schedule(static)
       do k = 1, size(self%nodes%first)
         do i = self%nodes%first(k), self%nodes%last(k)
           t = self%weight(i, m)/unit*x(i)
@@ -374,7 +417,8 @@ contains
           self%displacement(n + i) = real(self%direction(1, i)*t + self%direction(2, i)*e, sp)
         end do
       end do
-      !$omp end parallel do
+      !$omp end do
+      !$omp end parallel
       call invert(self%operators, self%operators%flexibility%lattice%extent, self%edge, m == 2, self%displacement, self%traction)
       !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
       do k = 1, size(self%nodes%first)
@@ -414,19 +458,27 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: frame(:), traction(:), moved(:)
-    integer :: n
+    integer :: n, i
 
     n = size(x)/3
-    allocate (frame, source=x(n + 1:))
-    frame(n + 1:) = frame(n + 1:) + self%slope*x(:n)
-    allocate (traction(3*n), moved(3*n))
-    traction(:n) = x(:n)
+    allocate (frame(2*n), traction(3*n), moved(3*n))
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, n
+      frame(i) = x(n + i)
+      frame(n + i) = x(2*n + i) + self%slope(i)*x(i)
+      traction(i) = x(i)
+    end do
+    !$omp end parallel do
     call self%shear%to_plane(frame, traction(n + 1:))
     call self%operators%apply([normal, along_x, along_y], traction, [normal, along_x, along_y], moved, error)
     if (allocated(error)) return
-    y(:n) = moved(:n)
+    call copy(moved(:n), y(:n), self%n_threads)
     call self%shear%to_frame(moved(n + 1:), y(n + 1:))
-    y(n + 1:2*n) = y(n + 1:2*n) + self%shear%compliance*x(n + 1:2*n)
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do i = 1, n
+      y(n + i) = y(n + i) + self%shear%compliance(i)*x(n + i)
+    end do
+    !$omp end parallel do
   end subroutine coupled_product
 
   subroutine coupled_precondition(self, x, y, error)

@@ -7,7 +7,7 @@ module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_friction_systems, only: operators_t, new_operators, operators_memory
   use hc_friction_level, only: solve_level
@@ -63,8 +63,10 @@ contains
       end if
       if (l == 1) then
         call new_operators(self%operators(l), problem%lattice, problem%pair, error, n_threads, cache)
+        self%problem%n_threads = self%operators(l)%n_threads
       else
         call new_operators(self%operators(l), self%coarse(l)%lattice, problem%pair, error, n_threads, cache)
+        self%coarse(l)%n_threads = self%operators(l)%n_threads
       end if
       if (allocated(error)) return
     end do
@@ -113,7 +115,7 @@ contains
       return
     end if
     work = 0.0_wp
-    guess = start
+    call take_tractions(start, guess, self%problem%n_threads)
     predicted = .false.
     if (size(self%operators) > 1) then
       if (any(start%pressure > 0.0_wp)) then

@@ -18,15 +18,13 @@
 module hc_krylov
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_lapack, only: ddot, dgesv
+  use hc_lapack, only: dgesv
   use hc_packing, only: packing_t, new_packing
+  use hc_vectors, only: fill, dot, dots, add_columns, sum_block
   implicit none
   private
 
-  public :: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, dot
-
-  !> Terms of a sum that are added up by one thread: the result does not depend on their number.
-  integer, parameter :: sum_block = 4096
+  public :: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil
 
   !> A symmetric positive definite operator with a preconditioner, on fields that
   !> are kept as vectors over all nodes.
@@ -70,13 +68,17 @@ contains
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    integer :: m
+    integer :: i, m
 
     allocate (mb(size(constraint, 1), size(constraint, 2)))
     do m = 1, size(constraint, 2)
       call system%precondition(constraint(:, m), mb(:, m), error)
       if (allocated(error)) return
-      where (.not. active) mb(:, m) = 0.0_wp
+      !$omp parallel do schedule(static) num_threads(system%n_threads)
+      do i = 1, size(active)
+        if (.not. active(i)) mb(i, m) = 0.0_wp
+      end do
+      !$omp end parallel do
     end do
   end subroutine precondition_constraints
 
@@ -181,7 +183,8 @@ contains
     associate (n => nodes%n_active)
       allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
     end associate
-    allocate (onto(size(x)), from(size(x)), source=0.0_wp)
+    allocate (onto(size(x)), from(size(x)))
+    call fill(from, 0.0_wp, n_threads)
     call nodes%pack_columns(constraint, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack(x, x_active)
@@ -190,9 +193,13 @@ contains
     call invert_gram(b, m_b, inverse, independent, n_threads)
     iterations = 0
     rz_old = 0.0_wp
-    do m = 1, size(multiplier)
-      multiplier(m) = dot(b(:, m), ax_active - rhs_active, n_threads)/dot(b(:, m), b(:, m), n_threads)
-    end do
+    multiplier = 0.0_wp
+    if (size(multiplier) > 0) then
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
+      do m = 1, size(multiplier)
+        multiplier(m) = -dot(b(:, m), r, n_threads)/dot(b(:, m), b(:, m), n_threads)
+      end do
+    end if
     do
       ! The share of the constraints is taken out of the residual before it is
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
@@ -418,64 +425,5 @@ contains
     end do
     !$omp end parallel do
   end subroutine constrained_residual
-
-  !> x <- x + B share
-  subroutine add_columns(b, share, x, n_threads)
-    !> Vectors to be added
-    real(wp), intent(in), contiguous :: b(:, :)
-    !> Their factors
-    real(wp), intent(in) :: share(:)
-    !> What they are added to
-    real(wp), intent(inout), contiguous :: x(:)
-    !> Threads to use
-    integer, intent(in) :: n_threads
-    integer :: i, m, from, to
-
-    !$omp parallel do schedule(static) num_threads(n_threads) private(i, m, to)
-    do from = 1, size(x), sum_block
-      to = min(from + sum_block - 1, size(x))
-      do m = 1, size(share)
-        do i = from, to
-          x(i) = x(i) + share(m)*b(i, m)
-        end do
-      end do
-    end do
-    !$omp end parallel do
-  end subroutine add_columns
-
-  !> Scalar products of several vectors with one.
-  function dots(b, x, n_threads)
-    !> The several
-    real(wp), intent(in), contiguous :: b(:, :)
-    !> The one
-    real(wp), intent(in), contiguous :: x(:)
-    !> Threads to use
-    integer, intent(in) :: n_threads
-    real(wp) :: dots(size(b, 2))
-    integer :: m
-
-    do m = 1, size(b, 2)
-      dots(m) = dot(b(:, m), x, n_threads)
-    end do
-  end function dots
-
-  !> Scalar product, summed in fixed blocks.
-  real(wp) function dot(a, b, n_threads)
-    !> Vectors of equal length
-    real(wp), intent(in), contiguous :: a(:), b(:)
-    !> Threads to use
-    integer, intent(in) :: n_threads
-    real(wp) :: part((size(a) + sum_block - 1)/sum_block)
-    integer :: k, from, to
-
-    !$omp parallel do schedule(static) num_threads(n_threads) private(from, to)
-    do k = 1, size(part)
-      from = (k - 1)*sum_block + 1
-      to = min(k*sum_block, size(a))
-      part(k) = ddot(to - from + 1, a(from:to), 1, b(from:to), 1)
-    end do
-    !$omp end parallel do
-    dot = sum(part)
-  end function dot
 
 end module hc_krylov

@@ -9,7 +9,7 @@ module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, force_control
-  use hc_friction_problem, only: friction_solver_t
+  use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_entry_state, only: solve_with_entry
   implicit none
   private
@@ -23,7 +23,7 @@ contains
     !> Method
     class(friction_solver_t), intent(inout) :: solver
     !> State to go on from
-    type(contact_state_t), intent(in) :: state
+    type(contact_state_t), intent(in), target :: state
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> The load is applied to the undeformed bodies at once
@@ -41,7 +41,8 @@ contains
     !> Slip of a node that enters counts from where it stood when its gap closed; default: from the beginning of the step
     logical, intent(in), optional :: interpolated
 
-    type(contact_state_t) :: now, trial
+    type(contact_state_t), target :: now
+    type(contact_state_t), pointer :: from
     real(wp), allocatable :: undeformed(:, :, :), slipped(:, :, :)
     logical :: from_entry
     real(wp) :: done, part, work
@@ -49,58 +50,82 @@ contains
 
     from_entry = .false.
     if (present(interpolated)) from_entry = interpolated
-    now = state
-    undeformed = 0.0_wp*state%relative_displacement
-    allocate (slipped, source=undeformed)
+    if (static) allocate (undeformed, source=0.0_wp*state%relative_displacement)
+    if (from_entry) then
+      allocate (slipped, source=0.0_wp*state%relative_displacement)
+    else
+      allocate (slipped(0, 0, 0))
+    end if
+    from => state
     done = 0.0_wp
     part = 1.0_wp
     work = 0.0_wp
     cuts = 0
     sweeps = 0
     do
-      if (static) then
-        call solver%solve_step(now, undeformed, between(state, target, done + part), tolerance, max_sweeps, trial, error)
-      else if (from_entry) then
-        call solve_with_entry(solver, now, between(state, target, done + part), tolerance, max_sweeps, trial, error)
-      else
-        call solver%solve_step(now, now%relative_displacement, between(state, target, done + part), tolerance, &
-                               max_sweeps, trial, error)
-      end if
-      if (allocated(error)) return
-      work = work + trial%operator_applications
-      sweeps = sweeps + trial%sweeps
-      if (trial%converged) then
+      associate (goal => between(state, target, done + part))
         if (static) then
-          trial%accumulated_slip = norm2(trial%slip_increment, dim=3)
-          trial%dissipated_energy = dissipation(solver, trial)
+          call solver%solve_step(from, undeformed, goal, tolerance, max_sweeps, next, error)
+        else if (from_entry) then
+          call solve_with_entry(solver, from, goal, tolerance, max_sweeps, next, error)
         else
-          trial%accumulated_slip = now%accumulated_slip + norm2(trial%slip_increment, dim=3)
-          trial%dissipated_energy = now%dissipated_energy + dissipation(solver, trial)
+          call solver%solve_step(from, from%relative_displacement, goal, tolerance, max_sweeps, next, error)
         end if
-        slipped = slipped + trial%slip_increment
-        now = trial
+      end associate
+      if (allocated(error)) return
+      work = work + next%operator_applications
+      sweeps = sweeps + next%sweeps
+      if (next%converged) then
+        call add_slip(solver%problem, from, static, next)
+        if (from_entry) slipped = slipped + next%slip_increment
         done = done + part
-        if (done >= 1.0_wp .or. touches_rim(now)) exit
+        if (done >= 1.0_wp .or. touches_rim(next)) exit
+        now = next
+        from => now
       else
-        if (cuts == max_cuts) then
-          now = trial
-          exit
-        end if
+        if (cuts == max_cuts) exit
         cuts = cuts + 1
         part = 0.5_wp*part
       end if
     end do
-    next = now
     next%cuts = cuts
     next%sweeps = sweeps
     next%operator_applications = work
     if (.not. static .and. cuts > 0 .and. next%converged) then
       ! the slip of the step is that of all its parts
-      next%slip_increment = next%relative_displacement - state%relative_displacement
-      if (from_entry) next%slip_increment = slipped
+      if (from_entry) then
+        next%slip_increment = slipped
+      else
+        next%slip_increment = next%relative_displacement - state%relative_displacement
+      end if
       where (spread(next%pressure <= 0.0_wp, 3, 2)) next%slip_increment = 0.0_wp
     end if
   end subroutine advance
+
+  !> Add slip path and dissipated energy of a step, sum of A (-q . ds) [J], to those before.
+  subroutine add_slip(problem, before, static, state)
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: before
+    !> Nothing was before
+    logical, intent(in) :: static
+    !> State at its end
+    type(contact_state_t), intent(inout) :: state
+    real(wp) :: part(size(state%pressure, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(problem%n_threads)
+    do row = 1, size(part)
+      associate (q => state%traction(:, row, :), ds => state%slip_increment(:, row, :))
+        state%accumulated_slip(:, row) = norm2(ds, dim=2)
+        if (.not. static) state%accumulated_slip(:, row) = before%accumulated_slip(:, row) + state%accumulated_slip(:, row)
+        part(row) = dot_product(q(:, 1), ds(:, 1)) + dot_product(q(:, 2), ds(:, 2))
+      end associate
+    end do
+    !$omp end parallel do
+    state%dissipated_energy = -problem%lattice%cell_area()*sum(part)
+    if (.not. static) state%dissipated_energy = before%dissipated_energy + state%dissipated_energy
+  end subroutine add_slip
 
   !> Part of the way from a state to a target.
   pure type(load_target_t) function between(state, target, fraction)
@@ -118,13 +143,6 @@ contains
       end associate
     end if
   end function between
-
-  !> Energy that friction takes during a step, sum of A (-q . ds) [J].
-  real(wp) function dissipation(solver, state)
-    class(friction_solver_t), intent(in) :: solver
-    type(contact_state_t), intent(in) :: state
-    dissipation = -solver%problem%lattice%cell_area()*sum(state%traction*state%slip_increment)
-  end function dissipation
 
   !> Is there contact at the rim of the window?
   pure logical function touches_rim(state)

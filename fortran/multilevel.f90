@@ -92,13 +92,25 @@ contains
     !> Fine pressure (n_col, n_row)
     real(wp), intent(out) :: fine(:, :)
     real(wp), allocatable :: square(:, :)
-    real(wp) :: beyond
-    integer :: col, row, k, n, near(2), next(2)
+    real(wp) :: beyond, around(size(coarse, 1))
+    integer :: col, row, k, n, near(2), next(2), last
 
-    allocate (square, source=max(coarse, 0.0_wp)**2)
+    last = size(coarse, 1)
+    allocate (square(last, size(coarse, 2)))
+    !$omp parallel do schedule(static) private(beyond, around, col, k, n, near, next) if (size(coarse) >= worth_sharing)
     do row = 1, size(coarse, 2)
-      do col = 1, size(coarse, 1)
-        if (coarse(col, row) > 0.0_wp) cycle
+      square(:, row) = max(coarse(:, row), 0.0_wp)**2
+      ! the largest pressure of the neighbours tells whether there is anything to continue
+      around = 0.0_wp
+      do k = 1, size(neighbors, 2)
+        associate (c => neighbors(1, k), r => row + neighbors(2, k))
+          if (r < 1 .or. r > size(coarse, 2)) cycle
+          around(max(1, 1 - c):min(last, last - c)) = max(around(max(1, 1 - c):min(last, last - c)), &
+                                                          coarse(max(1, 1 + c):min(last, last + c), r))
+        end associate
+      end do
+      do col = 1, last
+        if (coarse(col, row) > 0.0_wp .or. .not. around(col) > 0.0_wp) cycle
         beyond = 0.0_wp
         n = 0
         do k = 1, size(neighbors, 2)
@@ -112,8 +124,13 @@ contains
         if (n > 0) square(col, row) = beyond/n
       end do
     end do
+    !$omp end parallel do
     call prolong(coarse_lattice, square, fine_lattice, fine)
-    fine = sqrt(max(fine, 0.0_wp))
+    !$omp parallel do schedule(static) if (size(fine) >= worth_sharing)
+    do row = 1, size(fine, 2)
+      fine(:, row) = sqrt(max(fine(:, row), 0.0_wp))
+    end do
+    !$omp end parallel do
   end subroutine prolong_edge
 
   !> Interpolate all components of a field.
@@ -149,6 +166,7 @@ contains
     integer :: col, row, k, n, near(2)
 
     allocate (ratio, mold=coarse)
+    !$omp parallel do schedule(static) private(col, k, n, near) if (size(coarse_pressure) >= worth_sharing)
     do row = 1, size(coarse, 2)
       do col = 1, size(coarse, 1)
         ratio(col, row, :) = 0.0_wp
@@ -168,10 +186,15 @@ contains
         if (n > 0) ratio(col, row, :) = ratio(col, row, :)/n
       end do
     end do
+    !$omp end parallel do
     call prolong_vector(coarse_lattice, ratio, fine_lattice, fine)
-    do k = 1, size(fine, 3)
-      fine(:, :, k) = fine(:, :, k)*max(fine_pressure, 0.0_wp)
+    !$omp parallel do schedule(static) private(k) if (size(fine_pressure) >= worth_sharing)
+    do row = 1, size(fine, 2)
+      do k = 1, size(fine, 3)
+        fine(:, row, k) = fine(:, row, k)*max(fine_pressure(:, row), 0.0_wp)
+      end do
     end do
+    !$omp end parallel do
   end subroutine prolong_shear
 
   !> Values of a field at the coarse nodes.

@@ -9,7 +9,7 @@ module hc_normal_iterate
   private
 
   public :: iterate_t, begin, rescale, balance, judge, take_set, press_punch, find_residual, projected_step, &
-            next_direction, step_share, advance, load_lack, fit_load
+            next_direction, step_share, advance, load_lack, fit_load, push_only
 
   !> Scale of the classification parameter: r = this/(2 pi lambda_1 a), a the contact radius.
   real(wp), parameter :: classification_scale = 10.0_wp
@@ -57,31 +57,50 @@ contains
     logical, intent(in) :: candidate(:, :)
     real(wp), intent(in) :: start(:, :)
     type(error_t), allocatable, intent(out) :: error
-    integer :: n(2), stat
+    real(wp) :: part(size(start, 2)), scale, largest
+    integer :: n(2), n_active, row, stat
+    logical :: known
 
     n = level%lattice%extent
     allocate (now%p(n(1), n(2)), now%w(n(1), n(2)), stat=stat)
-    if (stat == 0) allocate (now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
-                             source=0.0_sp, stat=stat)
+    if (stat == 0) allocate (now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), stat=stat)
     if (stat == 0) allocate (now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
       return
     end if
-    now%p = merge(max(start, 0.0_wp), 0.0_wp, candidate)
-    if (.not. any(now%p > 0.0_wp)) now%p = merge(1.0_wp, 0.0_wp, candidate)
+    known = any(start > 0.0_wp .and. candidate)
+    n_active = 0
+    largest = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(level%n_threads) reduction(+: n_active) reduction(max: largest)
+    do row = 1, n(2)
+      now%active(:, row) = candidate(:, row)
+      if (known) now%active(:, row) = candidate(:, row) .and. start(:, row) > 0.0_wp
+      now%p(:, row) = 1.0_wp
+      if (known) now%p(:, row) = start(:, row)
+      now%p(:, row) = merge(now%p(:, row), 0.0_wp, now%active(:, row))
+      now%w(:, row) = 0.0_wp
+      now%r(:, row, 1) = 0.0_sp
+      n_active = n_active + count(now%active(:, row))
+      largest = max(largest, maxval(now%p(:, row)))
+      part(row) = sum(now%p(:, row))
+    end do
+    !$omp end parallel do
+    now%n_active = n_active
     now%approach = target
-    if (by_load) now%p = target/(level%lattice%cell_area()*sum(sum(now%p, dim=1)))*now%p
-    now%active = now%p > 0.0_wp
-    now%n_active = count(now%active)
+    scale = 1.0_wp
+    if (by_load) scale = target/(level%lattice%cell_area()*sum(part))
     now%span(1, :) = n(1) + 1
     now%span(2, :) = 0
-    call find_span(now)
-    now%p_unit = maxval(now%p)
+    call find_span(now, level%n_threads)
+    now%p_unit = scale*largest
     now%w_unit = now%p_unit*level%preconditioner%unit
-    now%w = 0.0_wp
-    now%d(:, :, 1) = real(now%p/now%p_unit, sp)
-    now%p = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, n(2)
+      now%d(:, row, 1) = real(now%p(:, row)/largest, sp)
+      now%p(:, row) = 0.0_wp
+    end do
+    !$omp end parallel do
     call level%multiply(now%d, now%kd)
     call advance(level, now, 1.0_wp)
     if (.not. by_load) then
@@ -202,7 +221,7 @@ contains
     call move_alloc(next, now%active)
     call move_alloc(swap, next)
     now%n_active = now%n_next
-    call find_span(now)
+    call find_span(now, level%n_threads)
     call new_edge_extension(now%edge, now%active, level%n_threads)
     !$omp parallel do schedule(static) num_threads(level%n_threads)
     do row = 1, size(now%p, 2)
@@ -217,15 +236,18 @@ contains
   end subroutine take_set
 
   !> Columns between which the active nodes of each row lie, those of earlier sets included.
-  pure subroutine find_span(now)
+  subroutine find_span(now, n_threads)
     type(iterate_t), intent(inout) :: now
+    integer, intent(in) :: n_threads
     integer :: row
 
+    !$omp parallel do schedule(static) num_threads(n_threads)
     do row = 1, size(now%active, 2)
       if (.not. any(now%active(:, row))) cycle
       now%span(1, row) = min(now%span(1, row), findloc(now%active(:, row), .true., dim=1))
       now%span(2, row) = max(now%span(2, row), findloc(now%active(:, row), .true., dim=1, back=.true.))
     end do
+    !$omp end parallel do
   end subroutine find_span
 
   !> Sum in double precision, row by row: it does not depend on the number of threads.
@@ -439,6 +461,25 @@ contains
     !$omp end parallel do
     now%stale = now%stale + single_error*abs(lift)*largest
   end subroutine advance
+
+  !> Leave no tension: what is within the tolerance.
+  subroutine push_only(level, now, pulls)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    !> There was some
+    logical, intent(out) :: pulls
+    integer :: row
+
+    pulls = .false.
+    !$omp parallel do schedule(static) num_threads(level%n_threads) reduction(.or.: pulls)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        pulls = pulls .or. count(now%p(from:to, row) < 0.0_wp) > 0
+        now%p(from:to, row) = max(now%p(from:to, row), 0.0_wp)
+      end associate
+    end do
+    !$omp end parallel do
+  end subroutine push_only
 
   !> What the sum of the pressures lacks because of rounding.
   real(wp) function load_lack(level, now, pressures)

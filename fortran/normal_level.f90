@@ -81,6 +81,7 @@ contains
     type(rounded_kernel_t) :: rounded
     type(kernel_key_t) :: key
     logical :: found
+    integer :: block
 
     self%pair = pair
     self%compliance = normal_self_compliance(self%lattice, pair)
@@ -101,7 +102,11 @@ contains
       ! copied as fast as it would be found
       call self%single%take_spectra(found, error)
       if (allocated(error)) return
-      self%single%spectrum = real(self%flexibility%convolution%spectrum, sp)
+      !$omp parallel do schedule(static) num_threads(self%n_threads)
+      do block = 1, self%single%n_block
+        self%single%spectrum(:, block, 1) = real(self%flexibility%convolution%spectrum(:, block, 1), sp)
+      end do
+      !$omp end parallel do
     else
       key = new_kernel_key(of_pressure_rounded, self%lattice, pair)
       call self%single%take_spectra(found, error, cache, key)
@@ -130,12 +135,18 @@ contains
     type(contact_state_t), intent(inout) :: state
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    integer :: row
+
     self%flexibility%applications = 0.0_wp
     self%single_work = 0.0_wp
     call self%multiply_exactly(state%pressure, state%gap, error)
     if (allocated(error)) return
-    state%gap = self%initial_gap + state%gap - state%motion(normal)
-    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance)
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do row = 1, size(state%gap, 2)
+      state%gap(:, row) = self%initial_gap(:, row) + state%gap(:, row) - state%motion(normal)
+    end do
+    !$omp end parallel do
+    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%n_threads)
   end subroutine conclude_anew
 
   !> K d in single precision, in units of the preconditioner.

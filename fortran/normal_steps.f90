@@ -18,7 +18,7 @@ module hc_normal_steps
   use hc_contact_residuals, only: conclude
   use hc_normal_level, only: normal_level_t
   use hc_normal_iterate, only: iterate_t, begin, rescale, balance, judge, take_set, press_punch, find_residual, &
-                               projected_step, next_direction, step_share, advance, load_lack, fit_load
+                               projected_step, next_direction, step_share, advance, load_lack, fit_load, push_only
   implicit none
   private
 
@@ -54,6 +54,8 @@ contains
     type(iterate_t) :: now
     real(wp), allocatable :: start(:, :)
     real(wp) :: delta
+    logical :: pulls
+    integer :: row
 
     level%flexibility%applications = 0.0_wp
     level%single_work = 0.0_wp
@@ -66,16 +68,18 @@ contains
     else
       call iterate(level, now, control == force_control, target, tolerance, max_sweeps, start, state%sweeps, error)
       if (allocated(error)) return
-      if (any(now%p < 0.0_wp)) then                                            ! within the tolerance
-        now%p = max(now%p, 0.0_wp)
-        if (level%exact) call find_closing(level, now, error)
-        if (allocated(error)) return
-      end if
-      state%gap = level%initial_gap + now%w - now%approach
+      call push_only(level, now, pulls)
+      if (pulls .and. level%exact) call find_closing(level, now, error)
+      if (allocated(error)) return
+      !$omp parallel do schedule(static) num_threads(level%n_threads)
+      do row = 1, size(now%w, 2)
+        state%gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
+      end do
+      !$omp end parallel do
       call move_alloc(now%p, state%pressure)
       state%motion(normal) = now%approach
     end if
-    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance)
+    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%n_threads)
   end subroutine solve_level
 
   !> Iterations up to the tolerance.

@@ -10,6 +10,9 @@ module hc_packing
 
   public :: packing_t, new_packing
 
+  !> Nodes that one thread looks through at a time.
+  integer, parameter :: block_size = 8192
+
   !> Runs of active nodes.
   type :: packing_t
     !> Number of active nodes
@@ -30,40 +33,85 @@ module hc_packing
 
 contains
 
-  !> Find the runs of active nodes.
-  pure subroutine new_packing(self, active, n_threads)
+  !> Find the runs of active nodes; they end at the ends of blocks, too.
+  subroutine new_packing(self, active, n_threads)
     !> Packing to be set up
     type(packing_t), intent(out) :: self
     !> Active nodes
     logical, intent(in), contiguous :: active(:)
     !> Threads to use
     integer, intent(in) :: n_threads
-    integer :: i, k, n_run
-    logical :: before
+    !> Where the runs of each block begin in the list, less one
+    integer :: before((size(active) + block_size - 1)/block_size + 1)
+    integer :: k, n_block
 
-    n_run = 0
-    before = .false.
-    do i = 1, size(active)
-      if (active(i) .and. .not. before) n_run = n_run + 1
-      before = active(i)
+    n_block = size(before) - 1
+    before(1) = 0
+    !$omp parallel do schedule(static) num_threads(n_threads)
+    do k = 1, n_block
+      before(k + 1) = count_runs(active(start(k):min(start(k + 1) - 1, size(active))))
     end do
-    allocate (self%first(n_run), self%last(n_run), self%place(n_run))
-    k = 0
-    before = .false.
-    do i = 1, size(active)
-      if (active(i) .and. .not. before) then
-        k = k + 1
-        self%first(k) = i
-      end if
-      if (active(i)) self%last(k) = i
-      before = active(i)
+    !$omp end parallel do
+    do k = 1, n_block
+      before(k + 1) = before(k) + before(k + 1)
     end do
-    do k = 1, n_run
+    associate (n_run => before(n_block + 1))
+      allocate (self%first(n_run), self%last(n_run), self%place(n_run))
+    end associate
+    !$omp parallel do schedule(static) num_threads(n_threads)
+    do k = 1, n_block
+      if (before(k + 1) == before(k)) cycle
+      call list_runs(active(start(k):min(start(k + 1) - 1, size(active))), start(k) - 1, &
+                     self%first(before(k) + 1:before(k + 1)), self%last(before(k) + 1:before(k + 1)))
+    end do
+    !$omp end parallel do
+    do k = 1, size(self%first)
       self%place(k) = self%n_active + 1
       self%n_active = self%n_active + self%last(k) - self%first(k) + 1
     end do
     self%n_threads = n_threads
+
+  contains
+
+    !> First node of a block.
+    pure integer function start(block)
+      integer, intent(in) :: block
+      start = (block - 1)*block_size + 1
+    end function start
+
   end subroutine new_packing
+
+  !> Number of runs of active nodes.
+  pure integer function count_runs(active)
+    logical, intent(in), contiguous :: active(:)
+    count_runs = merge(1, 0, active(1)) + count(active(2:) .and. .not. active(:size(active) - 1))
+  end function count_runs
+
+  !> Runs of active nodes.
+  pure subroutine list_runs(active, shift, first, last)
+    logical, intent(in), contiguous :: active(:)
+    !> What the nodes are shifted by
+    integer, intent(in) :: shift
+    !> First and last node of each run
+    integer, intent(inout), contiguous :: first(:), last(:)
+    integer :: i, k
+    logical :: before
+
+    k = 0
+    before = .false.
+    do i = 1, size(active)
+      if (active(i) .neqv. before) then
+        if (active(i)) then
+          k = k + 1
+          first(k) = shift + i
+        else
+          last(k) = shift + i - 1
+        end if
+      end if
+      before = active(i)
+    end do
+    if (before) last(k) = shift + size(active)
+  end subroutine list_runs
 
   !> The active nodes of a field.
   subroutine pack_field(self, field, packed)

@@ -55,6 +55,8 @@ contains
     if (present(n_threads)) self%n_threads = n_threads
     if (present(cache)) self%cache => cache
     call new_frictional_contact(self%whole, problem, error, n_threads, self%cache)
+    if (allocated(error)) return
+    self%problem%n_threads = self%whole%problem%n_threads
   end subroutine new_windowed_friction
 
   !> Bytes that a problem takes, for a window of the given size.

@@ -54,8 +54,8 @@ module hc_convolution
     complex(wp), allocatable, private :: work(:, :, :)
     !> Two padded rows before and after their transform, for each thread
     complex(wp), allocatable, private :: row_buffer(:, :, :)
-    !> One column block of each component for each thread
-    complex(wp), allocatable, private :: block_buffer(:, :, :)
+    !> One column block of each component before and after its transform, for each thread; column by column
+    complex(wp), allocatable, private :: block_buffer(:, :, :, :)
   contains
     !> Sums of weighted convolutions
     procedure :: convolve
@@ -120,7 +120,7 @@ contains
     associate (column => self%width*padded(2))
       ! the columns that only fill up the last block are transformed too: zeros stay zeros
       allocate (self%work(self%leading, even(extent(2)), n_component), self%row_buffer(padded(1), 2, self%n_threads), &
-                self%block_buffer(column, n_component, self%n_threads), source=(0.0_wp, 0.0_wp), stat=stat)
+                self%block_buffer(column, n_component, 2, self%n_threads), source=(0.0_wp, 0.0_wp), stat=stat)
     end associate
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
@@ -204,7 +204,7 @@ contains
     n_row = extent(2)
     length = padded(2)
     convolution_memory = n_kernel*leading*length + 2*(n_component + n_kernel)*leading*n_row &
-                         + n_threads*(4*padded(1) + 2*n_component*width*length)
+                         + n_threads*(4*padded(1) + 4*n_component*width*length)
     convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
   end function convolution_memory
 
@@ -235,8 +235,8 @@ contains
     self%row_plan = fftw_plan_many_dft(1_c_int, length, 1_c_int, self%row_buffer(:, 1, 1), length, 1_c_int, n1, &
                                        self%row_buffer(:, 2, 1), length, 1_c_int, n1, fftw_forward, fftw_estimate)
     length = self%padded(2)
-    self%column_plan = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer, length, width, 1_c_int, &
-                                          self%block_buffer, length, width, 1_c_int, fftw_forward, fftw_estimate)
+    self%column_plan = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer(:, 1, 1, 1), length, 1_c_int, length(1), &
+                                          self%block_buffer(:, 1, 2, 1), length, 1_c_int, length(1), fftw_forward, fftw_estimate)
     !$omp end critical (hc_fftw_planner)
     if (.not. (c_associated(self%row_plan) .and. c_associated(self%column_plan))) then
       call raise(error, status%resources, 'FFTW could not plan the transforms of this window')
@@ -258,7 +258,7 @@ contains
     complex(wp), allocatable :: rows(:, :, :)
     real(wp), allocatable :: kernel(:, :, :)
     real(wp) :: scale, sign
-    integer :: n(2), n_kernel, j, m, b, thread, stat, from, to
+    integer :: n(2), n_kernel, j, m, b, column, thread, stat, from
 
     n = self%extent
     n_kernel = size(self%spectrum, 3)
@@ -270,7 +270,7 @@ contains
     end if
 
     thread = 1
-    !$omp parallel num_threads(self%n_threads) private(j, m, b, kernel, sign, from, to) firstprivate(thread)
+    !$omp parallel num_threads(self%n_threads) private(j, m, b, column, kernel, sign, from) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     allocate (kernel(n_kernel, 1 - n(1):n(1) - 1, 2))
     !$omp do schedule(dynamic)
@@ -296,20 +296,21 @@ contains
     !$omp do schedule(dynamic)
     do b = 1, self%n_block
       from = (b - 1)*self%width + 1
-      to = b*self%width
       do m = 1, n_kernel
         sign = merge(1.0_wp, -1.0_wp, m < self%first_odd)
-        associate (buffer => self%block_buffer(:, 1, thread), w => self%width)
-          buffer = 0.0_wp
-          do j = 0, n(2) - 1
-            buffer(j*w + 1:(j + 1)*w) = rows(from:to, j, m)
-            if (j > 0) buffer((self%padded(2) - j)*w + 1:(self%padded(2) - j + 1)*w) = sign*conjg(rows(from:to, j, m))
+        associate (given => self%block_buffer(:, 1, 1, thread), transformed => self%block_buffer(:, 1, 2, thread), &
+                   length => self%padded(2))
+          call gather_columns(self%width, n(2), self%leading, length, rows(from, 0, m), given)
+          do column = 0, self%width - 1
+            associate (line => given(column*length + 1:(column + 1)*length))
+              line(length - n(2) + 2:) = sign*conjg(line(n(2):2:-1))
+            end associate
           end do
-          call fftw_execute_dft(self%column_plan, buffer, buffer)
+          call fftw_execute_dft(self%column_plan, given, transformed)
           if (m < self%first_odd) then
-            self%spectrum(:, b, m) = real(buffer, wp)
+            self%spectrum(:, b, m) = real(transformed, wp)
           else
-            self%spectrum(:, b, m) = aimag(buffer)
+            self%spectrum(:, b, m) = aimag(transformed)
           end if
         end associate
       end do
@@ -328,9 +329,9 @@ contains
     integer :: column, row
 
     allocate (f(2, self%width*self%padded(2)))
-    do row = 1, self%padded(2)
-      do column = 1, self%width
-        f(:, (row - 1)*self%width + column) = [(b - 1)*self%width + column - 1, row - 1]
+    do column = 1, self%width
+      do row = 1, self%padded(2)
+        f(:, (column - 1)*self%padded(2) + row) = [(b - 1)*self%width + column - 1, row - 1]
       end do
     end do
   end function frequencies
@@ -362,7 +363,7 @@ contains
     !$omp barrier
     !$omp do schedule(static)
     do b = 1, self%n_block
-      call convolve_block(self, b, kernel, self%block_buffer(:, :, thread))
+      call convolve_block(self, b, kernel, self%block_buffer(:, :, 1, thread), self%block_buffer(:, :, 2, thread))
     end do
     !$omp end do
     do o = 1, size(result, 3)
@@ -410,58 +411,79 @@ contains
   end subroutine transform_rows
 
   !> Transform a block of columns, multiply with the spectra, transform back (the conjugate, that is).
-  subroutine convolve_block(self, b, kernel, buffer)
+  subroutine convolve_block(self, b, kernel, given, transformed)
     class(convolution_t), intent(inout) :: self
     !> Index of the block
     integer, intent(in) :: b
     !> Number of the kernel (onto, from), negative to reverse its sign
     integer, intent(in) :: kernel(:, :)
     !> Scratch (width*padded(2), component)
-    complex(wp), intent(inout), contiguous :: buffer(:, :)
+    complex(wp), intent(inout), contiguous :: given(:, :), transformed(:, :)
 
-    integer :: n_row, w, i, o, first
+    integer :: i, o, first
 
-    w = self%width
-    n_row = self%extent(2)
-    first = (b - 1)*w + 1
+    first = (b - 1)*self%width + 1
     do i = 1, size(kernel, 2)
-      call copy_columns(w, n_row, self%leading, w, self%work(first, 1, i), buffer(:, i))
-      buffer(n_row*w + 1:, i) = 0.0_wp
-      call fftw_execute_dft(self%column_plan, buffer(:, i), buffer(:, i))
+      call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%work(first, 1, i), given(:, i))
+      call fftw_execute_dft(self%column_plan, given(:, i), transformed(:, i))
     end do
 
     if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
-      call multiply_one(size(buffer, 1), self%spectrum(:, b, kernel(1, 1)), buffer(:, 1))
+      call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
     else
-      call multiply(self%spectrum(:, b, :), self%first_odd, kernel, buffer)
+      call multiply(self%spectrum(:, b, :), self%first_odd, kernel, transformed, given)
     end if
 
     do o = 1, size(kernel, 1)
-      call fftw_execute_dft(self%column_plan, buffer(:, o), buffer(:, o))
-      call copy_columns(w, n_row, w, self%leading, buffer(:, o), self%work(first, 1, o))
+      call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))
+      call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), self%work(first, 1, o))
     end do
   end subroutine convolve_block
 
-  !> Columns of a matrix from one place to another; their number is a multiple of four.
-  pure subroutine copy_columns(width, n_row, from_leading, onto_leading, from, onto)
-    !> Number of columns and rows
-    integer, intent(in) :: width, n_row
-    !> Distance of two rows where they are and where they go
-    integer, intent(in) :: from_leading, onto_leading
-    !> Where they are and where they go
-    complex(wp), intent(in) :: from(from_leading*(n_row - 1) + width)
-    complex(wp), intent(inout) :: onto(onto_leading*(n_row - 1) + width)
-    integer :: row, k, i, o
+  !> Columns of a matrix one after the other, padded with zeros; their number is a multiple of four.
+  !>
+  !> Transforms of contiguous columns out of place take half to two thirds of the time of interleaved ones in place.
+  pure subroutine gather_columns(width, n_row, leading, length, matrix, columns)
+    !> Number of columns and rows, distance of two rows, length of a padded column
+    integer, intent(in) :: width, n_row, leading, length
+    !> The matrix, from the first of the columns on
+    complex(wp), intent(in) :: matrix(leading*(n_row - 1) + width)
+    !> The columns
+    complex(wp), intent(inout) :: columns(0:length - 1, 0:width - 1)
+    integer :: row, k, i
 
-    ! in pieces of fixed length, so that short rows do not cost a call each
     do row = 0, n_row - 1
-      i = row*from_leading
-      o = row*onto_leading
-      do k = 1, width, 4
-        onto(o + k:o + k + 3) = from(i + k:i + k + 3)
+      i = row*leading
+      do k = 0, width - 4, 4
+        columns(row, k) = matrix(i + k + 1)
+        columns(row, k + 1) = matrix(i + k + 2)
+        columns(row, k + 2) = matrix(i + k + 3)
+        columns(row, k + 3) = matrix(i + k + 4)
       end do
     end do
-  end subroutine copy_columns
+    columns(n_row:, :) = 0.0_wp
+  end subroutine gather_columns
+
+  !> The way back, without the padding.
+  pure subroutine scatter_columns(width, n_row, length, leading, columns, matrix)
+    !> Number of columns and rows, length of a padded column, distance of two rows
+    integer, intent(in) :: width, n_row, length, leading
+    !> The columns
+    complex(wp), intent(in) :: columns(0:length - 1, 0:width - 1)
+    !> The matrix, from the first of the columns on
+    complex(wp), intent(inout) :: matrix(leading*(n_row - 1) + width)
+    integer :: row, k, i
+
+    do row = 0, n_row - 1
+      i = row*leading
+      do k = 0, width - 4, 4
+        matrix(i + k + 1) = columns(row, k)
+        matrix(i + k + 2) = columns(row, k + 1)
+        matrix(i + k + 3) = columns(row, k + 2)
+        matrix(i + k + 4) = columns(row, k + 3)
+      end do
+    end do
+  end subroutine scatter_columns
 
   !> Run the transforms of one scalar product and nothing else, to compare times with.
   subroutine time_transforms(self)
@@ -479,7 +501,7 @@ contains
       !$omp end do
       !$omp do schedule(static)
       do b = 1, self%n_block
-        call fftw_execute_dft(self%column_plan, self%block_buffer(:, 1, thread), self%block_buffer(:, 1, thread))
+        call fftw_execute_dft(self%column_plan, self%block_buffer(:, 1, 1, thread), self%block_buffer(:, 1, 2, thread))
       end do
       !$omp end do
     end do

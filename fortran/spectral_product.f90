@@ -15,44 +15,46 @@ module hc_spectral_product
 contains
 
   !> One field and one even kernel, the whole operator of frictionless contact: conjg(spectrum * field).
-  pure subroutine multiply_one(n, spectrum, field)
+  pure subroutine multiply_one(n, spectrum, field, total)
     !> Number of frequencies
     integer, intent(in) :: n
     !> Spectrum of the kernel
     real(wp), intent(in) :: spectrum(n)
-    !> Transformed field, replaced by the result
-    complex(wp), intent(inout) :: field(n)
+    !> Transformed field and result
+    complex(wp), intent(in) :: field(n)
+    complex(wp), intent(inout) :: total(n)
     integer :: f
 
     do f = 1, n
-      field(f) = cmplx(spectrum(f)*real(field(f), wp), -spectrum(f)*aimag(field(f)), wp)
+      total(f) = cmplx(spectrum(f)*real(field(f), wp), -spectrum(f)*aimag(field(f)), wp)
     end do
   end subroutine multiply_one
 
   !> Up to three fields and any kernels: the conjugates of the sums over the fields.
-  pure subroutine multiply(spectrum, first_odd, kernel, buffer)
+  pure subroutine multiply(spectrum, first_odd, kernel, field, total)
     !> Spectra (frequency, kernel); those of odd kernels are divided by i
     real(wp), intent(in) :: spectrum(:, :)
     !> The first odd kernel
     integer, intent(in) :: first_odd
     !> Number of the kernel (onto, from), negative to reverse its sign
     integer, intent(in) :: kernel(:, :)
-    !> Transformed fields, replaced by the results
-    complex(wp), intent(inout), contiguous :: buffer(:, :)
+    !> Transformed fields and results (frequency, from and onto)
+    complex(wp), intent(in), contiguous :: field(:, :)
+    complex(wp), intent(inout), contiguous :: total(:, :)
 
     integer, parameter :: plain = 1, rotated = 2
     !> Fields as they are and times i (frequency, from)
-    complex(wp) :: field(chunk, 3, 2)
+    complex(wp) :: part(chunk, 3, 2)
     integer :: i, o, start, last, m, n_from, turn(3), k(3)
     real(wp) :: sign(3)
 
     n_from = size(kernel, 2)
-    do start = 1, size(buffer, 1), chunk
-      last = min(start + chunk - 1, size(buffer, 1))
+    do start = 1, size(field, 1), chunk
+      last = min(start + chunk - 1, size(field, 1))
       m = last - start + 1
       do i = 1, n_from
-        field(:m, i, plain) = buffer(start:last, i)
-        if (any(abs(kernel(:, i)) >= first_odd)) call rotate(m, field(:, i, plain), field(:, i, rotated))
+        part(:m, i, plain) = field(start:last, i)
+        if (any(abs(kernel(:, i)) >= first_odd)) call rotate(m, part(:, i, plain), part(:, i, rotated))
       end do
       do o = 1, size(kernel, 1)
         k(:n_from) = abs(kernel(o, :))
@@ -60,14 +62,14 @@ contains
         turn(:n_from) = merge(rotated, plain, k(:n_from) >= first_odd)
         select case (n_from)
         case (1)
-          call add_1(m, sign, spectrum(start:last, k(1)), field(:, 1, turn(1)), buffer(start:last, o))
+          call add_1(m, sign, spectrum(start:last, k(1)), part(:, 1, turn(1)), total(start:last, o))
         case (2)
-          call add_2(m, sign, spectrum(start:last, k(1)), field(:, 1, turn(1)), &
-                     spectrum(start:last, k(2)), field(:, 2, turn(2)), buffer(start:last, o))
+          call add_2(m, sign, spectrum(start:last, k(1)), part(:, 1, turn(1)), &
+                     spectrum(start:last, k(2)), part(:, 2, turn(2)), total(start:last, o))
         case default
-          call add_3(m, sign, spectrum(start:last, k(1)), field(:, 1, turn(1)), &
-                     spectrum(start:last, k(2)), field(:, 2, turn(2)), &
-                     spectrum(start:last, k(3)), field(:, 3, turn(3)), buffer(start:last, o))
+          call add_3(m, sign, spectrum(start:last, k(1)), part(:, 1, turn(1)), &
+                     spectrum(start:last, k(2)), part(:, 2, turn(2)), &
+                     spectrum(start:last, k(3)), part(:, 3, turn(3)), total(start:last, o))
         end select
       end do
     end do

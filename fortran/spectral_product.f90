@@ -31,7 +31,7 @@ contains
   end subroutine multiply_one
 
   !> Up to three fields and any kernels: the conjugates of the sums over the fields.
-  pure subroutine multiply(spectrum, first_odd, kernel, field, total)
+  subroutine multiply(spectrum, first_odd, kernel, field, total)
     !> Spectra (frequency, kernel); those of odd kernels are divided by i
     real(wp), intent(in) :: spectrum(:, :)
     !> The first odd kernel
@@ -39,13 +39,16 @@ contains
     !> Number of the kernel (onto, from), negative to reverse its sign
     integer, intent(in) :: kernel(:, :)
     !> Transformed fields and results (frequency, from and onto)
-    complex(wp), intent(in), contiguous :: field(:, :)
+    complex(wp), intent(in), contiguous, target :: field(:, :)
     complex(wp), intent(inout), contiguous :: total(:, :)
 
-    integer, parameter :: plain = 1, rotated = 2
-    !> Fields as they are and times i (frequency, from)
-    complex(wp) :: part(chunk, 3, 2)
-    integer :: i, o, start, last, m, n_from, turn(3), k(3)
+    type :: part_t
+      complex(wp), pointer, contiguous :: value(:)
+    end type part_t
+    !> Fields times i (frequency, from)
+    complex(wp), target :: rotated(chunk, 3)
+    type(part_t) :: part(3)
+    integer :: i, o, start, last, m, n_from, k(3)
     real(wp) :: sign(3)
 
     n_from = size(kernel, 2)
@@ -53,23 +56,27 @@ contains
       last = min(start + chunk - 1, size(field, 1))
       m = last - start + 1
       do i = 1, n_from
-        part(:m, i, plain) = field(start:last, i)
-        if (any(abs(kernel(:, i)) >= first_odd)) call rotate(m, part(:, i, plain), part(:, i, rotated))
+        if (any(abs(kernel(:, i)) >= first_odd)) call rotate(m, field(start:last, i), rotated(:, i))
       end do
       do o = 1, size(kernel, 1)
         k(:n_from) = abs(kernel(o, :))
         sign(:n_from) = merge(1.0_wp, -1.0_wp, kernel(o, :) > 0)
-        turn(:n_from) = merge(rotated, plain, k(:n_from) >= first_odd)
+        do i = 1, n_from
+          if (k(i) >= first_odd) then
+            part(i)%value => rotated(:m, i)
+          else
+            part(i)%value => field(start:last, i)
+          end if
+        end do
         select case (n_from)
         case (1)
-          call add_1(m, sign, spectrum(start:last, k(1)), part(:, 1, turn(1)), total(start:last, o))
+          call add_1(m, sign, spectrum(start:last, k(1)), part(1)%value, total(start:last, o))
         case (2)
-          call add_2(m, sign, spectrum(start:last, k(1)), part(:, 1, turn(1)), &
-                     spectrum(start:last, k(2)), part(:, 2, turn(2)), total(start:last, o))
+          call add_2(m, sign, spectrum(start:last, k(1)), part(1)%value, spectrum(start:last, k(2)), part(2)%value, &
+                     total(start:last, o))
         case default
-          call add_3(m, sign, spectrum(start:last, k(1)), part(:, 1, turn(1)), &
-                     spectrum(start:last, k(2)), part(:, 2, turn(2)), &
-                     spectrum(start:last, k(3)), part(:, 3, turn(3)), total(start:last, o))
+          call add_3(m, sign, spectrum(start:last, k(1)), part(1)%value, spectrum(start:last, k(2)), part(2)%value, &
+                     spectrum(start:last, k(3)), part(3)%value, total(start:last, o))
         end select
       end do
     end do

@@ -10,6 +10,7 @@ program tester
   use test_pyramid_influence, only: collect_pyramid_influence
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
+  use test_vectors, only: collect_vectors
   use test_contact, only: collect_contact
   use test_normal_contact, only: collect_normal_contact
   use test_friction, only: collect_friction
@@ -28,6 +29,7 @@ program tester
     new_suite('pyramid_influence', collect_pyramid_influence), &
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
+    new_suite('vectors', collect_vectors), &
     new_suite('contact', collect_contact), &
     new_suite('normal_contact', collect_normal_contact), &
     new_suite('friction', collect_friction), &

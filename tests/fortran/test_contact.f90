@@ -6,7 +6,8 @@ module test_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control, normal
   use hc_contact_residuals, only: normal_residual, force_residual
-  use hc_krylov, only: linear_system_t, projected_cg, precondition_constraints, fulfil, dot
+  use hc_krylov, only: linear_system_t, projected_cg, precondition_constraints, fulfil
+  use hc_vectors, only: dot
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use testing, only: test_t, new_test, check, check_raised, check_true
@@ -162,20 +163,20 @@ contains
     candidate = .true.
     p(:, 1) = [10.0_wp, 4.0_wp, 0.0_wp]
     g(:, 1) = [0.0_wp, 0.0_wp, 1.0_wp]
-    call check(error, normal_residual(p, g, candidate, 0.5_wp), 0.0_wp, 0.0_wp, 'no violation')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.0_wp, 0.0_wp, 'no violation')
     if (allocated(error)) return
     g(1, 1) = -0.05_wp
-    call check(error, normal_residual(p, g, candidate, 0.5_wp), 0.01_wp, 1.0e-15_wp, 'penetration')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.01_wp, 1.0e-15_wp, 'penetration')
     if (allocated(error)) return
     g(1, 1) = 0.25_wp
-    call check(error, normal_residual(p, g, candidate, 0.5_wp), 0.05_wp, 1.0e-15_wp, 'pressure across a gap')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.05_wp, 1.0e-15_wp, 'pressure across a gap')
     if (allocated(error)) return
     g(1, 1) = 0.0_wp
     p(2, 1) = -3.0_wp
-    call check(error, normal_residual(p, g, candidate, 0.5_wp), 0.3_wp, 1.0e-15_wp, 'tension')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.3_wp, 1.0e-15_wp, 'tension')
     if (allocated(error)) return
     candidate(2, 1) = .false.
-    call check(error, normal_residual(p, g, candidate, 0.5_wp), 0.0_wp, 0.0_wp, 'not a candidate')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.0_wp, 0.0_wp, 'not a candidate')
     if (allocated(error)) return
     call check(error, force_residual(99.0_wp, 100.0_wp), 0.01_wp, 1.0e-15_wp, 'load')
   end subroutine test_residuals

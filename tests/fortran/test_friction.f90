@@ -158,7 +158,7 @@ contains
       character(len=*), intent(in) :: what
       real(wp), parameter :: p(3, 1) = reshape([10.0_wp, 4.0_wp, 0.0_wp], [3, 1])
 
-      call check(error, tangential_residual(q, ds, p, coulomb_t(0.5_wp), 0.5_wp), expected, 1.0e-15_wp, what)
+      call check(error, tangential_residual(q, ds, p, coulomb_t(0.5_wp), 0.5_wp, 1), expected, 1.0e-15_wp, what)
     end subroutine violation
 
   end subroutine test_tangential_residual
@@ -173,16 +173,16 @@ contains
     q(:, 1, 2) = [0.0_wp, 400.0_wp]
     ds = 0.0_wp
     ds(1, 1, 1) = 0.5_wp
-    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp), 1.0_wp/400.0_wp, 1.0e-15_wp, &
+    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp, 1), 1.0_wp/400.0_wp, 1.0e-15_wp, &
                'no slip: the largest traction')
     if (allocated(error)) return
     q = 0.0_wp
-    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp), 100.0_wp, 1.0e-12_wp, &
+    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp, 1), 100.0_wp, 1.0e-12_wp, &
                'no slip and no traction: a thousandth of the largest pressure')
     if (allocated(error)) return
-    call check(error, tangential_residual(q, ds, p, coulomb_t(0.0_wp), 0.5_wp), 0.0_wp, 0.0_wp, 'any slip without friction')
+    call check(error, tangential_residual(q, ds, p, coulomb_t(0.0_wp), 0.5_wp, 1), 0.0_wp, 0.0_wp, 'any slip without friction')
     if (allocated(error)) return
-    call check(error, tangential_residual(q, ds, 0.0_wp*p, coulomb_t(0.5_wp), 0.5_wp), 0.0_wp, 0.0_wp, 'no contact')
+    call check(error, tangential_residual(q, ds, 0.0_wp*p, coulomb_t(0.5_wp), 0.5_wp, 1), 0.0_wp, 0.0_wp, 'no contact')
   end subroutine test_residual_scales
 
   !> d_t = (lambda_1 + lambda_5/2) K1(0), K1(0) = (3 sqrt(3)/2) ln 3 spacings.

@@ -322,7 +322,7 @@ contains
     if (allocated(error)) return
     allocate (candidate(150, 150), source=.true.)
     residual = normal_residual(state%pressure, gap + w(:, :, 1) - state%motion(normal), candidate, &
-                               normal_self_compliance(lattice, pair))
+                               normal_self_compliance(lattice, pair), 1)
     call check_true(error, state%converged, 'converged')
     if (allocated(error)) return
     call check(error, residual, state%residual_normal, 0.1_wp*tolerance, 'residual')

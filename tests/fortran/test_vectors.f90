@@ -1,0 +1,180 @@
+!> Long vectors and packed ones: whatever the number of threads, the same bits.
+module test_vectors
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_friction_law, only: linearize, on_cone
+  use hc_friction_rows, only: cone_row, residual_row, soften_row, unbounded, zone_row
+  use hc_contact_state, only: separated
+  use hc_packing, only: packing_t, new_packing
+  use hc_vectors, only: add, add_columns, copy, dot, fill, maximum, total
+  use testing, only: test_t, new_test, check, check_true
+  implicit none
+  private
+
+  public :: collect_vectors
+
+contains
+
+  subroutine collect_vectors(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('vectors', test_sums), &
+      new_test('packing', test_packing), &
+      new_test('rows_like_nodes', test_rows), &
+      new_test('springs', test_springs) &
+    ]
+  end subroutine collect_vectors
+
+  !> A vector of more than two blocks whose elements are nothing round.
+  pure function sample(n)
+    integer, intent(in) :: n
+    real(wp) :: sample(n)
+    integer :: i
+    sample = [(sin(1.7_wp*i) + 0.3_wp*cos(0.9_wp*i*i), i=1, n)]
+  end function sample
+
+  subroutine test_sums(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 10001
+    real(wp) :: x(n), y(n), b(n, 2)
+    integer :: n_threads
+
+    x = sample(n)
+    b(:, 1) = x**2
+    b(:, 2) = 1.0_wp - x
+    do n_threads = 1, 3
+      call check(error, total(x, n_threads), sum(x), 1.0e-12_wp, 'sum')
+      if (allocated(error)) return
+      call check_true(error, .not. abs(total(x, n_threads) - total(x, 1)) > 0.0_wp, 'the sum does not depend on threads')
+      if (allocated(error)) return
+      call check_true(error, .not. abs(dot(x, b(:, 1), n_threads) - dot(x, b(:, 1), 1)) > 0.0_wp, 'nor does a product')
+      if (allocated(error)) return
+      call check(error, dot(x, b(:, 1), n_threads), sum(x**3), 1.0e-12_wp, 'product')
+      if (allocated(error)) return
+      call check(error, maximum(x, n_threads), maxval(x), 0.0_wp, 'largest')
+      if (allocated(error)) return
+      call check(error, maximum(-abs(x) - 1.0_wp, n_threads), -minval(abs(x)) - 1.0_wp, 0.0_wp, 'largest of negative numbers')
+      if (allocated(error)) return
+      call fill(y, 0.25_wp, n_threads)
+      call add(x, y, n_threads)
+      call add_columns(b, [2.0_wp, -3.0_wp], y, n_threads)
+      call check(error, maxval(abs(y - (0.25_wp + x + 2.0_wp*b(:, 1) - 3.0_wp*b(:, 2)))), 0.0_wp, 1.0e-14_wp, 'combination')
+      if (allocated(error)) return
+      call copy(x, y, n_threads)
+      call check(error, maxval(abs(y - x)), 0.0_wp, 0.0_wp, 'copy')
+      if (allocated(error)) return
+    end do
+  end subroutine test_sums
+
+  !> Runs that begin and end anywhere, also across the blocks that threads look through.
+  subroutine test_packing(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 20011
+    type(packing_t) :: packing
+    logical :: active(n)
+    real(wp) :: x(n), back(n)
+    real(wp), allocatable :: packed(:)
+    integer :: pattern, n_threads
+
+    x = sample(n)
+    do pattern = 1, 5
+      select case (pattern)
+      case (1)
+        active = x > 0.2_wp
+      case (2)
+        active = .true.
+      case (3)
+        active = .false.
+      case (4)
+        ! one run from end to end but for its ends
+        active = .true.
+        active([1, n]) = .false.
+      case default
+        ! single nodes at the ends of blocks
+        active = .false.
+        active([1, 8192, 8193, 16384, n]) = .true.
+      end select
+      do n_threads = 1, 2
+        call new_packing(packing, active, n_threads)
+        call check_true(error, packing%n_active == count(active), 'number of active nodes')
+        if (allocated(error)) return
+        call check_true(error, sum(packing%last - packing%first + 1) == count(active), 'length of the runs')
+        if (allocated(error)) return
+        if (allocated(packed)) deallocate (packed)
+        allocate (packed(packing%n_active))
+        call packing%pack(x, packed)
+        call check_true(error, all(.not. abs(packed - pack(x, active)) > 0.0_wp), 'packed values')
+        if (allocated(error)) return
+        back = -7.0_wp
+        call packing%unpack(packed, back)
+        call check_true(error, all(.not. abs(back - merge(x, -7.0_wp, active)) > 0.0_wp), 'values put back')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_packing
+
+  !> Passes over a row say what the law of friction says node by node.
+  subroutine test_rows(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 301
+    real(wp), parameter :: mu = 0.4_wp, r = 2.0e12_wp, compliance = 3.0e-13_wp
+    real(wp), dimension(n) :: p, qx, qy, dsx, dsy, cut_x, cut_y
+    integer :: zone(n), expected, i
+    real(wp) :: unit, largest, worst, q(2), ds(2), cut(2), direction(2), d, lack
+
+    p = 1.0e9_wp*sample(n)
+    qx = 0.3_wp*p*cos(sample(n))
+    qy = 0.4e9_wp*sample(n)**2
+    dsx = 1.0e-4_wp*sample(n)
+    dsy = 1.0e-4_wp*sample(n)*qx/p
+    unit = 1.0_wp/maxval(p)
+    largest = 0.0_wp
+    worst = 0.0_wp
+    call zone_row(n, unit, mu, r, p, qx, qy, dsx, dsy, zone)
+    call cone_row(n, unit, mu, p, qx, qy, cut_x, cut_y)
+    call residual_row(n, unit, mu, 1.0_wp/compliance, p, qx, qy, dsx, dsy, largest, worst)
+    lack = 0.0_wp
+    do i = 1, n
+      q = [qx(i), qy(i)]
+      ds = [dsx(i), dsy(i)]
+      expected = separated
+      cut = 0.0_wp
+      if (p(i) > 0.0_wp) then
+        call linearize(q, ds, mu*p(i), mu/unit, r, expected, direction, d)
+        cut = on_cone(q, mu*p(i))
+        lack = max(lack, norm2(q - on_cone(q - ds/compliance, mu*p(i))))
+      end if
+      call check_true(error, zone(i) == expected, 'zone')
+      if (allocated(error)) return
+      call check(error, norm2(cut - [cut_x(i), cut_y(i)]), 0.0_wp, 1.0e-6_wp, 'traction on the cone [Pa]')
+      if (allocated(error)) return
+    end do
+    call check_true(error, count(zone == separated) > 9 .and. minval(zone) < maxval(zone) - 1, 'all zones are there')
+    if (allocated(error)) return
+    call check(error, sqrt(worst), unit*lack, 1.0e-14_wp, 'residual')
+    if (allocated(error)) return
+    call check(error, sqrt(largest), unit*maxval(hypot(qx, qy), mask=p > 0.0_wp), 1.0e-14_wp, 'largest traction')
+    if (allocated(error)) return
+    ! without slip nothing is cut off
+    call cone_row(n, unit, unbounded, p, qx, qy, cut_x, cut_y)
+    call check(error, maxval(hypot(cut_x - qx, cut_y - qy), mask=p > 0.0_wp), 0.0_wp, 0.0_wp, 'no slip')
+  end subroutine test_rows
+
+  !> A spring as soft as the node leaves half of the traction, and none leaves all; nothing becomes of nothing.
+  subroutine test_springs(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), dimension(4) :: qx, qy
+    real(wp), parameter :: compliance(4) = [0.0_wp, 2.0e-3_wp, 6.0e-3_wp, 2.0e-3_wp], none(4) = 0.0_wp, &
+                           u(4) = [1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp]
+
+    qx = [300.0_wp, 300.0_wp, 300.0_wp, 0.0_wp]
+    qy = [400.0_wp, 400.0_wp, 400.0_wp, 0.0_wp]
+    call soften_row(4, compliance, u, none, qx, qy)
+    call check(error, maxval(abs(qx - 300.0_wp*[1.0_wp, 0.5_wp, 0.25_wp, 0.0_wp])), 0.0_wp, 1.0e-12_wp, 'along x')
+    if (allocated(error)) return
+    call check(error, maxval(abs(qy - 400.0_wp*[1.0_wp, 0.5_wp, 0.25_wp, 0.0_wp])), 0.0_wp, 1.0e-12_wp, 'along y')
+  end subroutine test_springs
+
+end module test_vectors

@@ -24,7 +24,8 @@ contains
     real(wp), intent(in) :: unit, slope, stiffness
     !> Pressure, traction and slip of the step
     real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
-    !> Squares of the largest traction and of what is lacking most, in the unit of pressure: of the rows before, and now this one too
+    !> Squares of the largest traction and of what is lacking most, in the unit of pressure: those of the rows before,
+    !> and now of this one too
     real(wp), intent(inout) :: largest, worst
     real(wp) :: x, y, trial_x, trial_y, length, share
     integer :: i

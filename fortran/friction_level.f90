@@ -7,7 +7,7 @@ module hc_friction_level
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, along_x, force_control
   use hc_friction_problem, only: friction_problem_t
-  use hc_friction_systems, only: operators_t
+  use hc_friction_operators, only: operators_t
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_friction_sweep, only: staggered_sweep
   use hc_friction_newton, only: coupled_sweep

@@ -10,6 +10,7 @@ module hc_friction_newton
   use hc_error, only: error_t
   use hc_contact_state, only: normal, force_control
   use hc_driven_motions, only: driven_motions_t
+  use hc_friction_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t
   use hc_friction_sweep, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
   use hc_friction_systems, only: coupled_system_t
@@ -46,10 +47,10 @@ contains
 
     n = size(now%p)
     call now%find_gap(gap)
-    call now%find_contact(gap, contact)
+    call find_contact(now, gap, contact)
     call move_alloc(contact, now%contact)
     now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
-    call now%classify(.false., shear_active)
+    call classify(now, .false., shear_active)
     system%operators => now%operators
     system%shear => now%shear
     call now%pressure%take(now%contact)
@@ -68,7 +69,7 @@ contains
     x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
     where (.not. shear_active) x(n + 1:) = 0.0_wp
 
-    call now%constraints(shear_active, driven, shear_columns, shear_missing)
+    call find_constraints(now, shear_active, driven, shear_columns, shear_missing)
     n_shear = size(shear_missing)
     m = n_shear
     if (now%target%control(normal) == force_control) m = m + 1
@@ -102,7 +103,7 @@ contains
       call system%product(x, ax, error)
       if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
-      call now%wanted_displacement(rhs(n + 1:))
+      call find_wanted(now, rhs(n + 1:))
       weight(:n) = 1.0_wp/(now%problem%normal_compliance*maxval(now%p))
       weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &

@@ -18,7 +18,7 @@ module hc_friction_predictor
   use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t, slip, normal, force_control
   use hc_friction_law, only: magnitude
   use hc_friction_problem, only: friction_problem_t
-  use hc_friction_systems, only: operators_t
+  use hc_friction_operators, only: operators_t
   use hc_friction_level, only: solve_level
   use hc_multilevel, only: prolong, prolong_vector, restrict_field, restrict_vector
   implicit none

@@ -11,6 +11,7 @@ module hc_friction_sweep
   use hc_error, only: error_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_driven_motions, only: driven_motions_t
+  use hc_friction_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil
   use hc_vectors, only: copy, maximum, total
@@ -98,7 +99,7 @@ contains
           abs(missing(1)) <= final_accuracy*now%tolerance*carried) return
       changed = now%first .and. area == 1
       if (.not. (changed .and. now%cold)) then
-        call now%find_contact(gap, contact)
+        call find_contact(now, gap, contact)
         if (.not. changed) changed = count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if
@@ -155,9 +156,9 @@ contains
     call copy(now%q, q, now%shear%n_threads)
     holding = .false.
     do
-      call now%classify(holding, active)
+      call classify(now, holding, active)
       call now%shear%to_frame(now%q, x)
-      call now%constraints(active, driven, constraint, missing)
+      call find_constraints(now, active, driven, constraint, missing)
       multiplier = driven%multipliers(now%motion)
       call drag_shear(now, active, constraint, .false., mb, error)
       if (allocated(error)) return
@@ -171,7 +172,7 @@ contains
         call displace(now, x, ax, error)
         if (allocated(error)) return
         ! motions that are prescribed are known; the others are multipliers
-        call now%wanted_displacement(rhs)
+        call find_wanted(now, rhs)
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
         goal = goal*min(inner_accuracy, max(goal, merge(late_accuracy, 1.0e-3_wp, now%pressing)))

@@ -13,14 +13,10 @@
 module hc_friction_systems
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
-  use hc_lattice, only: lattice_t
-  use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
-  use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
-  use hc_kernel_cache, only: kernel_cache_t
   use hc_spring_blend, only: node_compliance, blend
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
+  use hc_friction_operators, only: operators_t
   use hc_friction_rows, only: soften_row
   use hc_krylov, only: linear_system_t
   use hc_packing, only: packing_t, new_packing
@@ -28,28 +24,12 @@ module hc_friction_systems
   implicit none
   private
 
-  public :: operators_t, new_operators, operators_memory
   public :: pressure_system_t, shear_system_t, new_shear_system, coupled_system_t
 
   !> Components of the shear traction
   integer, parameter :: shear(2) = [along_x, along_y]
   !> Nodes that one thread takes at a time
   integer, parameter :: row_block = 4096
-
-  !> Operator and preconditioners over one window, and the work they did.
-  type :: operators_t
-    type(fft_flexibility_t) :: flexibility
-    type(preconditioner_t) :: normal, tangential
-    !> Threads that share the vector operations
-    integer :: n_threads = 1
-    !> Work of the preconditioners, in applications of the full operator
-    real(wp) :: preconditioning = 0.0_wp
-  contains
-    !> Displacements that given components of the traction cause along others
-    procedure :: apply => apply_operators
-    !> All work so far, in applications of the full operator
-    procedure :: work
-  end type operators_t
 
   !> Pressure on the nodes in contact.
   type, extends(linear_system_t) :: pressure_system_t
@@ -114,85 +94,6 @@ module hc_friction_systems
 
 contains
 
-  !> Operator and preconditioners over a window.
-  subroutine new_operators(self, lattice, pair, error, n_threads, cache)
-    !> Operators to be set up
-    type(operators_t), intent(out) :: self
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
-    !> Allocated on failure: not enough memory
-    type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; absent or 0: as many as OpenMP would take
-    integer, intent(in), optional :: n_threads
-    !> Spectra that are kept
-    type(kernel_cache_t), pointer, intent(in), optional :: cache
-
-    call new_fft_flexibility(self%flexibility, lattice, pair, error, n_threads=n_threads, cache=cache)
-    if (allocated(error)) return
-    call new_preconditioner(self%normal, lattice, pair, error, n_threads, cache=cache)
-    if (allocated(error)) return
-    call new_preconditioner(self%tangential, lattice, pair, error, n_threads, tangential=.true., cache=cache)
-    self%n_threads = self%flexibility%convolution%n_threads
-  end subroutine new_operators
-
-  !> Bytes that operator and preconditioners take, for a window of the given size.
-  pure integer(selected_int_kind(18)) function operators_memory(extent, n_threads)
-    !> Number of columns and rows of the window
-    integer, intent(in) :: extent(2)
-    !> Threads to use
-    integer, intent(in) :: n_threads
-
-    operators_memory = fft_memory(extent, .false., n_threads) + preconditioner_memory(extent, n_threads, .false.) &
-                       + preconditioner_memory(extent, n_threads, .true.)
-  end function operators_memory
-
-  !> A product of some components, on vectors.
-  subroutine apply_operators(self, from, traction, onto, displacement, error)
-    class(operators_t), intent(inout) :: self
-    !> Components that act: normal, along_x, along_y
-    integer, intent(in) :: from(:)
-    !> Their values, one after the other [Pa]
-    real(wp), intent(in), contiguous, target :: traction(:)
-    !> Components that are wanted
-    integer, intent(in) :: onto(:)
-    !> Their values, one after the other [m]
-    real(wp), intent(out), contiguous, target :: displacement(:)
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), pointer, contiguous :: acting(:, :, :), wanted(:, :, :)
-
-    associate (n => self%flexibility%lattice%extent)
-      acting(1:n(1), 1:n(2), 1:size(from)) => traction
-      wanted(1:n(1), 1:n(2), 1:size(onto)) => displacement
-    end associate
-    call self%flexibility%apply(from, acting, onto, wanted, error)
-  end subroutine apply_operators
-
-  pure real(wp) function work(self)
-    class(operators_t), intent(in) :: self
-    work = self%flexibility%applications + self%preconditioning
-  end function work
-
-  !> Apply a preconditioner to vectors, and count it.
-  subroutine precondition(operators, preconditioner, edge, n_component, x, y)
-    type(operators_t), intent(inout) :: operators
-    type(preconditioner_t), intent(inout) :: preconditioner
-    type(edge_extension_t), intent(in) :: edge
-    integer, intent(in) :: n_component
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    real(wp), pointer, contiguous :: displacement(:, :, :), traction(:, :, :)
-
-    associate (n => operators%flexibility%lattice%extent)
-      displacement(1:n(1), 1:n(2), 1:n_component) => x
-      traction(1:n(1), 1:n(2), 1:n_component) => y
-    end associate
-    call preconditioner%apply(displacement, traction, edge)
-    operators%preconditioning = operators%preconditioning + preconditioner%cost
-  end subroutine precondition
-
   !> Take the nodes in contact.
   subroutine take_contact(self, contact)
     class(pressure_system_t), intent(inout) :: self
@@ -217,7 +118,7 @@ contains
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    call precondition(self%operators, self%operators%normal, self%edge, 1, x, y)
+    call self%operators%precondition_pressure(self%edge, x, y)
   end subroutine pressure_precondition
 
   !> A shear system in which every node sticks.
@@ -419,7 +320,7 @@ contains
       end do
       !$omp end do
       !$omp end parallel
-      call invert(self%operators, self%operators%flexibility%lattice%extent, self%edge, m == 2, self%displacement, self%traction)
+      call self%operators%precondition_shear(self%edge, m == 2, self%displacement, self%traction)
       !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
       do k = 1, size(self%nodes%first)
         do i = self%nodes%first(k), self%nodes%last(k)
@@ -432,25 +333,6 @@ contains
       !$omp end parallel do
     end do
   end subroutine shear_precondition
-
-  !> Apply the tangential preconditioner to vectors in single precision, and count it.
-  subroutine invert(operators, extent, edge, on_springs, displacement, traction)
-    type(operators_t), intent(inout) :: operators
-    !> Number of columns and rows of the window
-    integer, intent(in) :: extent(2)
-    !> Continuation beyond the contact, where nodes on soft springs play no part
-    type(edge_extension_t), intent(in) :: edge
-    logical, intent(in) :: on_springs
-    real(sp), intent(inout) :: displacement(extent(1), extent(2), 2)
-    real(sp), intent(out) :: traction(extent(1), extent(2), 2)
-
-    if (on_springs) then
-      call operators%tangential%apply_single(displacement, traction, on_springs=.true.)
-    else
-      call operators%tangential%apply_single(displacement, traction, edge)
-    end if
-    operators%preconditioning = operators%preconditioning + operators%tangential%cost
-  end subroutine invert
 
   subroutine coupled_product(self, x, y, error)
     class(coupled_system_t), intent(inout) :: self
@@ -489,7 +371,7 @@ contains
     integer :: n
 
     n = size(x)/3
-    call precondition(self%operators, self%operators%normal, self%edge, 1, x(:n), y(:n))
+    call self%operators%precondition_pressure(self%edge, x(:n), y(:n))
     call self%shear%precondition(x(n + 1:), y(n + 1:), error)
   end subroutine coupled_precondition
 

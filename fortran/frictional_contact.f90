@@ -9,7 +9,7 @@ module hc_frictional_contact
   use hc_lattice, only: lattice_t
   use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
-  use hc_friction_systems, only: operators_t, new_operators, operators_memory
+  use hc_friction_operators, only: operators_t, new_operators, operators_memory
   use hc_friction_level, only: solve_level
   use hc_friction_predictor, only: predict
   use hc_kernel_cache, only: kernel_cache_t

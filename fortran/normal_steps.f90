@@ -17,8 +17,9 @@ module hc_normal_steps
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal
   use hc_contact_residuals, only: conclude
   use hc_normal_level, only: normal_level_t
-  use hc_normal_iterate, only: iterate_t, begin, rescale, balance, judge, take_set, press_punch, find_residual, &
-                               projected_step, next_direction, step_share, advance, load_lack, fit_load, push_only
+  use hc_normal_iterate, only: iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, &
+                               push_only
+  use hc_normal_directions, only: find_residual, projected_step, next_direction, step_share
   implicit none
   private
 

@@ -14,7 +14,8 @@ module test_friction
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
   use hc_friction_problem, only: friction_problem_t, new_friction_problem
   use hc_krylov, only: projected_cg
-  use hc_friction_systems, only: operators_t, new_operators, shear_system_t, new_shear_system
+  use hc_friction_operators, only: operators_t, new_operators
+  use hc_friction_systems, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use testing, only: test_t, new_test, check, check_raised, check_true
   implicit none

@@ -5,7 +5,7 @@ module test_friction_predictor
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, slip, force_control, displacement_control
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t
-  use hc_friction_systems, only: operators_t, new_operators
+  use hc_friction_operators, only: operators_t, new_operators
   use hc_friction_predictor, only: predict
   use hc_frictional_contact, only: frictional_contact_t
   use test_friction, only: new_sphere

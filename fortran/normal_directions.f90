@@ -1,0 +1,165 @@
+!> Steps of an iteration for frictionless contact: where to go, and how far.
+module hc_normal_directions
+  use hc_precision, only: wp, sp
+  use hc_normal_level, only: normal_level_t
+  use hc_normal_iterate, only: iterate_t
+  implicit none
+  private
+
+  public :: find_residual, projected_step, next_direction, step_share
+
+  !> Length c of a projected step: M is a little more than the inverse.
+  real(wp), parameter :: step_length = 0.85_wp
+
+contains
+
+  !> r = approach - h - w on the active nodes.
+  subroutine find_residual(level, now)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    real(wp) :: gap, scale
+    integer :: col, row
+
+    scale = 1.0_wp/now%w_unit
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, gap)
+    do row = 1, size(now%p, 2)
+      !$omp simd private(gap)
+      do col = now%span(1, row), now%span(2, row)
+        gap = merge(level%initial_gap(col, row) + now%w(col, row) - now%approach, 0.0_wp, now%active(col, row))
+        now%r(col, row, 1) = merge(real(-scale*gap, sp), now%r(col, row, 1), now%active(col, row))
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine find_residual
+
+  !> d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or what is left of p, on a set to be held.
+  subroutine projected_step(level, now, held, by_load, pressures)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    logical, intent(in) :: held, by_load
+    !> Sum of the pressures under a prescribed load
+    real(wp), intent(in) :: pressures
+    real(wp) :: part(size(now%p, 2)), aim, mean, row_sum
+    real(sp) :: lack
+    integer :: col, row
+
+    mean = 0.0_wp
+    if (by_load .and. .not. held) then
+      !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, row_sum)
+      do row = 1, size(now%p, 2)
+        row_sum = 0.0_wp
+        !$omp simd reduction(+: row_sum)
+        do col = now%span(1, row), now%span(2, row)
+          row_sum = row_sum + merge(now%z(col, row, 1), 0.0_sp, now%active(col, row))
+        end do
+        part(row) = row_sum
+      end do
+      !$omp end parallel do
+      mean = sum(part)/now%punch_sum
+    end if
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, aim)
+    do row = 1, size(now%p, 2)
+      now%d(:, row, 1) = 0.0_sp
+      part(row) = 0.0_wp
+      do col = now%span(1, row), now%span(2, row)
+        aim = 0.0_wp
+        if (now%active(col, row)) then
+          aim = now%p(col, row)/now%p_unit
+          if (.not. held) then
+            aim = aim + step_length*now%z(col, row, 1)
+            if (by_load) aim = aim - step_length*mean*now%punch(col, row)
+          end if
+          aim = max(aim, 0.0_wp)
+          part(row) = part(row) + aim
+        end if
+        now%d(col, row, 1) = real(aim - now%p(col, row)/now%p_unit, sp)
+      end do
+    end do
+    !$omp end parallel do
+    if (.not. sum(part) > 0.0_wp) then
+      ! none of the pressure is left where it should be
+      now%d(:, :, 1) = now%d(:, :, 1) + merge(1.0_sp, 0.0_sp, now%active)
+      part = count(now%active, dim=1)
+    end if
+    ! what was cut off goes where it changes the approach alone
+    if (.not. by_load) return
+    lack = real((pressures/now%p_unit - sum(part))/now%punch_sum, sp)
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    do row = 1, size(now%p, 2)
+      do col = now%span(1, row), now%span(2, row)
+        now%d(col, row, 1) = now%d(col, row, 1) + lack*now%punch(col, row)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine projected_step
+
+  !> Direction of conjugate gradients.
+  subroutine next_direction(level, now, by_load, rz)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(inout) :: now
+    logical, intent(in) :: by_load
+    !> r^T z of the last direction, 0: there is none; on return that of the new one
+    real(wp), intent(inout) :: rz
+    real(wp), dimension(size(now%p, 2)) :: part, sum_z
+    real(wp) :: rz_new, z, product_z, total_z
+    real(sp) :: back, mean
+    integer :: col, row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, z, product_z, total_z)
+    do row = 1, size(now%p, 2)
+      product_z = 0.0_wp
+      total_z = 0.0_wp
+      !$omp simd private(z) reduction(+: product_z, total_z)
+      do col = now%span(1, row), now%span(2, row)
+        z = merge(now%z(col, row, 1), 0.0_sp, now%active(col, row))
+        product_z = product_z + merge(now%r(col, row, 1), 0.0_sp, now%active(col, row))*z
+        total_z = total_z + z
+      end do
+      part(row) = product_z
+      sum_z(row) = total_z
+    end do
+    !$omp end parallel do
+    rz_new = sum(part)
+    back = 0.0_sp
+    if (rz > 0.0_wp) back = real(rz_new/rz, sp)
+    mean = 0.0_sp
+    if (by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
+    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    do row = 1, size(now%p, 2)
+      if (.not. rz > 0.0_wp) now%d(:, row, 1) = 0.0_sp
+      !$omp simd
+      do col = now%span(1, row), now%span(2, row)
+        now%d(col, row, 1) = merge(now%z(col, row, 1) + back*now%d(col, row, 1), 0.0_sp, now%active(col, row))
+      end do
+      if (.not. by_load) cycle
+      !$omp simd
+      do col = now%span(1, row), now%span(2, row)
+        now%d(col, row, 1) = now%d(col, row, 1) - mean*now%punch(col, row)
+      end do
+    end do
+    !$omp end parallel do
+    rz = rz_new
+  end subroutine next_direction
+
+  !> Length of a step of conjugate gradients; 0 if there is no curvature.
+  real(wp) function step_share(level, now, rz)
+    type(normal_level_t), intent(in) :: level
+    type(iterate_t), intent(in) :: now
+    !> r^T z
+    real(wp), intent(in) :: rz
+    real(wp) :: part(size(now%p, 2)), curvature
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        part(row) = sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))
+      end associate
+    end do
+    !$omp end parallel do
+    curvature = sum(part)
+    step_share = 0.0_wp
+    if (curvature > 0.0_wp .and. rz > 0.0_wp) step_share = rz/curvature
+  end function step_share
+
+end module hc_normal_directions

@@ -75,29 +75,54 @@ module hc_contact_state
 contains
 
   !> A state without contact.
-  pure subroutine new_contact_state(state, lattice)
+  subroutine new_contact_state(state, lattice, n_threads)
     !> State to be set up
     type(contact_state_t), intent(out) :: state
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    integer :: row, threads
 
-    allocate (state%pressure(lattice%extent(1), lattice%extent(2)), source=0.0_wp)
-    allocate (state%gap, source=state%pressure)
-    allocate (state%zone(lattice%extent(1), lattice%extent(2)), source=separated)
+    threads = 1
+    if (present(n_threads)) threads = n_threads
+    associate (n => lattice%extent)
+      allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)))
+    end associate
+    !$omp parallel do schedule(static) num_threads(threads)
+    do row = 1, lattice%extent(2)
+      state%pressure(:, row) = 0.0_wp
+      state%gap(:, row) = 0.0_wp
+      state%zone(:, row) = separated
+    end do
+    !$omp end parallel do
   end subroutine new_contact_state
 
   !> A state with friction before the first load: no contact, nothing displaced.
-  pure subroutine new_friction_state(state, lattice)
+  subroutine new_friction_state(state, lattice, n_threads)
     !> State to be set up
     type(contact_state_t), intent(out) :: state
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    integer :: row, threads
 
-    call new_contact_state(state, lattice)
-    allocate (state%traction(lattice%extent(1), lattice%extent(2), 2), source=0.0_wp)
-    allocate (state%relative_displacement, source=state%traction)
-    allocate (state%slip_increment, source=state%traction)
-    allocate (state%accumulated_slip, source=state%pressure)
+    threads = 1
+    if (present(n_threads)) threads = n_threads
+    call new_contact_state(state, lattice, threads)
+    associate (n => lattice%extent)
+      allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2), &
+                state%accumulated_slip(n(1), n(2)))
+    end associate
+    !$omp parallel do schedule(static) num_threads(threads)
+    do row = 1, lattice%extent(2)
+      state%traction(:, row, :) = 0.0_wp
+      state%relative_displacement(:, row, :) = 0.0_wp
+      state%slip_increment(:, row, :) = 0.0_wp
+      state%accumulated_slip(:, row) = 0.0_wp
+    end do
+    !$omp end parallel do
   end subroutine new_friction_state
 
   !> Tractions and motions of a state, and nothing else: what an iteration starts from.

@@ -53,7 +53,7 @@ contains
     held = 0
     operators%flexibility%applications = 0.0_wp
     operators%preconditioning = 0.0_wp
-    call new_friction_state(state, problem%lattice)
+    call new_friction_state(state, problem%lattice, operators%n_threads)
     allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
     call now%begin(problem, operators, start, reference, target, tolerance, error)
     if (allocated(error)) return

@@ -102,7 +102,7 @@ contains
     type(contact_state_t), intent(out) :: coarse
 
     associate (from => problem%lattice, to => coarse_problem%lattice)
-      call new_friction_state(coarse, to)
+      call new_friction_state(coarse, to, coarse_problem%n_threads)
       coarse%pressure = restrict_field(from, fine%pressure, to)
       coarse%gap = restrict_field(from, fine%gap, to)
       coarse%traction = restrict_vector(from, fine%traction, to)

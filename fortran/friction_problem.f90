@@ -235,7 +235,7 @@ contains
     type(contact_state_t), intent(out) :: state
     real(wp), allocatable :: displacement(:, :, :)
 
-    call new_friction_state(state, self%lattice)
+    call new_friction_state(state, self%lattice, self%n_threads)
     state%motion = merge(start%motion, target%value, target%control == force_control)
     if (target%control(normal) == force_control) state%motion(normal) = minval(self%initial_gap, mask=self%candidate)
     allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 3), source=0.0_wp)

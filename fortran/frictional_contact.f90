@@ -171,7 +171,7 @@ contains
       associate (problem => self%coarse(l))
         if (.not. any(problem%candidate)) cycle
         if (.not. problem%is_pressed(target)) cycle
-        call new_friction_state(state, problem%lattice)
+        call new_friction_state(state, problem%lattice, problem%n_threads)
         state%motion = guess%motion
         if (allocated(coarser%pressure)) call prolong_state(self%coarse(l + 1), coarser, problem, state)
         call solve_level(problem, self%operators(l), state, origin(l)%value, target, coarse_tolerance, max_sweeps, &

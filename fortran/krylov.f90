@@ -63,7 +63,7 @@ contains
     !> Nodes that carry unknowns (n)
     logical, intent(in) :: active(:)
     !> Constraint vectors B (n, number of constraints), zero off the active nodes
-    real(wp), intent(in) :: constraint(:, :)
+    real(wp), intent(in), contiguous :: constraint(:, :)
     !> M B (n, number of constraints)
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure

@@ -15,6 +15,7 @@ module hc_normal_contact
   use hc_contact_state, only: contact_state_t, new_contact_state, check_problem
   use hc_preconditioner, only: preconditioner_memory
   use hc_normal_level, only: normal_level_t
+  use hc_normal_iterate, only: iterate_t
   use hc_normal_steps, only: solve_level
   use hc_window_part, only: frame, is_worth, part_of
   use hc_multilevel, only: level_count, prolong_edge, restrict_field, restrict_mask
@@ -39,6 +40,8 @@ module hc_normal_contact
     private
     !> From the finest to the coarsest lattice
     type(normal_level_t), allocatable :: level(:)
+    !> Fields of the iterations on each of them, from one solution to the next
+    type(iterate_t), allocatable :: iterate(:)
     !> The part of the finest lattice around the contact, and its first column and row there
     type(normal_level_t), allocatable :: inner
     integer :: corner(2) = 0
@@ -83,6 +86,7 @@ contains
     call check_problem(lattice, initial_gap, candidate, error)
     if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, smallest_side)))
+    allocate (self%iterate(size(self%level)))
     do l = 1, size(self%level)
       associate (level => self%level(l))
         if (l == 1) then
@@ -150,7 +154,7 @@ contains
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
-          call solve_level(level, control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          call solve_level(level, self%iterate(l), control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
@@ -214,11 +218,11 @@ contains
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
           part%pressure = state%pressure(first(1):last(1), first(2):last(2))
           ! the product over the window sees what single precision left
-          call solve_level(inner, control, target, part_tolerance*tolerance, max_sweeps, part, error)
+          call solve_level(inner, self%iterate(1), control, target, part_tolerance*tolerance, max_sweeps, part, error)
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
           sweeps = sweeps + part%sweeps
-          call new_contact_state(state, whole%lattice)
+          call new_contact_state(state, whole%lattice, whole%n_threads)
           state%pressure(first(1):last(1), first(2):last(2)) = part%pressure
         end associate
         state%motion = part%motion
@@ -231,7 +235,7 @@ contains
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
       call whole%prepare(self%pair, self%kernel, .true., .true., error, threads_of(whole%lattice, self%n_threads), self%cache)
       if (allocated(error)) return
-      call solve_level(whole, control, target, tolerance, max_sweeps, state, error)
+      call solve_level(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
       state%sweeps = state%sweeps + sweeps
       work = work + whole%work()

@@ -60,9 +60,17 @@ contains
     logical :: known
 
     n = level%lattice%extent
-    allocate (now%p(n(1), n(2)), now%w(n(1), n(2)), stat=stat)
-    if (stat == 0) allocate (now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), stat=stat)
-    if (stat == 0) allocate (now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
+    stat = 0
+    if (allocated(now%w)) then
+      if (any(shape(now%w) /= n)) deallocate (now%w, now%r, now%z, now%d, now%kd, now%active, now%span)
+    end if
+    if (allocated(now%punch)) deallocate (now%punch)
+    if (allocated(now%p)) deallocate (now%p)
+    if (.not. allocated(now%w)) then
+      allocate (now%w(n(1), n(2)), now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
+                now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
+    end if
+    if (stat == 0) allocate (now%p(n(1), n(2)), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
       return
@@ -86,6 +94,7 @@ contains
     !$omp end parallel do
     now%n_active = n_active
     now%approach = target
+    now%stale = 0.0_wp
     scale = 1.0_wp
     if (by_load) scale = target/(level%lattice%cell_area()*sum(part))
     now%span(1, :) = n(1) + 1

@@ -37,8 +37,10 @@ module hc_normal_steps
 contains
 
   !> Solve for a normal load or an approach.
-  subroutine solve_level(level, control, target, tolerance, max_sweeps, state, error)
+  subroutine solve_level(level, now, control, target, tolerance, max_sweeps, state, error)
     type(normal_level_t), intent(inout) :: level
+    !> Iterate of an earlier solution, whose memory is used again
+    type(iterate_t), intent(inout) :: now
     !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
@@ -52,7 +54,6 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    type(iterate_t) :: now
     real(wp), allocatable :: start(:, :)
     real(wp) :: delta
     logical :: pulls
@@ -61,7 +62,7 @@ contains
     level%flexibility%applications = 0.0_wp
     level%single_work = 0.0_wp
     call move_alloc(state%pressure, start)
-    call new_contact_state(state, level%lattice)
+    call new_contact_state(state, level%lattice, level%n_threads)
     delta = minval(level%initial_gap, mask=level%candidate)
     if (target <= merge(0.0_wp, delta, control == force_control)) then         ! nothing touches
       state%motion(normal) = merge(delta, target, control == force_control)
@@ -86,7 +87,7 @@ contains
   !> Iterations up to the tolerance.
   subroutine iterate(level, now, by_load, target, tolerance, max_sweeps, start, sweeps, error)
     type(normal_level_t), intent(inout) :: level
-    type(iterate_t), intent(out) :: now
+    type(iterate_t), intent(inout) :: now
     !> The normal load is prescribed, not the approach
     logical, intent(in) :: by_load
     !> Normal load [N] or approach [m]

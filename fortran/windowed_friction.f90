@@ -151,9 +151,9 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
 
     work = 0.0_wp
-    call new_friction_state(state, self%problem%lattice)
+    call new_friction_state(state, self%problem%lattice, self%problem%n_threads)
     associate (lattice => self%part%problem%lattice, c => [self%low(1), self%high(1)], r => [self%low(2), self%high(2)])
-      call new_friction_state(before, lattice)
+      call new_friction_state(before, lattice, self%problem%n_threads)
       before%pressure = start%pressure(c(1):c(2), r(1):r(2))
       before%gap = start%gap(c(1):c(2), r(1):r(2))
       before%traction = start%traction(c(1):c(2), r(1):r(2), :)

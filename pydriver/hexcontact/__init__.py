@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from .store import open_result
     from .study import Study, run_study
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _HOME = {
     "Case": "case",

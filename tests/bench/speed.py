@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 SIZES = (256, 512, 1024, 2048)
 LARGEST_WITH_FRICTION = 1024
 PROBLEMS = {"HERTZ": "Hertz", "HC": "HC (press, shear)", "N19": "N19"}
-TURNS = 2
+TURNS = 4
 LONG_ENOUGH = 10.0
 """Seconds of a solve that is not run again."""
 

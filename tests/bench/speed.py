@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,12 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
             "2 threads [s]",
             "times faster",
             "goal",
+            "two processes side by side",
             "set-up times faster",
+        ],
+        remarks=[
+            "Two processes side by side, one thread each: how much more they do together than one alone, "
+            "which is the most that two threads could gain on this machine at that time."
         ],
     )
     memory = Table(
@@ -107,7 +113,7 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
         bare = [bare_transforms(program, side)] if program.exists() else []
         chosen = {k: v for k, v in PROBLEMS.items() if k == "HERTZ" or side <= LARGEST_WITH_FRICTION}
         for name, title in chosen.items():
-            single, double = timed(name, side, turns=1 if quick else TURNS, both=parallel)
+            single, double, pair = timed(name, side, turns=1 if quick else TURNS, both=parallel)
             label = f"{title}, {side}²"
             if "failed" in single or "failed" in double:
                 ratio.add(label, single.get("failed") or double["failed"])
@@ -122,6 +128,7 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
                     seconds(double["solve"]),
                     f"{single['solve'] / double['solve']:.2f}",
                     "≥ 1.7" if side >= 512 else "",
+                    f"{2.0 * single['solve'] / pair:.2f}",
                     f"{single['setup'] / double['setup']:.2f}",
                 )
             memory.add(
@@ -181,11 +188,12 @@ def setups(*, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
     return [table]
 
 
-def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the best of several runs on one thread and, in turns, on two threads."""
+def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, Any], dict[str, Any], float]:
+    """Return the best of several runs on one thread, on two, and of two processes at a time, in turns."""
     repeats = 3 if side <= 512 else 1
     one: list[dict[str, Any]] = []
     two: list[dict[str, Any]] = []
+    pairs: list[float] = []
     for turn in range(turns):
         if turn and one[0].get("solve", 0.0) > LONG_ENOUGH:
             break
@@ -193,7 +201,16 @@ def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, An
         if both:
             # 0: as many as the environment says, but one for small lattices, which is what users get
             two.append(worker.run(task_of(name, side, 0, repeats), threads=2))
-    return worker.best(one, "setup", "solve", "memory"), worker.best(two or one, "setup", "solve")
+            pairs.append(side_by_side(task_of(name, side, 1, repeats)))
+    pair = min(pairs, default=float("nan"))
+    return worker.best(one, "setup", "solve", "memory"), worker.best(two or one, "setup", "solve"), pair
+
+
+def side_by_side(task: dict[str, Any]) -> float:
+    """Return the mean time of two processes that solve the same at the same time."""
+    with ThreadPoolExecutor(2) as pool:
+        answers = list(pool.map(worker.run, [task, task]))
+    return sum(float(answer.get("solve", "nan")) for answer in answers) / len(answers)
 
 
 def add_ratio(

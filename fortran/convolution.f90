@@ -16,6 +16,7 @@ module hc_convolution
   use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, release
   use hc_kernel_cache, only: kernel_cache_t
   use hc_row_pairs, only: split_rows, join_rows
+  use hc_column_blocks, only: gather_columns, scatter_columns
   use hc_spectral_product, only: multiply, multiply_one
   !$ use omp_lib, only: omp_get_thread_num, omp_get_max_threads
   implicit none
@@ -439,51 +440,6 @@ contains
       call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), self%work(first, 1, o))
     end do
   end subroutine convolve_block
-
-  !> Columns of a matrix one after the other, padded with zeros; their number is a multiple of four.
-  !>
-  !> Transforms of contiguous columns out of place take half to two thirds of the time of interleaved ones in place.
-  pure subroutine gather_columns(width, n_row, leading, length, matrix, columns)
-    !> Number of columns and rows, distance of two rows, length of a padded column
-    integer, intent(in) :: width, n_row, leading, length
-    !> The matrix, from the first of the columns on
-    complex(wp), intent(in) :: matrix(leading*(n_row - 1) + width)
-    !> The columns
-    complex(wp), intent(inout) :: columns(0:length - 1, 0:width - 1)
-    integer :: row, k, i
-
-    do row = 0, n_row - 1
-      i = row*leading
-      do k = 0, width - 4, 4
-        columns(row, k) = matrix(i + k + 1)
-        columns(row, k + 1) = matrix(i + k + 2)
-        columns(row, k + 2) = matrix(i + k + 3)
-        columns(row, k + 3) = matrix(i + k + 4)
-      end do
-    end do
-    columns(n_row:, :) = 0.0_wp
-  end subroutine gather_columns
-
-  !> The way back, without the padding.
-  pure subroutine scatter_columns(width, n_row, length, leading, columns, matrix)
-    !> Number of columns and rows, length of a padded column, distance of two rows
-    integer, intent(in) :: width, n_row, length, leading
-    !> The columns
-    complex(wp), intent(in) :: columns(0:length - 1, 0:width - 1)
-    !> The matrix, from the first of the columns on
-    complex(wp), intent(inout) :: matrix(leading*(n_row - 1) + width)
-    integer :: row, k, i
-
-    do row = 0, n_row - 1
-      i = row*leading
-      do k = 0, width - 4, 4
-        matrix(i + k + 1) = columns(row, k)
-        matrix(i + k + 2) = columns(row, k + 1)
-        matrix(i + k + 3) = columns(row, k + 2)
-        matrix(i + k + 4) = columns(row, k + 3)
-      end do
-    end do
-  end subroutine scatter_columns
 
   !> Run the transforms of one scalar product and nothing else, to compare times with.
   subroutine time_transforms(self)

@@ -370,6 +370,8 @@ contains
     do o = 1, size(result, 3)
       !$omp do schedule(static)
       do row = 1, n(2), 2
+        ! an odd last row has no companion, but what earlier products left there
+        if (row == n(2)) self%work(:, row + 1, o) = 0.0_wp
         associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
           call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
           call fftw_execute_dft(self%row_plan, joined, transformed)

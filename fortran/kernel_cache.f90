@@ -68,7 +68,7 @@ contains
   !> Keep spectra in a folder, too.
   subroutine use_folder(self, folder, maker, word, room)
     class(kernel_cache_t), intent(inout) :: self
-    !> The folder, which is there; empty: none
+    !> The folder, which is there, with a slash at the end, so that its name may end with a blank; empty: none
     character(len=*), intent(in) :: folder
     !> What the numbers depend on besides the kernels: program, machine
     character(len=*), intent(in) :: maker
@@ -105,7 +105,7 @@ contains
       self%found = self%found + 1
     else if (allocated(self%folder)) then
       maker = self%maker
-      path = self%folder//'/'//file_name(key, maker)
+      path = self%folder//file_name(key, maker)
     end if
     !$omp end critical (hc_kernel_cache)
     if (associated(spectrum)) return
@@ -135,7 +135,7 @@ contains
     call insert(self, key, spectrum)
     if (allocated(self%folder) .and. spectrum%bytes() <= self%room) then
       maker = self%maker
-      path = self%folder//'/'//file_name(key, maker)
+      path = self%folder//file_name(key, maker)
       self%written = self%written + 1
       write (number, '(i0)') self%written
       word = self%word//'-'//trim(number)

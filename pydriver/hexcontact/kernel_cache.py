@@ -194,7 +194,9 @@ def _open_folder() -> None:
         except OSError as error:
             _settings.folder = folder = None
             _warn(f"no kernels are kept in {error.filename}: {error.strerror}")
-    _cache.use_kernel_folder(os.fsencode(folder or ""), _maker(), uuid.uuid4().hex[:12], room)
+    # the core takes blanks at the end for none
+    name = b"" if folder is None else os.fsencode(folder) + b"/"
+    _cache.use_kernel_folder(name, _maker(), uuid.uuid4().hex[:12], room)
 
 
 def _pruned(folder: Path, bound: int) -> int:

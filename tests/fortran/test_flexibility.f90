@@ -49,6 +49,7 @@ contains
       new_test('components', test_components), &
       new_test('positive_definite', test_positive_definite), &
       new_test('threads', test_threads), &
+      new_test('nothing_left_behind', test_nothing_left_behind), &
       new_test('shared_spectra', test_shared_spectra), &
       new_test('wrong_shapes', test_wrong_shapes), &
       new_test('self_compliance', test_self_compliance), &
@@ -80,6 +81,46 @@ contains
     if (allocated(error)) return
     call check(error, pair%gamma(), 0.2_wp/0.8_wp, 1.0e-15_wp, 'gamma on a rigid plane')
   end subroutine test_elastic_pair
+
+  !> A product is to the bit that of an operator that was never used, whatever was multiplied before.
+  subroutine test_nothing_left_behind(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(elastic_pair_t) :: pair
+    type(lattice_t) :: lattice
+    integer :: n_row
+
+    call new_elastic_pair(pair, material_t(2.0_wp, 0.25_wp), material_t(5.0_wp, 0.1_wp), error)
+    if (allocated(error)) return
+    do n_row = 30, 31
+      call new_lattice(lattice, equilateral_basis(0.5_wp), [-4, -3], [60, n_row], error)
+      if (allocated(error)) return
+      call compare(n_row)
+      if (allocated(error)) return
+    end do
+
+  contains
+
+    subroutine compare(n_row)
+      integer, intent(in) :: n_row
+      type(fft_flexibility_t) :: used, fresh
+      real(wp) :: traction(60, n_row, 3), answer(60, n_row, 3), expected(60, n_row, 3)
+      integer :: i
+
+      traction = reshape([(sin(1.3_wp*i), i=1, size(traction))], shape(traction))
+      call new_fft_flexibility(used, lattice, pair, error)
+      if (allocated(error)) return
+      call new_fft_flexibility(fresh, lattice, pair, error)
+      if (allocated(error)) return
+      call used%apply(all_components, 1.0e40_wp*traction, all_components, answer, error)
+      if (allocated(error)) return
+      call used%apply([normal], traction(:, :, :1), all_components, answer, error)
+      if (allocated(error)) return
+      call fresh%apply([normal], traction(:, :, :1), all_components, expected, error)
+      if (allocated(error)) return
+      call check(error, maxval(abs(answer - expected)), 0.0_wp, 0.0_wp, 'a product after a large one')
+    end subroutine compare
+
+  end subroutine test_nothing_left_behind
 
   subroutine test_bad_materials(error)
     type(error_t), allocatable, intent(out) :: error

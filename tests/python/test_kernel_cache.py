@@ -267,6 +267,15 @@ def test_spectra_of_another_window_are_not_taken(tmp_path: Path) -> None:
             assert_array_equal(normal(lattice), answer)
 
 
+@pytest.mark.parametrize("name", ["ends with a blank ", "Müller", "two\nlines"])
+def test_folder_may_have_any_name(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / name
+    kernel_cache.configure(memory=0, folder=folder)
+    normal()
+    assert list(folder.iterdir())
+    assert list(tmp_path.iterdir()) == [folder]
+
+
 def test_vanished_folder_is_told_of_once(tmp_path: Path) -> None:
     folder = tmp_path / "kernels of Müller, 5 µm"
     before = normal()

@@ -126,10 +126,12 @@ contains
 
     allocate (change, mold=state%pressure)
     allocate (change_of_traction, mold=state%traction)
-    call prolong(coarse_problem%lattice, after%pressure - before%pressure, problem%lattice, change)
-    call prolong_vector(coarse_problem%lattice, after%traction - before%traction, problem%lattice, change_of_traction)
+    call prolong(coarse_problem%lattice, after%pressure - before%pressure, problem%lattice, change, problem%n_threads)
+    call prolong_vector(coarse_problem%lattice, after%traction - before%traction, problem%lattice, change_of_traction, &
+                        problem%n_threads)
     allocate (slipping, mold=state%pressure)
-    call prolong(coarse_problem%lattice, merge(1.0_wp, 0.0_wp, after%zone == slip), problem%lattice, slipping)
+    call prolong(coarse_problem%lattice, merge(1.0_wp, 0.0_wp, after%zone == slip), problem%lattice, slipping, &
+                 problem%n_threads)
     !$omp parallel do schedule(static) num_threads(problem%n_threads) private(col, bound, length)
     do row = 1, size(slipping, 2)
       do col = 1, size(slipping, 1)

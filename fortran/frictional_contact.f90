@@ -191,9 +191,9 @@ contains
     type(contact_state_t), intent(inout) :: state
     if (any(shape(coarse%pressure) /= coarse_problem%lattice%extent)) return
     if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
-    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure)
+    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%n_threads)
     call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
-                       state%traction)
+                       state%traction, problem%n_threads)
     state%motion = coarse%motion
   end subroutine prolong_state
 

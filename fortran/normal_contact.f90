@@ -149,7 +149,7 @@ contains
         if (.not. any(level%candidate)) cycle
         allocate (state%pressure(level%lattice%extent(1), level%lattice%extent(2)), source=0.0_wp)
         if (allocated(coarse%pressure)) then
-          call prolong_edge(self%level(l + 1)%lattice, coarse%pressure, level%lattice, state%pressure)
+          call prolong_edge(self%level(l + 1)%lattice, coarse%pressure, level%lattice, state%pressure, level%n_threads)
         else
           where (level%candidate) state%pressure = 1.0_wp
         end if

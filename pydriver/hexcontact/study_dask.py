@@ -75,7 +75,10 @@ class DaskPool:
         if where.cluster is not None:
             self._cluster = _started(where)
         try:
-            self._client = distributed.Client(self._cluster or where.address, timeout="10s")
+            # nobody else's: xarray would take its locks from the default client, even from one that failed
+            self._client = distributed.Client(
+                self._cluster or where.address, timeout="10s", set_as_default=False
+            )
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise DeckError(f"no Dask scheduler answers at {where.address}: {reason}") from None

@@ -445,7 +445,7 @@ def test_runs_killed_at_random_moments_go_on(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     *runs, kills = done.stdout.splitlines()
     assert len(runs) == 50
-    assert int(kills.removeprefix("kills ")) > 50
+    assert int(kills.removeprefix("kills ")) > 25  # about 75, fewer on a busy machine
     for number in range(50):
         same(tmp_path / f"{number}.nc", tmp_path / "whole.nc")
         assert not journal_of(tmp_path / f"{number}.nc").exists()

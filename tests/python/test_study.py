@@ -670,6 +670,8 @@ def test_where_no_scheduler_answers_there_is_one_sentence(folder: Path) -> None:
     done = command("study.toml", "--dask", "nonsense://")
     assert done.returncode == 2
     assert "no Dask scheduler answers at nonsense://" in done.stderr
+    with pytest.raises(ValueError, match="No client"):
+        importlib.import_module("distributed").default_client()
 
 
 def test_without_dask_there_is_one_sentence(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

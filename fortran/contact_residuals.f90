@@ -6,7 +6,7 @@ module hc_contact_residuals
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control, normal, separated, slip
   use hc_friction_law, only: coulomb_t
-  use hc_friction_rows, only: residual_row, unbounded
+  use hc_friction_rows, only: residual_row
   implicit none
   private
 
@@ -106,8 +106,7 @@ contains
     tangential_residual = 0.0_wp
     p_max = largest_pressure(pressure, n_threads)
     if (.not. (p_max > 0.0_wp .and. friction%resists())) return
-    slope = friction%coefficient
-    if (friction%no_slip) slope = unbounded
+    slope = friction%slope()
     largest = 0.0_wp
     worst = 0.0_wp
     !$omp parallel do schedule(static) num_threads(n_threads) reduction(max: largest, worst)

@@ -9,7 +9,7 @@ module hc_friction_iterate
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
-  use hc_friction_rows, only: residual_row, cone_row, unbounded
+  use hc_friction_rows, only: residual_row, cone_row
   use hc_friction_problem, only: friction_problem_t
   use hc_driven_motions, only: driven_motions_t, new_driven_motions
   use hc_friction_operators, only: operators_t
@@ -254,7 +254,8 @@ contains
     n = size(self%p)
     n_col = self%problem%lattice%extent(1)
     allocate (q(2*n))
-    call law(self, unit, slope)
+    unit = pressure_unit(self)
+    slope = self%problem%friction%slope()
     !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(from, to)
     do row = 1, n/n_col
       from = (row - 1)*n_col + 1
@@ -265,17 +266,13 @@ contains
     !$omp end parallel do
   end subroutine cut_to_cone
 
-  !> Coulomb's law as passes over a row take it.
-  subroutine law(self, unit, slope)
+  !> Inverse of the largest pressure, 0 without pressure [1/Pa].
+  real(wp) function pressure_unit(self)
     class(iterate_t), intent(in) :: self
-    !> Inverse of the largest pressure, 0 without pressure [1/Pa]; coefficient of friction, or `unbounded`
-    real(wp), intent(out) :: unit, slope
 
-    unit = max(maximum(self%p, self%operators%n_threads), 0.0_wp)
-    if (unit > 0.0_wp) unit = 1.0_wp/unit
-    slope = self%problem%friction%coefficient
-    if (self%problem%friction%no_slip) slope = unbounded
-  end subroutine law
+    pressure_unit = max(maximum(self%p, self%operators%n_threads), 0.0_wp)
+    if (pressure_unit > 0.0_wp) pressure_unit = 1.0_wp/pressure_unit
+  end function pressure_unit
 
   !> Residuals of the present tractions; nothing is multiplied for them.
   subroutine find_residuals(self)
@@ -295,7 +292,8 @@ contains
 
     n = size(self%p)
     self%residual_tangential = 0.0_wp
-    call law(self, unit, slope)
+    unit = pressure_unit(self)
+    slope = self%problem%friction%slope()
     if (.not. (unit > 0.0_wp .and. self%problem%friction%resists())) return
     largest = 0.0_wp
     worst = 0.0_wp

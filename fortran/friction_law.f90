@@ -21,6 +21,8 @@ module hc_friction_law
 
   public :: coulomb_t, linearize, on_cone, normal_to, magnitude
 
+  !> Slope of the bound without slip, where pressures are in units of the largest
+  real(wp), parameter :: unbounded = 1.0e100_wp
   !> Smallest bound of the traction that counts in D, relative to the largest
   real(wp), parameter :: smallest_bound = 1.0e-12_wp
 
@@ -33,6 +35,8 @@ module hc_friction_law
   contains
     !> Largest traction under a pressure
     procedure :: bound
+    !> The same over the pressure
+    procedure :: slope
     !> Is there any friction?
     procedure :: resists
   end type coulomb_t
@@ -48,6 +52,14 @@ contains
     bound = huge(1.0_wp)
     if (.not. self%no_slip) bound = self%coefficient*max(pressure, 0.0_wp)
   end function bound
+
+  !> mu; without slip a number so large that nothing is cut off, for pressures in units of the largest.
+  elemental real(wp) function slope(self)
+    class(coulomb_t), intent(in) :: self
+
+    slope = unbounded
+    if (.not. self%no_slip) slope = self%coefficient
+  end function slope
 
   !> Is there any friction?
   elemental logical function resists(self)

@@ -19,7 +19,7 @@ module hc_friction_problem
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
     tangential_residual, largest_pressure, force_residual, least_traction
   use hc_friction_law, only: coulomb_t
-  use hc_friction_rows, only: zone_row, unbounded
+  use hc_friction_rows, only: zone_row
   use hc_multilevel, only: restrict_field, restrict_mask
   implicit none
   private
@@ -332,8 +332,7 @@ contains
     r = self%classification_parameter(n_contact)
     unit = largest_pressure(state%pressure, self%n_threads)
     if (unit > 0.0_wp) unit = 1.0_wp/unit
-    slope = self%friction%coefficient
-    if (self%friction%no_slip) slope = unbounded
+    slope = self%friction%slope()
     finite = .true.
     !$omp parallel do schedule(static) num_threads(self%n_threads) private(col, m) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)

@@ -7,10 +7,8 @@ module hc_friction_rows
   implicit none
   private
 
-  public :: residual_row, zone_row, cone_row, soften_row, unbounded
+  public :: residual_row, zone_row, cone_row, soften_row
 
-  !> Bound of the traction without slip, in units of the largest pressure.
-  real(wp), parameter :: unbounded = 1.0e100_wp
   !> Squares below this count as nothing.
   real(wp), parameter :: nothing = 1.0e-200_wp
 
@@ -20,7 +18,7 @@ contains
   pure subroutine residual_row(n, unit, slope, stiffness, p, qx, qy, dsx, dsy, largest, worst)
     !> Number of nodes
     integer, intent(in) :: n
-    !> Inverse of the unit of pressure; coefficient of friction, or `unbounded`; inverse of d_t [Pa/m]
+    !> Inverse of the unit of pressure; slope of Coulomb's law; inverse of d_t [Pa/m]
     real(wp), intent(in) :: unit, slope, stiffness
     !> Pressure, traction and slip of the step
     real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
@@ -47,7 +45,7 @@ contains
   pure subroutine zone_row(n, unit, slope, r, p, qx, qy, dsx, dsy, zone)
     !> Number of nodes
     integer, intent(in) :: n
-    !> Inverse of the unit of pressure; coefficient of friction, or `unbounded`; classification parameter [Pa/m]
+    !> Inverse of the unit of pressure; slope of Coulomb's law; classification parameter [Pa/m]
     real(wp), intent(in) :: unit, slope, r
     !> Pressure, traction and slip of the step
     real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
@@ -69,7 +67,7 @@ contains
   pure subroutine cone_row(n, unit, slope, p, qx, qy, cut_x, cut_y)
     !> Number of nodes
     integer, intent(in) :: n
-    !> Inverse of the unit of pressure; coefficient of friction, or `unbounded`
+    !> Inverse of the unit of pressure; slope of Coulomb's law
     real(wp), intent(in) :: unit, slope
     !> Pressure and traction
     real(wp), intent(in) :: p(n), qx(n), qy(n)

@@ -20,8 +20,8 @@ contains
 
   !> Nodes with p - r g > 0: one step of a projected gradient map, which contracts
   !> because r is scaled with the size of the contact.
-  subroutine find_contact(self, gap, contact)
-    type(iterate_t), intent(in) :: self
+  subroutine find_contact(now, gap, contact)
+    type(iterate_t), intent(in) :: now
     !> Gap of the present tractions [m]
     real(wp), intent(in), contiguous :: gap(:)
     !> The nodes (n)
@@ -29,78 +29,78 @@ contains
     real(wp) :: r
     integer :: i, n_contact
 
-    r = classification_scale/(2.0_wp*pi*self%problem%pair%lambda_1 &
-                              *sqrt(self%problem%lattice%cell_area()*max(count(self%contact), 1)/pi))
+    r = classification_scale/(2.0_wp*pi*now%problem%pair%lambda_1 &
+                              *sqrt(now%problem%lattice%cell_area()*max(count(now%contact), 1)/pi))
     allocate (contact(size(gap)))
     n_contact = 0
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) reduction(+: n_contact)
+    !$omp parallel do schedule(static) num_threads(now%operators%n_threads) reduction(+: n_contact)
     do i = 1, size(gap)
-      contact(i) = self%candidate(i) .and. self%p(i) - r*gap(i) > 0.0_wp
+      contact(i) = now%candidate(i) .and. now%p(i) - r*gap(i) > 0.0_wp
       n_contact = n_contact + merge(1, 0, contact(i))
     end do
     !$omp end parallel do
-    if (n_contact == 0) contact = self%candidate .and. gap <= minval(gap, mask=self%candidate)
+    if (n_contact == 0) contact = now%candidate .and. gap <= minval(gap, mask=now%candidate)
   end subroutine find_contact
 
   !> Stick, slip and frames that the present tractions call for.
   !>
   !> The shear traction is put on the cone where a node slips, and its component across
   !> left as a start.
-  subroutine classify(self, holding, active)
-    type(iterate_t), intent(inout) :: self
+  subroutine classify(now, holding, active)
+    type(iterate_t), intent(inout) :: now
     !> Let some nodes stick where none does
     logical, intent(in) :: holding
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
     logical, allocatable, intent(out) :: active(:)
     integer, allocatable :: zone(:)
-    real(wp) :: ds(self%problem%lattice%extent(1), 2), r, bound, largest, across, e(2)
+    real(wp) :: ds(now%problem%lattice%extent(1), 2), r, bound, largest, across, e(2)
     integer :: n, n_stick, row, col, i
 
-    n = size(self%p)
+    n = size(now%p)
     allocate (zone(n), active(2*n))
-    r = self%caution*self%problem%classification_parameter(count(self%contact))
-    if (self%first .and. .not. any(abs(self%q) > 0.0_wp)) r = cautious*r
-    associate (friction => self%problem%friction)
-      largest = friction%bound(maximum(self%p, self%operators%n_threads))
+    r = now%caution*now%problem%classification_parameter(count(now%contact))
+    if (now%first .and. .not. any(abs(now%q) > 0.0_wp)) r = cautious*r
+    associate (friction => now%problem%friction)
+      largest = friction%bound(maximum(now%p, now%operators%n_threads))
       n_stick = 0
-      !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(ds, col, i) reduction(+: n_stick)
-      do row = 1, self%problem%lattice%extent(2)
-        call self%slip_row(row, ds(:, 1), ds(:, 2))
+      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(ds, col, i) reduction(+: n_stick)
+      do row = 1, now%problem%lattice%extent(2)
+        call now%slip_row(row, ds(:, 1), ds(:, 2))
         do col = 1, size(ds, 1)
           i = (row - 1)*size(ds, 1) + col
-          if (self%contact(i)) then
-            call linearize([self%q(i), self%q(n + i)], ds(col, :), friction%bound(self%p(i)), largest, r, zone(i), &
-                           self%shear%direction(:, i), self%shear%compliance(i))
+          if (now%contact(i)) then
+            call linearize([now%q(i), now%q(n + i)], ds(col, :), friction%bound(now%p(i)), largest, r, zone(i), &
+                           now%shear%direction(:, i), now%shear%compliance(i))
             if (zone(i) == stick) n_stick = n_stick + 1
           else
             zone(i) = separated
-            self%q([i, n + i]) = 0.0_wp
-            self%shear%direction(:, i) = [1.0_wp, 0.0_wp]
-            self%shear%compliance(i) = 0.0_wp
+            now%q([i, n + i]) = 0.0_wp
+            now%shear%direction(:, i) = [1.0_wp, 0.0_wp]
+            now%shear%compliance(i) = 0.0_wp
           end if
         end do
       end do
       !$omp end parallel do
-      self%held = holding .and. n_stick == 0
-      if (self%held) call hold(self%shear%compliance, zone)
+      now%held = holding .and. n_stick == 0
+      if (now%held) call hold(now%shear%compliance, zone)
 
-      !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(bound, across, e)
+      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(bound, across, e)
       do i = 1, n
         active(i) = zone(i) /= separated
         active(n + i) = zone(i) == stick
         if (zone(i) == slip) then
-          bound = friction%bound(self%p(i))
-          e = self%shear%direction(:, i)
+          bound = friction%bound(now%p(i))
+          e = now%shear%direction(:, i)
           across = 0.0_wp
-          if (self%shear%compliance(i) < soft*self%shear%elastic_compliance) then
-            across = dot_product(normal_to(e), [self%q(i), self%q(n + i)])
+          if (now%shear%compliance(i) < soft*now%shear%elastic_compliance) then
+            across = dot_product(normal_to(e), [now%q(i), now%q(n + i)])
           end if
-          self%q([i, n + i]) = bound*e + across*normal_to(e)
+          now%q([i, n + i]) = bound*e + across*normal_to(e)
         end if
       end do
       !$omp end parallel do
     end associate
-    call self%shear%weigh(self%contact)
+    call now%shear%weigh(now%contact)
   end subroutine classify
 
   !> Let the nodes stick that slip least: without any, nothing resists a prescribed load.
@@ -131,8 +131,8 @@ contains
   end subroutine hold
 
   !> Loads that are prescribed as constraints on the unknowns.
-  subroutine find_constraints(self, active, driven, constraint, missing)
-    type(iterate_t), intent(in) :: self
+  subroutine find_constraints(now, active, driven, constraint, missing)
+    type(iterate_t), intent(in) :: now
     !> Unknowns, in the frames (2 n)
     logical, intent(in) :: active(:)
     !> Motions that are driven by their loads
@@ -141,50 +141,50 @@ contains
     real(wp), allocatable, intent(out) :: constraint(:, :)
     !> What the present traction lacks of the loads, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
-    real(wp) :: part(self%problem%lattice%extent(2)), unit(self%problem%lattice%extent(1), 2), t, e
+    real(wp) :: part(now%problem%lattice%extent(2)), unit(now%problem%lattice%extent(1), 2), t, e
     integer :: n, k, row, col, i
 
-    n = size(self%p)
-    call new_driven_motions(driven, self%problem, self%target, self%contact)
+    n = size(now%p)
+    call new_driven_motions(driven, now%problem, now%target, now%contact)
     allocate (constraint(2*n, size(driven%motion)), missing(size(driven%motion)))
     do k = 1, size(driven%motion)
-      !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(unit, t, e, col, i)
+      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(unit, t, e, col, i)
       do row = 1, size(part)
-        call driven%direction_row(k, self%problem, row, unit(:, 1), unit(:, 2))
+        call driven%direction_row(k, now%problem, row, unit(:, 1), unit(:, 2))
         part(row) = 0.0_wp
         do col = 1, size(unit, 1)
           i = (row - 1)*size(unit, 1) + col
-          part(row) = part(row) + unit(col, 1)*self%q(i) + unit(col, 2)*self%q(n + i)
-          t = -self%shear%direction(2, i)*unit(col, 1) + self%shear%direction(1, i)*unit(col, 2)
-          e = self%shear%direction(1, i)*unit(col, 1) + self%shear%direction(2, i)*unit(col, 2)
+          part(row) = part(row) + unit(col, 1)*now%q(i) + unit(col, 2)*now%q(n + i)
+          t = -now%shear%direction(2, i)*unit(col, 1) + now%shear%direction(1, i)*unit(col, 2)
+          e = now%shear%direction(1, i)*unit(col, 1) + now%shear%direction(2, i)*unit(col, 2)
           constraint(i, k) = merge(t, 0.0_wp, active(i))
           constraint(n + i, k) = merge(e, 0.0_wp, active(n + i))
         end do
       end do
       !$omp end parallel do
-      missing(k) = driven%load(k, self%problem, self%target) - sum(part)
+      missing(k) = driven%load(k, now%problem, now%target) - sum(part)
     end do
   end subroutine find_constraints
 
   !> Displacements that sticking nodes should have as far as it is known: where they stood, and the motions that
   !> are prescribed.
-  subroutine find_wanted(self, frame)
-    type(iterate_t), intent(in) :: self
+  subroutine find_wanted(now, frame)
+    type(iterate_t), intent(in) :: now
     !> In the frames (2 n)
     real(wp), intent(out), contiguous :: frame(:)
     real(wp) :: motion(n_motion), x, y
     integer :: n, row, col, i
 
-    n = size(self%p)
-    motion = merge(self%motion, 0.0_wp, self%target%control /= force_control)
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(x, y, col, i)
-    do row = 1, self%problem%lattice%extent(2)
-      do col = 1, self%problem%lattice%extent(1)
-        i = (row - 1)*self%problem%lattice%extent(1) + col
-        x = self%origin(i) + (motion(along_x) - motion(about_z)*self%problem%y(col, row))
-        y = self%origin(n + i) + (motion(along_y) + motion(about_z)*self%problem%x(col, row))
-        frame(i) = -self%shear%direction(2, i)*x + self%shear%direction(1, i)*y
-        frame(n + i) = self%shear%direction(1, i)*x + self%shear%direction(2, i)*y
+    n = size(now%p)
+    motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
+    !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(x, y, col, i)
+    do row = 1, now%problem%lattice%extent(2)
+      do col = 1, now%problem%lattice%extent(1)
+        i = (row - 1)*now%problem%lattice%extent(1) + col
+        x = now%origin(i) + (motion(along_x) - motion(about_z)*now%problem%y(col, row))
+        y = now%origin(n + i) + (motion(along_y) + motion(about_z)*now%problem%x(col, row))
+        frame(i) = -now%shear%direction(2, i)*x + now%shear%direction(1, i)*y
+        frame(n + i) = now%shear%direction(1, i)*x + now%shear%direction(2, i)*y
       end do
     end do
     !$omp end parallel do

@@ -2,8 +2,8 @@
 module test_vectors
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_friction_law, only: linearize, on_cone
-  use hc_friction_rows, only: cone_row, residual_row, soften_row, unbounded, zone_row
+  use hc_friction_law, only: coulomb_t, linearize, on_cone
+  use hc_friction_rows, only: cone_row, residual_row, soften_row, zone_row
   use hc_contact_state, only: separated
   use hc_packing, only: packing_t, new_packing
   use hc_vectors, only: add, add_columns, copy, dot, fill, maximum, total
@@ -119,6 +119,7 @@ contains
   subroutine test_rows(error)
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 301
+    type(coulomb_t), parameter :: no_slip = coulomb_t(no_slip=.true.)
     real(wp), parameter :: mu = 0.4_wp, r = 2.0e12_wp, compliance = 3.0e-13_wp
     real(wp), dimension(n) :: p, qx, qy, dsx, dsy, cut_x, cut_y
     integer :: zone(n), expected, i
@@ -158,7 +159,7 @@ contains
     call check(error, sqrt(largest), unit*maxval(hypot(qx, qy), mask=p > 0.0_wp), 1.0e-14_wp, 'largest traction')
     if (allocated(error)) return
     ! without slip nothing is cut off
-    call cone_row(n, unit, unbounded, p, qx, qy, cut_x, cut_y)
+    call cone_row(n, unit, no_slip%slope(), p, qx, qy, cut_x, cut_y)
     call check(error, maxval(hypot(cut_x - qx, cut_y - qy), mask=p > 0.0_wp), 0.0_wp, 0.0_wp, 'no slip')
   end subroutine test_rows
 

@@ -36,7 +36,7 @@ Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
-_FIELDS = (  # in the order of fortran/f2py_friction.f90
+_FIELDS = (  # in the order of fortran/python/f2py_friction.f90
     "pressure",
     "traction_x",
     "traction_y",

@@ -5,6 +5,7 @@
 #   APT=no                       install no system package, only name what is missing
 #   PYTEST_ARGS='-k deck -x'     more words for pytest
 #   BENCH_ARGS='--only counts'   more words for the benchmarks
+#   CHECKS='fretting torsion'    which comparisons make verify makes
 
 VENV := .venv
 STAMPS := $(VENV)/.stamps
@@ -81,7 +82,7 @@ demo: install  ## press a sphere on aluminum, then shear it: history, result and
 	cd output && hexcontact report dissimilar_fretting.nc
 
 verify: install  ## compare with published, discrete and analytic solutions (minutes)
-	hexcontact verify
+	$(py) tests/validation/run.py $(CHECKS)
 
 bench: install  ## work, times, memory, other codes side by side: docs/performance.md (BENCH_ARGS=--quick: two minutes)
 	$(py) tests/bench/run.py --build $(BUILD) $(BENCH_ARGS)

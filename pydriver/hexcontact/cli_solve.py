@@ -180,14 +180,14 @@ def verify(
         typer.Argument(metavar="[NAME]...", help="Which comparisons; default: all.", show_default=False),
     ] = None,
     listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
-    table: Annotated[bool, typer.Option("--table", help="Print Markdown tables.")] = False,
     as_json: AsJson = False,
 ) -> Content:
-    """Compare with published, analytic and converged solutions; exit code 1 if a comparison fails."""
+    """Test the installation: solve a few contacts and compare them with known solutions.
+
+    Exit code 1 if a comparison fails.
+    """
     from . import verify as comparisons
 
     if as_json:
-        if table:
-            raise DeckError("expected --table or --json, not both")
         return comparisons.for_programs(names or [], listing=listing)
-    raise typer.Exit(comparisons.main(names or [], table=table, listing=listing))
+    raise typer.Exit(comparisons.main(names or [], listing=listing))

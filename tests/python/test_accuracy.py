@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
+from validation.error_bars import PROBLEMS, estimates_over_errors
 
 import hexcontact
 from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError, accuracy, refinement
@@ -22,7 +23,6 @@ from hexcontact.report import report
 from hexcontact.surfaces import Sphere
 from hexcontact.trial_folder import TrialFolder
 from hexcontact.variables import ESTIMATED, VARIABLES
-from hexcontact.verify_accuracy import PROBLEMS, estimates_over_errors
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SHEARED = {

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from validation.runs import shear_compliance
 
 import hexcontact
 from hexcontact import Case
@@ -16,7 +17,6 @@ from hexcontact.lattice import Lattice
 from hexcontact.native import ElasticPair, FlexibilityOperator
 from hexcontact.native_friction import ContactState, Entry, FrictionalContact
 from hexcontact.surfaces import Sphere
-from hexcontact.verify_runs import shear_compliance
 
 FORCES = ("force", "force", "force", "displacement")
 RADIUS = 1.0  # of the contact at the end

@@ -1,27 +1,28 @@
-"""The checks of ``hexcontact verify`` with friction, at sizes that are quick, and that they can fail."""
+"""The checks of tests/validation with friction, at sizes that are quick, and that they can fail."""
 
 import math
 
 import numpy as np
 import pytest
 from scipy import integrate
-
-from hexcontact import (
-    verify_cases,
-    verify_crossed,
-    verify_dissimilar,
-    verify_entry,
-    verify_fretting,
-    verify_methods,
-    verify_no_slip,
-    verify_plane,
-    verify_runs,
-    verify_tangential,
-    verify_unloading,
+from validation import (
+    checks,
+    crossed_cylinders,
+    dissimilar,
+    entry,
+    fretting,
+    methods,
+    no_slip,
+    plane,
+    runs,
+    tangential,
+    unloading,
 )
+from validation.reference import reference
+
 from hexcontact.analytic_friction import PlaneCattaneo, goodman_stick_ratio_plane
 from hexcontact.surfaces import Sphere
-from hexcontact.verify import Comparison, reference
+from hexcontact.verify import Comparison
 
 
 def failures(comparison: Comparison) -> list[str]:
@@ -88,8 +89,8 @@ def test_plane_stick_ratio_at_its_limits() -> None:
 def test_bodies_with_given_constants() -> None:
     for beta, gamma in ((0.19, 0.3), (-0.25, 0.4), (0.0, 0.4925), (0.49, 0.0)):
         loads = [{"normal_load": 1e-3}]
-        pair = verify_runs.run(
-            *verify_runs.bodies(beta, gamma, Sphere(radius=1.0)),
+        pair = runs.run(
+            *runs.bodies(beta, gamma, Sphere(radius=1.0)),
             nodes_in_radius=2,
             friction_coefficient=0.1,
             loads=loads,
@@ -98,71 +99,71 @@ def test_bodies_with_given_constants() -> None:
 
 
 def test_dissimilar_spheres() -> None:
-    comparison = verify_dissimilar.table_9_3({(40, 0.1): (1,), (40, 0.6): (10,)})
+    comparison = dissimilar.table_9_3({(40, 0.1): (1,), (40, 0.6): (10,)})
     assert failures(comparison) == []
     assert judged(comparison) == 4 + 2 * 4 + 4
 
 
 def test_sphere_on_a_rigid_plane() -> None:
-    comparison = verify_dissimilar.rigid_plane((10,))
+    comparison = dissimilar.rigid_plane((10,))
     assert failures(comparison) == []
     assert judged(comparison) == 1
 
 
 def test_stick_radii() -> None:
-    comparison = verify_no_slip.stick_radii({40.25: (("0.3",), ("0.3", "0.5"))})
+    comparison = no_slip.stick_radii({40.25: (("0.3",), ("0.3", "0.5"))})
     assert failures(comparison) == []
     assert judged(comparison) == 3
 
 
 def test_punch_without_slip() -> None:
-    comparison = verify_no_slip.flat_punch(betas=(0.0, 0.3))
+    comparison = no_slip.flat_punch(betas=(0.0, 0.3))
     assert failures(comparison) == []
     assert judged(comparison) == 2
 
 
 def test_unloading() -> None:
-    comparison = verify_unloading.unloading(verify_unloading.PATHS[1:])
+    comparison = unloading.unloading(unloading.PATHS[1:])
     assert failures(comparison) == []
     assert judged(comparison) == 3 + 3 * 5
 
 
 def test_crossed_cylinders_with_friction() -> None:
-    comparison = verify_crossed.crossed_cylinders(((14, 1, (60,)),), (0.25,), printed=(90,))
+    comparison = crossed_cylinders.crossed_cylinders(((14, 1, (60,)),), (0.25,), printed=(90,))
     assert failures(comparison) == []
     assert judged(comparison) == 8 + 4
 
 
 def test_prescribed_shift_and_torsion() -> None:
-    comparison = verify_tangential.prescribed_shift((0.4925,))
+    comparison = tangential.prescribed_shift((0.4925,))
     assert failures(comparison) == []
     assert judged(comparison) == 4
-    comparison = verify_tangential.torsion((0.4925,))
+    comparison = tangential.torsion((0.4925,))
     assert failures(comparison) == []
     assert judged(comparison) == 4 * 3
 
 
 def test_long_contact() -> None:
-    comparison = verify_plane.cattaneo((0.33,), (0.5,))
+    comparison = plane.cattaneo((0.33,), (0.5,))
     assert failures(comparison) == []
     assert judged(comparison) == 2
 
 
 def test_fretting() -> None:
-    comparison = verify_fretting.fretting((20,))
+    comparison = fretting.fretting((20,))
     assert failures(comparison) == []
     assert judged(comparison) == 9 * 4 - 1
     assert comparison.rows[0].published == pytest.approx(3211.257e6)
 
 
 def test_methods() -> None:
-    comparison = verify_methods.methods({"goodman": verify_methods.HISTORIES["goodman"]})
+    comparison = methods.methods({"goodman": methods.HISTORIES["goodman"]})
     assert failures(comparison) == []
     assert judged(comparison) == 2 * 2
 
 
 def test_compliance() -> None:
-    comparison = verify_fretting.compliance((0.0, 1.8908), mesh=20)
+    comparison = fretting.compliance((0.0, 1.8908), mesh=20)
     assert failures(comparison) == []
     assert judged(comparison) == 2 + 2
 
@@ -172,35 +173,35 @@ def test_compliance() -> None:
 
 def test_a_little_more_friction_is_a_failure(monkeypatch) -> None:
     """Two percent: shifts and stick areas change by more than a coarse mesh does."""
-    monkeypatch.setattr(verify_fretting, "FRICTION", 0.102)
-    monkeypatch.setattr(verify_fretting, "_name", lambda step: f"13.2 step {step} Q/muP={RATIO[step]}")
-    failed = failures(verify_fretting.fretting((20,)))
+    monkeypatch.setattr(fretting, "FRICTION", 0.102)
+    monkeypatch.setattr(fretting, "_name", lambda step: f"13.2 step {step} Q/muP={RATIO[step]}")
+    failed = failures(fretting.fretting((20,)))
     assert len(failed) > 5
     assert any("Δ_x" in each for each in failed)
 
 
 RATIO = {
-    step: f"{0.1 * (step - 10) / 3.15:.4f}" for step in verify_fretting.STEPS
+    step: f"{0.1 * (step - 10) / 3.15:.4f}" for step in fretting.STEPS
 }  # what the reference table calls the steps
 
 
 def test_few_steps(monkeypatch) -> None:
-    found = verify_entry.entry(20, 40, (5,))
+    found = entry.entry(20, 40, (5,))
     assert judged(found) == 4
     assert failures(found) == []
     # as if solver.entry did nothing
-    monkeypatch.setattr(verify_entry, "run", lambda *a, entry="", **k: verify_runs.run(*a, **k))
-    assert len(failures(verify_entry.entry(20, 40, (5,)))) == 3
+    monkeypatch.setattr(entry, "run", lambda *a, entry="", **k: runs.run(*a, **k))
+    assert len(failures(entry.entry(20, 40, (5,)))) == 3
 
 
 def test_other_materials_are_a_failure(monkeypatch) -> None:
-    monkeypatch.setattr(verify_dissimilar, "STIFF", {"young_modulus": 430e9, "poisson_ratio": 0.32})
-    assert len(failures(verify_dissimilar.table_9_3({(40, 0.1): (1,)}))) > 3
+    monkeypatch.setattr(dissimilar, "STIFF", {"young_modulus": 430e9, "poisson_ratio": 0.32})
+    assert len(failures(dissimilar.table_9_3({(40, 0.1): (1,)}))) > 3
 
 
 def test_the_reference_names_the_cases_of_the_checks() -> None:
     """A name that is not in the reference table would end a check of minutes with a KeyError."""
-    for step in verify_fretting.STEPS:
-        assert not math.isnan(reference(verify_fretting._name(step), "p_max").reference)
+    for step in fretting.STEPS:
+        assert not math.isnan(reference(fretting._name(step), "p_max").reference)
     friction = {"table-9.3", "cattaneo-mindlin", "loop", "torsion", "fretting", "unloading", "goodman"}
-    assert friction <= set(verify_cases.CHECKS)
+    assert friction <= set(checks.CHECKS)

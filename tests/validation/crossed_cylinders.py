@@ -1,15 +1,17 @@
-"""Checks of ``hexcontact verify``: crossed cylinders pressed with friction (section 9.3, Figure 9.4)."""
+"""Checks: crossed cylinders pressed with friction (section 9.3, Figure 9.4)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from . import analytic, estimators
-from .surfaces import Cylinder
-from .verify import Comparison, reference
-from .verify_normal import ellipse_error
-from .verify_runs import DIGITS, Run, State, press, run
+from hexcontact import analytic, estimators
+from hexcontact.surfaces import Cylinder
+from hexcontact.verify import Comparison
+
+from .normal import ellipse_error
+from .reference import reference
+from .runs import DIGITS, Run, State, press, run
 
 STEEL = {"young_modulus": 200e9, "poisson_ratio": 0.30}
 ALUMINUM = {"young_modulus": 69e9, "poisson_ratio": 0.33}

@@ -1,14 +1,16 @@
-"""Checks of ``hexcontact verify``: dissimilar spheres pressed with friction (section 9.2, Table 9.3)."""
+"""Checks: dissimilar spheres pressed with friction (section 9.2, Table 9.3)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from . import analytic_friction as closed
-from .surfaces import Sphere
-from .verify import Comparison, reference
-from .verify_runs import (
+from hexcontact import analytic_friction as closed
+from hexcontact.surfaces import Sphere
+from hexcontact.verify import Comparison
+
+from .reference import reference
+from .runs import (
     ALUMINUM,
     BALL,
     RIGID,
@@ -102,7 +104,7 @@ def table_9_3(paths: Mapping[tuple[int, float], Sequence[int]] | None = None) ->
 
 
 def _without_friction(found: Comparison) -> None:
-    from .verify_normal import solve
+    from .normal import solve
 
     for mesh, load in LOAD.items():
         hertz = hertz_of(dissimilar_pair(), load)

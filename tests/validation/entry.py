@@ -1,14 +1,16 @@
-"""Checks of ``hexcontact verify``: nodes that come into contact, and how many load steps they need."""
+"""Checks: nodes that come into contact, and how many load steps they need."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from . import analytic_friction as closed
-from .surfaces import Sphere
-from .verify import Comparison, reference
-from .verify_dissimilar import LOAD
-from .verify_runs import (
+from hexcontact import analytic_friction as closed
+from hexcontact.surfaces import Sphere
+from hexcontact.verify import Comparison
+
+from .dissimilar import LOAD
+from .reference import reference
+from .runs import (
     ALUMINUM,
     BALL,
     STIFF,

@@ -1,4 +1,4 @@
-"""Check of ``hexcontact verify``: estimated discretization errors against true ones."""
+"""Check: estimated discretization errors against true ones."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analytic
-from .analytic_friction import MindlinContact
-from .case import Case
-from .native import ElasticPair
-from .progress import Reporter
-from .refinement import InMemory, refine
-from .surfaces import Cylinder, Sphere
-from .verify import Comparison
-from .verify_runs import shear_compliance
+from hexcontact import analytic
+from hexcontact.analytic_friction import MindlinContact
+from hexcontact.case import Case
+from hexcontact.native import ElasticPair
+from hexcontact.progress import Reporter
+from hexcontact.refinement import InMemory, refine
+from hexcontact.surfaces import Cylinder, Sphere
+from hexcontact.verify import Comparison
+
+from .runs import shear_compliance
 
 Array = NDArray[np.float64]
 Exact = Mapping[str, float]

@@ -1,4 +1,4 @@
-"""Checks of ``hexcontact verify``: dissimilar spheres pressed, then sheared (section 13.2)."""
+"""Checks: dissimilar spheres pressed, then sheared (section 13.2)."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from .analytic_friction import MindlinContact
-from .surfaces import Sphere
-from .verify import Comparison, reference
-from .verify_runs import (
+from hexcontact.analytic_friction import MindlinContact
+from hexcontact.surfaces import Sphere
+from hexcontact.verify import Comparison
+
+from .reference import reference
+from .runs import (
     ALUMINUM,
     BALL,
     DIGITS,

@@ -1,4 +1,4 @@
-"""Checks of ``hexcontact verify``: both methods with friction lead to one solution."""
+"""Checks: both methods with friction lead to one solution."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from .surfaces import Sphere
-from .verify import Comparison
-from .verify_runs import ALUMINUM, BALL, STIFF, bodies, dissimilar_pair, hertz_of, press, run
+from hexcontact.surfaces import Sphere
+from hexcontact.verify import Comparison
+
+from .runs import ALUMINUM, BALL, STIFF, bodies, dissimilar_pair, hertz_of, press, run
 
 ROUGH = hertz_of(dissimilar_pair(), 31.5).contact_radius / 8  # spacing: a few hundred nodes in contact
 PRESSED = {"normal_load": 31.5, "steps": 4}

@@ -1,14 +1,16 @@
-"""Checks of ``hexcontact verify``: contacts that cannot slip, and the stick radius of self-similar ones."""
+"""Checks: contacts that cannot slip, and the stick radius of self-similar ones."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 
-from . import analytic_friction as closed
-from .surfaces import Punch, Sphere
-from .verify import Comparison, reference
-from .verify_runs import DIGITS, bodies, hertz_of, press, run
+from hexcontact import analytic_friction as closed
+from hexcontact.surfaces import Punch, Sphere
+from hexcontact.verify import Comparison
+
+from .reference import reference
+from .runs import DIGITS, bodies, hertz_of, press, run
 
 NO_SLIP = math.inf
 

@@ -1,4 +1,4 @@
-"""Checks of ``hexcontact verify`` that solve frictionless contacts."""
+"""Checks that solve frictionless contacts."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analytic, estimators
-from .case import Case
-from .surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere, Surface
-from .verify import Comparison, reference
+from hexcontact import analytic, estimators
+from hexcontact.case import Case
+from hexcontact.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere, Surface
+from hexcontact.verify import Comparison
+
+from .reference import reference
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Checks of ``hexcontact verify``: the middle of a long contact against plane solutions (Figure 13.3)."""
+"""Checks: the middle of a long contact against plane solutions (Figure 13.3)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from . import analytic
-from .analytic_friction import PlaneCattaneo, goodman_stick_ratio_plane
-from .surfaces import Paraboloid
-from .verify import Comparison
-from .verify_runs import Array, Mask, State, bodies, press, run
+from hexcontact import analytic
+from hexcontact.analytic_friction import PlaneCattaneo, goodman_stick_ratio_plane
+from hexcontact.surfaces import Paraboloid
+from hexcontact.verify import Comparison
+
+from .runs import Array, Mask, State, bodies, press, run
 
 # A barrel along x, so that the contact is 18 times as long as it is wide.
 LONG = Paraboloid(radius_x=100.0, radius_y=1.0)

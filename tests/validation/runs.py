@@ -1,4 +1,4 @@
-"""Contacts with friction as the checks of ``hexcontact verify`` need them: solved, and read step by step."""
+"""Contacts with friction as the checks need them: solved, and read step by step."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analytic, estimators
-from .case import Case
-from .native import ElasticPair
-from .result import Result
-from .surfaces import Sphere, Surface
+from hexcontact import analytic, estimators
+from hexcontact.case import Case
+from hexcontact.native import ElasticPair
+from hexcontact.result import Result
+from hexcontact.surfaces import Sphere, Surface
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -1,4 +1,4 @@
-"""Checks of ``hexcontact verify``: alike spheres pressed, then sheared or twisted (sections 13.1 and 6)."""
+"""Checks: alike spheres pressed, then sheared or twisted (sections 13.1 and 6)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .analytic_friction import LubkinTorsion, MindlinContact
-from .native import ElasticPair
-from .surfaces import Sphere
-from .verify import Comparison, reference
-from .verify_runs import DIGITS, Run, State, bodies, each, hertz_of, run, shear_compliance, twist_compliance
+from hexcontact.analytic_friction import LubkinTorsion, MindlinContact
+from hexcontact.native import ElasticPair
+from hexcontact.surfaces import Sphere
+from hexcontact.verify import Comparison
+
+from .reference import reference
+from .runs import DIGITS, Run, State, bodies, each, hertz_of, run, shear_compliance, twist_compliance
 
 # ------------------------------------------------------------------------- Cattaneo-Mindlin, Figure 13.2
 

@@ -1,13 +1,15 @@
-"""Checks of ``hexcontact verify``: a dissimilar sphere pressed with friction and let go again."""
+"""Checks: a dissimilar sphere pressed with friction and let go again."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .surfaces import Sphere
-from .verify import Comparison, reference
-from .verify_runs import DIGITS, bodies, hertz_of, press, run
+from hexcontact.surfaces import Sphere
+from hexcontact.verify import Comparison
+
+from .reference import reference
+from .runs import DIGITS, bodies, hertz_of, press, run
 
 LOAD = 4.0 / 3.0  # E* = 1, R = 1: a_Hertz = 1
 MESH = 40

@@ -15,6 +15,7 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
+from ._version import __version__ as __version__
 from .errors import (
     AccuracyWarning,
     ConvergenceError,
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     from .step import Step
     from .store import open_result
     from .study import Study, run_study
-
-__version__ = "0.3.0"
 
 _HOME = {
     "Case": "case",

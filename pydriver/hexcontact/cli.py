@@ -12,7 +12,8 @@ from typing import Annotated
 
 import typer
 
-from . import __version__, cli_deck, cli_show, cli_solve, plot_choices
+from . import cli_deck, cli_show, cli_solve, plot_choices
+from ._version import __version__
 from .cli_guard import Commands, warn_plainly
 
 app = typer.Typer(

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import __version__
+from ._version import __version__
 from .errors import ConvergenceError, DeckError, Fault, ResourceError
 from .progress import RESIDUALS
 

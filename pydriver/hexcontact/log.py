@@ -48,7 +48,7 @@ def _word(value: Any) -> str:
 
 def begun(case: Case, lattice: Lattice, done: int) -> None:
     """Tell of a run that begins, or goes on after so many steps."""
-    from . import __version__
+    from ._version import __version__
     from .solve import parameters_of
 
     if not logger.isEnabledFor(logging.INFO):

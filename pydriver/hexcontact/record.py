@@ -43,7 +43,7 @@ def write_record(path: Path, metadata: Metadata, step: Step) -> None:
     OSError
         If the file cannot be written.
     """
-    from . import __version__
+    from ._version import __version__
 
     layout = Layout(metadata, [step.head])
     about = {

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import __version__, summary
+from . import summary
+from ._version import __version__
 from .errors import DeckError
 from .progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, quantity, worth_showing
 from .report_fields import kept_steps, maps_of, rounded

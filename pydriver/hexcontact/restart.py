@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import __version__
+from ._version import __version__
 from .errors import DeckError, HexcontactError
 from .netcdf import read_output
 from .progress import Reporter, reporter

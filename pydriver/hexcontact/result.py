@@ -42,7 +42,7 @@ def now() -> str:
 
 
 def _version() -> str:
-    from . import __version__
+    from ._version import __version__
 
     return __version__
 
@@ -188,7 +188,7 @@ class Layout:
 
     def attributes(self, complete: bool) -> dict[str, Any]:
         """Global attributes; `complete` says whether all planned steps are there."""
-        from . import __version__
+        from ._version import __version__
 
         window = self.window
         return {

@@ -157,7 +157,7 @@ class StudyFolder:
 
     def _is_final(self, case: PlannedCase) -> bool:
         """Tell whether a case has failed for good: by itself, in this version of the program."""
-        from . import __version__
+        from ._version import __version__
 
         failure = self.failure(case)
         if failure is None or not failure.lasting or failure.exit_code not in _FINAL:
@@ -174,7 +174,7 @@ class StudyFolder:
 
     def note(self, case: PlannedCase, outcome: Outcome) -> None:
         """Write down how a case has ended, and clear away what attempts have left."""
-        from . import __version__
+        from ._version import __version__
 
         path = self.path(case)
         if outcome.exit_code:

@@ -513,8 +513,8 @@ class Case:
         )
 
     def _repr_html_(self) -> str:
-        from .display import html_table
         from .summary import case_rows
+        from .text import html_table
 
         return html_table(self.title or "Case", ("", ""), case_rows(self))
 

@@ -36,6 +36,7 @@ class Arrows(enum.StrEnum):
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Say what a result holds: origin, history, residuals, the last load step against Hertz."""
     from . import json_output, summary
+    from .text import rich_table
 
     result = _open(file)
     if as_json:
@@ -46,9 +47,9 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
     console.print(summary.history_table(histories, console))
     console.print(summary.pairs("Last load step", summary.step_rows(histories[-1])))
     if case is not None and (rows := summary.hertz_rows(case, histories[-1])):
-        console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+        console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if rows := summary.trial_rows(result):
-        console.print(summary.table("Accuracy", summary.TRIAL_HEADERS, rows))
+        console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, rows))
     return None
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from .errors import ConvergenceError
 from .load_history import LEAST
 from .messages import listed
-from .progress import RESIDUALS, quantity
+from .progress import RESIDUALS
+from .text import quantity
 
 if TYPE_CHECKING:
     from .case import Case

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import matplotlib
 from matplotlib.figure import Figure
 
-from .closed_forms import ClosedForms
+from .analytic.shear import ClosedForms
 from .plotting_compliance import compliance
 from .plotting_history import draw_history, fitted, history, loop, torsion
 from .plotting_maps import draw_field, field_map, outline, set_plane, widened

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .analytic_friction import MindlinContact
-from .closed_forms import CIRCULAR
+from .analytic.friction import MindlinContact
+from .analytic.shear import CIRCULAR
 from .plotting_style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, new_figure, set_title
 from .step_view import QuadraticGap, as_list, dataset_of
 

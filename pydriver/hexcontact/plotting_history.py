@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from .closed_forms import ClosedForms, line_of
+from .analytic.shear import ClosedForms, line_of
 from .plotting_style import COMPUTED, EXACT, GUIDE, STYLE, new_figure, set_title
 from .step_view import dataset_of, scaled
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from .closed_forms import ClosedForms, PartialSlip
+from .analytic.shear import ClosedForms, PartialSlip
 from .plotting_maps import step_label
 from .plotting_style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, legend_below, new_figure, set_title, shades
 from .step_view import StepView, dataset_of, scaled, worded

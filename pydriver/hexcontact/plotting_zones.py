@@ -15,7 +15,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from . import estimators
-from .closed_forms import ClosedForms, PartialSlip
+from .analytic.shear import ClosedForms, PartialSlip
 from .edges import ContactEdges, Edge
 from .plotting_maps import (
     FEWER_ARROWS,

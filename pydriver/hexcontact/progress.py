@@ -8,34 +8,10 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from typing import IO, TYPE_CHECKING, Any
 
+from .text import percent, quantity
+
 if TYPE_CHECKING:
-    from .result import Step
-
-PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-
-
-def quantity(value: float, unit: str = "", digits: int = 4) -> str:
-    """Write a number as an engineer would: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``.
-
-    Parameters
-    ----------
-    value : float
-        The number, in SI.
-    unit : str
-        A unit that takes a prefix; without one, or where no prefix fits, the number is written plainly.
-    digits : int
-        Significant digits.
-    """
-    if math.isnan(value):
-        return "-"
-    if value == 0 or math.isinf(value):
-        return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
-    rounded = float(f"{value:.{digits - 1}e}")
-    power = 3 * math.floor(math.log10(abs(rounded)) / 3)
-    if not unit or power not in PREFIXES:
-        return f"{rounded:.{digits}g} {unit}".rstrip()
-    scaled = f"{rounded / 10.0**power:#.{digits}g}".rstrip(".")
-    return f"{scaled} {PREFIXES[power]}{unit}"
+    from .step import Step
 
 
 class Reporter:
@@ -245,11 +221,6 @@ def error_of(name: str, history: Mapping[str, Any]) -> str:
     value, error = abs(float(history[own])), float(history.get(f"{own}_error", 0.0))
     least = _NOISE * _scale(name, history) if name in LOADS_AND_MOTIONS else 0.0
     return f" ± {percent(error / value)}" if value > least and error > 0.0 else ""
-
-
-def percent(share: float) -> str:
-    """Write a share with two digits, as "0.051 %"."""
-    return f"{100.0 * share:.2g} %" if math.isfinite(share) else "-"
 
 
 def stick_share(history: Mapping[str, Any]) -> str:

@@ -21,8 +21,9 @@ import numpy as np
 from . import accuracy, log
 from .accuracy import LEAST_LEVELS, RATIO, SHIFTS, Solution
 from .errors import ResourceError, StopRun
-from .progress import Reporter, quantity
+from .progress import Reporter
 from .result import Metadata, Result, Step, assemble
+from .text import quantity
 from .variables import ESTIMATED
 
 if TYPE_CHECKING:

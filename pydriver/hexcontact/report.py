@@ -22,9 +22,10 @@ import numpy as np
 from . import summary
 from ._version import __version__
 from .errors import DeckError
-from .progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, quantity, worth_showing
+from .progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
 from .report_fields import kept_steps, maps_of, rounded
 from .step_view import scaled
+from .text import quantity
 from .variables import VARIABLES
 
 if TYPE_CHECKING:

@@ -474,7 +474,8 @@ class Result(ResultTools):
 
     def __repr__(self) -> str:
         """Say in a few lines what is there."""
-        from .display import result_header, result_rows, text_table
+        from .display import result_header, result_rows
+        from .text import text_table
 
         fields = [name for name in FIELDS if name in self.dataset]
         table = text_table(("", ""), result_rows(self))

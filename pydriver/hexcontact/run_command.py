@@ -19,6 +19,7 @@ from .errors import AccuracyWarning, DeckError
 from .interruption import Interrupted, in_background
 from .progress import reporter
 from .store import open_result
+from .text import rich_table
 
 if TYPE_CHECKING:
     from .case import Case
@@ -164,9 +165,9 @@ def summarize(
     console.print(summary.pairs(f"Last load step of {case.title!r}" if case.title else "Last load step",
                                 summary.step_rows(last)))  # fmt: skip
     if rows := summary.hertz_rows(case, last):
-        console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+        console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if refined is not None:
-        console.print(summary.table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
+        console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
     if remark := summary.limited_steps(histories, case.solver.step_tolerance):
         console.print(f"note: {remark}", soft_wrap=True)
     console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from .progress import quantity
 from .study import Outcome, PlannedCase, Study, StudyWatcher
+from .text import quantity
 
 if TYPE_CHECKING:
     from .run_command import Listeners

@@ -12,18 +12,16 @@ from .errors import HexcontactError
 from .messages import listed
 from .progress import (
     LOADS_AND_MOTIONS,
-    PREFIXES,
     error_of,
     fitted,
     is_frictional,
     load_or_motion,
-    percent,
-    quantity,
     residuals,
     step_error_share,
     stick_share,
     worth_showing,
 )
+from .text import PREFIXES, percent, quantity, rich_table
 from .variables import VARIABLES
 
 if TYPE_CHECKING:
@@ -57,27 +55,9 @@ def console() -> Console:
     return Console(highlight=False, markup=False, emoji=False, width=width)
 
 
-def table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: bool = False) -> Table:
-    """Return a table of numbers; names and labels are text, which may wrap on a narrow terminal."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    shown = Table(
-        title=Text(title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, show_header=any(headers),
-        pad_edge=False, collapse_padding=tight,
-    )  # fmt: skip
-    for header in headers:
-        text = header in ("", "label")
-        shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
-    for row in rows:
-        shown.add_row(*map(Text, row))
-    return shown
-
-
 def pairs(title: str, rows: Iterable[Row]) -> Table:
     """Return a table of names and what belongs to them."""
-    return table(title, ("", ""), rows)
+    return rich_table(title, ("", ""), rows)
 
 
 # --- before the run -------------------------------------------------------------------------------
@@ -266,7 +246,7 @@ def history_table(histories: Sequence[History], console: Console) -> Table:
         for spare in ("", "time", "label", "residual"):
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
-            shown = table("History", ("step", *columns), rows, tight=True)
+            shown = rich_table("History", ("step", *columns), rows, tight=True)
             if console.measure(shown, options=console.options.update_width(1000)).maximum <= console.width:
                 return shown
     return shown

@@ -19,9 +19,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.quiver import Quiver
 
-from hexcontact import analytic, closed_forms, plotting, plotting_zones
-from hexcontact.analytic_friction import LubkinTorsion, MindlinContact
-from hexcontact.closed_forms import ClosedForms
+from hexcontact import analytic, plotting, plotting_zones
+from hexcontact.analytic import shear as closed_forms
+from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
+from hexcontact.analytic.shear import ClosedForms
 from hexcontact.lattice import Lattice
 from hexcontact.plotting_compliance import initial_compliance
 from hexcontact.plotting_history import panels_of

@@ -16,10 +16,11 @@ from hexcontact import memory, native, solve
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.errors import ConvergenceError, DeckError, ResourceError
-from hexcontact.progress import Lines, Reporter, quantity, reporter
+from hexcontact.progress import Lines, Reporter, reporter
 from hexcontact.result import Step
 from hexcontact.store import journal_of, open_result
 from hexcontact.surfaces import Punch, Sphere
+from hexcontact.text import quantity
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 ALUMINIUM = {"young_modulus": 70e9, "poisson_ratio": 0.33}

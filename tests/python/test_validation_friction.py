@@ -20,7 +20,7 @@ from validation import (
 )
 from validation.reference import reference
 
-from hexcontact.analytic_friction import PlaneCattaneo, goodman_stick_ratio_plane
+from hexcontact.analytic.friction import PlaneCattaneo, goodman_stick_ratio_plane
 from hexcontact.surfaces import Sphere
 from hexcontact.verify import Comparison
 

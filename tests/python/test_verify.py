@@ -12,7 +12,7 @@ from validation.reference import TABLE, reference
 from validation.run import markdown
 
 from hexcontact import verify
-from hexcontact.analytic_friction import MindlinContact
+from hexcontact.analytic.friction import MindlinContact
 from hexcontact.errors import DeckError
 from hexcontact.native import ElasticPair
 from hexcontact.verify import Check, Comparison

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from hexcontact import analytic_friction as closed
+from hexcontact.analytic import friction as closed
 from hexcontact.surfaces import Sphere
 from hexcontact.verify import Comparison
 

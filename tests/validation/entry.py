@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexcontact import analytic_friction as closed
+from hexcontact.analytic import friction as closed
 from hexcontact.surfaces import Sphere
 from hexcontact.verify import Comparison
 

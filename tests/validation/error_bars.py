@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexcontact import analytic
-from hexcontact.analytic_friction import MindlinContact
+from hexcontact.analytic.friction import MindlinContact
 from hexcontact.case import Case
 from hexcontact.native import ElasticPair
 from hexcontact.progress import Reporter

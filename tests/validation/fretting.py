@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hexcontact.analytic_friction import MindlinContact
+from hexcontact.analytic.friction import MindlinContact
 from hexcontact.surfaces import Sphere
 from hexcontact.verify import Comparison
 

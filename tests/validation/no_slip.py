@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from hexcontact import analytic_friction as closed
+from hexcontact.analytic import friction as closed
 from hexcontact.surfaces import Punch, Sphere
 from hexcontact.verify import Comparison
 

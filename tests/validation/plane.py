@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hexcontact import analytic
-from hexcontact.analytic_friction import PlaneCattaneo, goodman_stick_ratio_plane
+from hexcontact.analytic.friction import PlaneCattaneo, goodman_stick_ratio_plane
 from hexcontact.surfaces import Paraboloid
 from hexcontact.verify import Comparison
 

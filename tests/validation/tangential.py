@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hexcontact.analytic_friction import LubkinTorsion, MindlinContact
+from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
 from hexcontact.native import ElasticPair
 from hexcontact.surfaces import Sphere
 from hexcontact.verify import Comparison

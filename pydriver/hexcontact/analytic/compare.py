@@ -3,49 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .display import html_table, text_table
-from .errors import DeckError
-from .progress import quantity
-from .variables import VARIABLES
+from ..errors import DeckError
+from ..text import html_table, quantity, rich_table, text_table
+from ..variables import VARIABLES
+from .recognise import Exact, closed_solutions
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
+    import xarray
     from rich.table import Table
-
-    from .result import Result
 
 Array = NDArray[np.float64]
 
 _HEADERS = ("", "solution", "exact", "computed", "error")
-
-
-@dataclass(frozen=True)
-class Exact:
-    """What a closed solution says about a load step.
-
-    Attributes
-    ----------
-    solution : str
-        Whose solution it is.
-    values : mapping of str to float
-        Its values (SI), by the names of the quantities of a result.
-    fields : mapping of str to callable
-        Fields as functions of x and y (m), by their names.
-    scales : mapping of str to float
-        What the errors of the fields are measured against.
-    """
-
-    solution: str
-    values: Mapping[str, float]
-    fields: Mapping[str, Callable[[Array, Array], Array]] = field(default_factory=dict)
-    scales: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -151,9 +128,7 @@ class Comparison(Sequence[Entry]):
 
     def __rich__(self) -> Table:
         """Return the table for a terminal."""
-        from .summary import table
-
-        shown = table(self._title, _HEADERS, self._rows())
+        shown = rich_table(self._title, _HEADERS, self._rows())
         shown.caption = self.note or None
         return shown
 
@@ -168,29 +143,29 @@ def _shown(value: float, unit: str) -> str:
 # --- comparing ----------------------------------------------------------------------------------------------
 
 
-def compare(result: Result, exact: Mapping[str, float] | object | None, step: int, name: str) -> Comparison:
-    """Compare a load step; see `hexcontact.Result.compare`."""
-    data = result.step(step)
+def compare(
+    dataset: xarray.Dataset, data: xarray.Dataset, exact: Mapping[str, float] | object | None, name: str
+) -> Comparison:
+    """Compare a load step of a dataset, `data`; see `hexcontact.Result.compare`."""
     number = int(data["step"])
     note = ""
     if exact is None:
-        from .closed_solutions import closed_solutions
-
-        known, note = closed_solutions(result, number)
+        known, note = closed_solutions(dataset, number)
     else:
-        known = [_own(exact, name, result)]
+        known = [_own(exact, name, dataset)]
     entries = [entry for one in known for entry in _entries(data, one)]
     radius = float(data["contact_radius"]) if "contact_radius" in data else 0.0
     if entries and radius and not note:
-        note = f"{radius / result.lattice.spacing:.3g} spacings in the contact radius"
+        spacings = radius / float(dataset.attrs["lattice_spacing"])
+        note = f"{spacings:.3g} spacings in the contact radius"
     return Comparison(entries, number, note)
 
 
-def _own(exact: Mapping[str, float] | object, name: str, result: Result) -> Exact:
+def _own(exact: Mapping[str, float] | object, name: str, dataset: xarray.Dataset) -> Exact:
     """Return a solution that the user gave."""
     if isinstance(exact, Mapping):
         for quantity_name in exact:
-            if result[str(quantity_name)].dims != ("step",):
+            if dataset[str(quantity_name)].dims != ("step",):
                 raise DeckError(f"{quantity_name}: expected a quantity with one value by step")
         return Exact(name, {str(key): float(value) for key, value in exact.items()})
     names = ("normal_load", "approach", "max_pressure", "contact_radius")

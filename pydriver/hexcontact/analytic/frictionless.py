@@ -8,7 +8,7 @@ The axisymmetric solutions come from one theorem (Galin, Sneddon): with
 
     P = 2 E* integral_0^a (delta(a) - delta(t)) dt,     p(r) = E*/pi integral_r^a delta'(t)/sqrt(t^2-r^2) dt.
 
-The solutions with friction are in :mod:`hexcontact.analytic_friction`.
+The solutions with friction are in :mod:`hexcontact.analytic.friction`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 import scipy  # its parts are loaded when they are first used: a fifth of a second
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import number, reals
+from ..arguments import number, reals
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array], Array]

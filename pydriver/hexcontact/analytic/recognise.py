@@ -9,24 +9,23 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import analytic, analytic_friction
-from .closed_forms import CIRCULAR, ClosedForms, superposed
-from .comparison import Exact
-from .deck import Deck
-from .step_view import SIMILAR, QuadraticGap
+from ..deck import Deck
+from . import friction, frictionless
+from .hertz_gap import SIMILAR, QuadraticGap
+from .shear import CIRCULAR, ClosedForms, superposed
 
 if TYPE_CHECKING:
     import xarray
 
-    from .analytic import AxisymmetricContact
-    from .result import Result
-    from .surfaces import Surface
+    from ..surfaces import Surface
+    from .frictionless import AxisymmetricContact
 
 Array = NDArray[np.float64]
 
@@ -34,18 +33,40 @@ _STEADY = 1e-6  # share of the sliding load, or of a motion, that counts as none
 _NAMES = {"cone": "Sneddon", "power": "Sneddon", "punch": "Sneddon", "rounded_punch": "Sneddon, Galin"}
 
 
-def closed_solutions(result: Result, number: int) -> tuple[list[Exact], str]:
+@dataclass(frozen=True)
+class Exact:
+    """What a closed solution says about a load step.
+
+    Attributes
+    ----------
+    solution : str
+        Whose solution it is.
+    values : mapping of str to float
+        Its values (SI), by the names of the quantities of a result.
+    fields : mapping of str to callable
+        Fields as functions of x and y (m), by their names.
+    scales : mapping of str to float
+        What the errors of the fields are measured against.
+    """
+
+    solution: str
+    values: Mapping[str, float]
+    fields: Mapping[str, Callable[[Array, Array], Array]] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
+
+
+def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact], str]:
     """Return the closed solutions that hold for a load step, and a sentence if there are none.
 
     Parameters
     ----------
-    result : Result
-        The result.
+    dataset : xarray.Dataset
+        That of a result.
     number : int
         Number of the step, from 1.
     """
-    place = int(np.flatnonzero(result.dataset["step"].values == number)[0])
-    so_far = result.dataset.isel(step=slice(0, place + 1))
+    place = int(np.flatnonzero(dataset["step"].values == number)[0])
+    so_far = dataset.isel(step=slice(0, place + 1))
     load = float(so_far["normal_load"][-1])
     if not load > 0.0:
         return [], "nothing is pressed in this load step"
@@ -92,7 +113,7 @@ def _normal(dataset: xarray.Dataset, load: float) -> list[Exact]:
     """Return the contact without friction: Hertz where the gap is a quadratic form, else by its shape."""
     if not _pressure_is_frictionless(dataset):
         return []
-    frictionless = _friction(dataset) == 0.0  # else shear stores energy, too
+    without_friction = _friction(dataset) == 0.0  # else shear stores energy, too
     gap = QuadraticGap.of(dataset)
     if gap is not None:
         hertz = gap.contact(load)
@@ -102,7 +123,7 @@ def _normal(dataset: xarray.Dataset, load: float) -> list[Exact]:
             "approach": hertz.approach,
             "contact_radius_fit": radius,
         }
-        if frictionless:
+        if without_friction:
             values["elastic_energy"] = 0.4 * load * hertz.approach
         x0, y0 = gap.center
         fields = {"pressure": lambda x, y: hertz.pressure(x - x0, y - y0)}
@@ -114,7 +135,7 @@ def _normal(dataset: xarray.Dataset, load: float) -> list[Exact]:
     values = {"approach": contact.approach}
     if surface.shape != "punch":
         values["contact_radius_fit"] = contact.contact_radius
-    if frictionless and energy:
+    if without_friction and energy:
         values["elastic_energy"] = energy * load * contact.approach
     fields = {}
     if math.isfinite(contact.max_pressure):
@@ -138,14 +159,14 @@ def _only_surface(dataset: xarray.Dataset) -> Surface | None:
 def _axisymmetric(surface: Any, modulus: float, load: float) -> tuple[AxisymmetricContact, float]:
     """Return the contact under a load, and its elastic energy over load times approach (0: unknown)."""
     if surface.shape == "cone":
-        return analytic.cone(modulus, surface.slope, normal_load=load), 1.0 / 3.0
+        return frictionless.cone(modulus, surface.slope, normal_load=load), 1.0 / 3.0
     if surface.shape == "power":
         n = surface.exponent
-        found = analytic.power_law(modulus, surface.coefficient, n, normal_load=load)
+        found = frictionless.power_law(modulus, surface.coefficient, n, normal_load=load)
         return found, n / (2.0 * n + 1.0)  # P ~ approach^(1 + 1/n)
     if surface.shape == "punch":
-        return analytic.flat_punch(modulus, surface.radius, normal_load=load), 0.5
-    found = analytic.rounded_punch(modulus, surface.flat_radius, surface.edge_radius, normal_load=load)
+        return frictionless.flat_punch(modulus, surface.radius, normal_load=load), 0.5
+    found = frictionless.rounded_punch(modulus, surface.flat_radius, surface.edge_radius, normal_load=load)
     return found, 0.0
 
 
@@ -198,7 +219,7 @@ def _dissimilar(dataset: xarray.Dataset, load: float) -> list[Exact]:
     circular = hertz is not None and hertz.semi_minor >= CIRCULAR * hertz.semi_major
     incremental = dataset.attrs.get("algorithm") == "incremental"
     if math.isinf(mu) and not goodman and abs(beta) <= 0.5:
-        kappa, chi = analytic_friction.no_slip_constants(beta)
+        kappa, chi = friction.no_slip_constants(beta)
         if circular and hertz is not None and incremental:
             values = {
                 "approach": chi * (kappa * chi) ** (-2.0 / 3.0) * hertz.approach,
@@ -209,7 +230,7 @@ def _dissimilar(dataset: xarray.Dataset, load: float) -> list[Exact]:
             stiffness = 2.0 * _attribute(dataset, "effective_modulus") * surface.radius  # type: ignore[attr-defined]
             return [Exact("Mossakovskii", {"approach": load / (kappa * stiffness)})]
     if math.isfinite(mu) and goodman and circular and hertz is not None and incremental:
-        ratio = analytic_friction.goodman_stick_ratio(beta, mu)
+        ratio = friction.goodman_stick_ratio(beta, mu)
         return [Exact("Goodman, Spence", {"stick_radius_fit": ratio * hertz.semi_major})]
     return []
 

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .analytic_friction import LubkinTorsion, MindlinContact
-from .step_view import SIMILAR, QuadraticGap
+from .friction import LubkinTorsion, MindlinContact
+from .hertz_gap import SIMILAR, QuadraticGap
 
 if TYPE_CHECKING:
     import xarray
 
-    from .analytic import EllipticContact
+    from .frictionless import EllipticContact
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,3 @@
+"""The earlier name of `hexcontact.analytic.friction`."""
+
+from .analytic.friction import *  # noqa: F403

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from hexcontact import Case, plotting, plotting_influence
+from hexcontact import Case, plotting
+from hexcontact.plotting import influence as plotting_influence
 
 HERE = Path(__file__).parent
 CASES = HERE.parents[1] / "cases"

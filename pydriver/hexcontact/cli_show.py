@@ -143,7 +143,7 @@ def report(
     ] = None,
 ) -> None:
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
-    from .report import write_report
+    from .plotting.report import write_report
 
     print(f"written: {write_report(_open(file), output or file.with_suffix('.html'))}")
 

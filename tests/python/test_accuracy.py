@@ -19,7 +19,7 @@ import hexcontact
 from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError, accuracy, refinement
 from hexcontact.accuracy import RATIO, SHIFTS
 from hexcontact.cli import app
-from hexcontact.report import report
+from hexcontact.plotting.report import report
 from hexcontact.surfaces import Sphere
 from hexcontact.trial_folder import TrialFolder
 from hexcontact.variables import ESTIMATED, VARIABLES

@@ -15,7 +15,7 @@ from PIL import Image
 from rich.console import Console
 
 from hexcontact import Case, Result
-from hexcontact.report_fields import Plane
+from hexcontact.plotting.report_fields import Plane
 from hexcontact.step_view import StepView
 from hexcontact.surfaces import Sphere
 from hexcontact.text import html_table, text_table

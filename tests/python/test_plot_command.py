@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from hexcontact import Case, plot_choices, plot_command, plotting, plotting_influence
+from hexcontact import Case, plot_choices, plot_command, plotting
 from hexcontact.cli import app
 from hexcontact.errors import DeckError
+from hexcontact.plotting import influence as plotting_influence
 
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 

@@ -9,7 +9,8 @@ import pytest
 import xarray
 from matplotlib.figure import Figure
 
-from hexcontact import analytic, estimators, plotting, plotting_maps
+from hexcontact import analytic, estimators, plotting
+from hexcontact.plotting import maps as plotting_maps
 from hexcontact.step_view import StepView, scaled, worded
 
 HEIGHT = np.sqrt(0.75)
@@ -281,7 +282,7 @@ def test_no_window_system_is_touched() -> None:
 
 
 def test_load_shapes_hold_the_same_volume() -> None:
-    from hexcontact import plotting_influence
+    from hexcontact.plotting import influence as plotting_influence
 
     x, y = np.array([300.0, 0.0, -40.0]), np.array([0.0, 200.0, 70.0])
     for shape, _ in plotting_influence.SHAPES.values():
@@ -296,7 +297,7 @@ def test_load_shapes_hold_the_same_volume() -> None:
 
 
 def test_order_of_the_load_shapes() -> None:
-    from hexcontact.plotting_influence import interpolation_error
+    from hexcontact.plotting.influence import interpolation_error
 
     coarse, fine = np.array(interpolation_error(10.0)), np.array(interpolation_error(40.0))
     order = np.log(coarse / fine) / np.log(4.0)
@@ -304,7 +305,7 @@ def test_order_of_the_load_shapes() -> None:
 
 
 def test_displacement_error_of_the_load_shapes() -> None:
-    from hexcontact.plotting_influence import SHAPES, hertz_error
+    from hexcontact.plotting.influence import SHAPES, hertz_error
 
     x = np.linspace(0.0, 8.0, 33)
     error = {
@@ -316,7 +317,7 @@ def test_displacement_error_of_the_load_shapes() -> None:
 
 
 def test_figures_of_the_influence_functions() -> None:
-    from hexcontact import plotting_influence
+    from hexcontact.plotting import influence as plotting_influence
 
     for make in plotting_influence.FIGURES.values():
         stream = io.BytesIO()

@@ -19,13 +19,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.quiver import Quiver
 
-from hexcontact import analytic, plotting, plotting_zones
+from hexcontact import analytic, plotting
 from hexcontact.analytic import shear as closed_forms
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
 from hexcontact.analytic.shear import ClosedForms
 from hexcontact.lattice import Lattice
-from hexcontact.plotting_compliance import initial_compliance
-from hexcontact.plotting_history import panels_of
+from hexcontact.plotting import zones as plotting_zones
+from hexcontact.plotting.compliance import initial_compliance
+from hexcontact.plotting.history import panels_of
 from hexcontact.result import Metadata, Step, assemble
 from hexcontact.step_view import StepView
 

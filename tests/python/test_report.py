@@ -24,8 +24,8 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, open_result
 from hexcontact.cli import app
-from hexcontact.report import report, write_report
-from hexcontact.report_fields import MOST_STEPS, Plane, kept_steps
+from hexcontact.plotting.report import report, write_report
+from hexcontact.plotting.report_fields import MOST_STEPS, Plane, kept_steps
 from hexcontact.result import Result, Step
 from hexcontact.step_view import StepView
 

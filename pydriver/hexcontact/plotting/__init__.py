@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any, cast
 import matplotlib
 from matplotlib.figure import Figure
 
-from .analytic.shear import ClosedForms
-from .plotting_compliance import compliance
-from .plotting_history import draw_history, fitted, history, loop, torsion
-from .plotting_maps import draw_field, field_map, outline, set_plane, widened
-from .plotting_sections import Cut, draw_section, draw_shear, section, tractions
-from .plotting_style import EXACT, STYLE, legend_below, new_figure, set_title
-from .plotting_zones import contact_boundary, draw_zones, outlines, zone_legend, zones
-from .step_view import StepView, dataset_of, scaled
+from ..analytic.shear import ClosedForms
+from ..step_view import StepView, dataset_of, scaled
+from .compliance import compliance
+from .history import draw_history, fitted, history, loop, torsion
+from .maps import draw_field, field_map, outline, set_plane, widened
+from .sections import Cut, draw_section, draw_shear, section, tractions
+from .style import EXACT, STYLE, legend_below, new_figure, set_title
+from .zones import contact_boundary, draw_zones, outlines, zone_legend, zones
 
 if TYPE_CHECKING:
     import xarray
 
-    from .result import Result
+    from ..result import Result
 
 __all__ = [
     "FIGURES",

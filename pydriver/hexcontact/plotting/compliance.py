@@ -9,15 +9,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .analytic.friction import MindlinContact
-from .analytic.shear import CIRCULAR
-from .plotting_style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, new_figure, set_title
-from .step_view import QuadraticGap, as_list, dataset_of
+from ..analytic.friction import MindlinContact
+from ..analytic.shear import CIRCULAR
+from ..step_view import QuadraticGap, as_list, dataset_of
+from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, new_figure, set_title
 
 if TYPE_CHECKING:
     import xarray
 
-    from .step_view import Results
+    from ..step_view import Results
 
 Array = NDArray[np.float64]
 

@@ -11,15 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from .analytic.shear import ClosedForms, line_of
-from .plotting_style import COMPUTED, EXACT, GUIDE, STYLE, new_figure, set_title
-from .step_view import dataset_of, scaled
+from ..analytic.shear import ClosedForms, line_of
+from ..step_view import dataset_of, scaled
+from .style import COMPUTED, EXACT, GUIDE, STYLE, new_figure, set_title
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from .result import Result
+    from ..result import Result
 
 Array = NDArray[np.float64]
 

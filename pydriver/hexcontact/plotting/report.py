@@ -1,6 +1,6 @@
 """A page that shows a result: one HTML file that needs nothing else, neither a network nor this program.
 
-What the page holds is gathered here and in `hexcontact.report_fields`; how it looks and moves is in
+What the page holds is gathered here and in `hexcontact.plotting.report_fields`; how it looks and moves is in
 data/report.html, which draws from numbers and small pictures in the file itself.
 """
 
@@ -19,17 +19,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import summary
-from ._version import __version__
-from .errors import DeckError
-from .progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
+from .. import summary
+from .._version import __version__
+from ..errors import DeckError
+from ..progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
+from ..step_view import scaled
+from ..text import quantity
+from ..variables import VARIABLES
 from .report_fields import kept_steps, maps_of, rounded
-from .step_view import scaled
-from .text import quantity
-from .variables import VARIABLES
 
 if TYPE_CHECKING:
-    from .result import Result
+    from ..result import Result
 
 History = Mapping[str, Any]
 

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .step_view import StepView, scaled
-from .variables import VARIABLES
+from ..step_view import StepView, scaled
+from ..variables import VARIABLES
 
 if TYPE_CHECKING:
-    from .result import Result
+    from ..result import Result
 
 Array = NDArray[np.float64]
 

@@ -13,17 +13,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from .analytic.shear import ClosedForms, PartialSlip
-from .plotting_maps import step_label
-from .plotting_style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, legend_below, new_figure, set_title, shades
-from .step_view import StepView, dataset_of, scaled, worded
+from ..analytic.shear import ClosedForms, PartialSlip
+from ..step_view import StepView, dataset_of, scaled, worded
+from .maps import step_label
+from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, legend_below, new_figure, set_title, shades
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
 
-    from .result import Result
+    from ..result import Result
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]

@@ -14,28 +14,19 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from . import estimators
-from .analytic.shear import ClosedForms, PartialSlip
-from .edges import ContactEdges, Edge
-from .plotting_maps import (
-    FEWER_ARROWS,
-    draw_arrows,
-    map_panels,
-    outer_labels,
-    outline,
-    set_plane,
-    union,
-    views_of,
-)
-from .plotting_style import COMPUTED, EXACT, GUIDE, SLIP, STICK, STYLE, THIRD, set_title, shades
-from .step_view import StepView, as_list, dataset_of, scaled, worded
+from .. import estimators
+from ..analytic.shear import ClosedForms, PartialSlip
+from ..edges import ContactEdges, Edge
+from ..step_view import StepView, as_list, dataset_of, scaled, worded
+from .maps import FEWER_ARROWS, draw_arrows, map_panels, outer_labels, outline, set_plane, union, views_of
+from .style import COMPUTED, EXACT, GUIDE, SLIP, STICK, STYLE, THIRD, set_title, shades
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from .result import Result
-    from .step_view import Results
+    from ..result import Result
+    from ..step_view import Results
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -10,7 +10,7 @@ import numpy as np
 from .surfaces import Surface
 
 if TYPE_CHECKING:
-    from .case import Body
+    from .case_settings import Body
     from .lattice import Lattice
 
 

@@ -13,7 +13,7 @@ from .errors import ConvergenceError, DeckError, Fault, ResourceError
 from .progress import RESIDUALS
 
 if TYPE_CHECKING:
-    from .case import Case
+    from .problem import Problem
     from .result import Result
     from .study import Study
     from .verify import Check, Comparison
@@ -87,7 +87,7 @@ def error(
 # --- what commands have to say ----------------------------------------------------------------------------
 
 
-def of_case(case: Case, output: Path) -> dict[str, Any]:
+def of_case(case: Problem, output: Path) -> dict[str, Any]:
     """Return what would be run."""
     from . import estimates
     from .solve import parameters_of
@@ -117,7 +117,7 @@ def of_steps(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [{"step": number, **history} for number, history in enumerate(histories, start=1)]
 
 
-def of_run(case: Case | None, title: str, histories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def of_run(case: Problem | None, title: str, histories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return what came out of a run that is complete; without a case nothing about Hertz."""
     from .summary import against_hertz
 

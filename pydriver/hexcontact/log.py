@@ -20,8 +20,8 @@ from .errors import DeckError, HexcontactError
 from .progress import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
 
 if TYPE_CHECKING:
-    from .case import Case
     from .lattice import Lattice
+    from .problem import Problem
     from .result import Step
 
 logger = logging.getLogger("hexcontact")
@@ -46,7 +46,7 @@ def _word(value: Any) -> str:
 # --- what is told -----------------------------------------------------------------------------------------
 
 
-def begun(case: Case, lattice: Lattice, done: int) -> None:
+def begun(case: Problem, lattice: Lattice, done: int) -> None:
     """Tell of a run that begins, or goes on after so many steps."""
     from ._version import __version__
     from .solve import parameters_of

@@ -24,7 +24,7 @@ from .store import Store, journal_of, open_result
 from .trial_folder import TrialFolder
 
 if TYPE_CHECKING:
-    from .case import Case
+    from .problem import Problem
 
 _PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that decide what is solved
 _NOT_PHYSICS = ("title", "solver", "output")  # tables of a deck that do not
@@ -37,7 +37,7 @@ class Restart:
 
     Attributes
     ----------
-    case : Case
+    case : Problem
         What is solved.
     store : Store
         Where its steps are, and go.
@@ -47,7 +47,7 @@ class Restart:
         Why the result may not be to the bit that of an uninterrupted run; may be empty.
     """
 
-    case: Case
+    case: Problem
     store: Store
     before: list[Step]
     warning: str = ""
@@ -56,7 +56,7 @@ class Restart:
 def resume(
     path: str | os.PathLike[str],
     *,
-    case: Case | None = None,
+    case: Problem | None = None,
     overrides: Mapping[str, Any] | None = None,
     on_step: Callable[[Step], object] | None = None,
     progress: Reporter | bool | None = None,
@@ -69,7 +69,7 @@ def resume(
     ----------
     path : path
         The output of the run; the steps that are finished are in the journal beside it.
-    case : Case, optional
+    case : Problem, optional
         The problem. Only needed if the deck does not say all of it, as with a gap given in Python.
     overrides : mapping, optional
         New values for keys of the solver, as ``{"solver.tolerance": 1e-7}``, for the steps to come.
@@ -107,7 +107,7 @@ def resume(
 
 @contextlib.contextmanager
 def reopened(
-    path: str | os.PathLike[str], case: Case | None = None, overrides: Mapping[str, Any] | None = None
+    path: str | os.PathLike[str], case: Problem | None = None, overrides: Mapping[str, Any] | None = None
 ) -> Iterator[Restart | None]:
     """Open a run to go on with it, and close it in the end; arguments and errors as `resume`.
 
@@ -162,9 +162,9 @@ def _found(path: Path) -> tuple[Store | None, Step | None]:
     raise DeckError(f"there is neither a file {path} nor a journal {journal_of(path)} of a run")
 
 
-def _case(metadata: Metadata, case: Case | None, overrides: Mapping[str, Any], path: Path) -> Case:
+def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any], path: Path) -> Problem:
     """Make the case again that the run solves."""
-    from .case import Case
+    from .problem import Problem
 
     for key in overrides:
         table, _, name = key.partition(".")
@@ -185,7 +185,7 @@ def _case(metadata: Metadata, case: Case | None, overrides: Mapping[str, Any], p
             f"the gap of {path} was given in Python; go on there: hexcontact.resume({str(path)!r}, case=case)"
         )
     try:
-        again = Case.from_text(metadata.deck, metadata.deck_file or f"deck of {path}", overrides)
+        again = Problem.from_text(metadata.deck, metadata.deck_file or f"deck of {path}", overrides)
     except HexcontactError as error:
         if metadata.version != __version__:
             error.add_note(f"the run was started by hexcontact {metadata.version}, this is {__version__}")
@@ -206,7 +206,7 @@ def _physics(deck: str) -> dict[str, Any]:
     return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
 
 
-def _check(case: Case, store: Store, last: Step | None) -> None:
+def _check(case: Problem, store: Store, last: Step | None) -> None:
     """See to it that the case is the one of the steps, though files that its deck names may have changed."""
     found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
     planned = store.metadata.planned_steps
@@ -218,7 +218,7 @@ def _check(case: Case, store: Store, last: Step | None) -> None:
         check_step(case, last, found)
 
 
-def check_step(case: Case, last: Step, found: str) -> None:
+def check_step(case: Problem, last: Step, found: str) -> None:
     """See to it that lattice and surfaces of a case are those of a finished step; `found` names it."""
     if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
         raise DeckError(f"the deck now leads to another lattice than that of the {found}")
@@ -230,7 +230,7 @@ def check_step(case: Case, last: Step, found: str) -> None:
         raise DeckError(f"the surfaces are no longer those of the {found}")
 
 
-def _continued(store: Store, case: Case) -> Metadata:
+def _continued(store: Store, case: Problem) -> Metadata:
     """Return what the result says from now on: as before, and that it went on."""
     old, new = store.metadata, metadata_of(case)
     changed = [

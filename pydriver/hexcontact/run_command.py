@@ -23,6 +23,7 @@ from .text import rich_table
 
 if TYPE_CHECKING:
     from .case import Case
+    from .problem import Problem
     from .result import Result, Step
     from .store import Store
 
@@ -36,7 +37,7 @@ def case_of(deck: Path, settings: list[str] | None) -> Case:
     return Case.from_toml(deck, overrides=dict(map(setting, settings or ())))
 
 
-def target_of(case: Case, deck: Path, output: Path | None = None) -> Path:
+def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:
     """Return the file that a run writes: what the user, else the deck, else the deck's name says."""
     target = output or case.output.file or Path(f"{deck.stem}.nc")
     if target.suffix in _PICTURES:
@@ -100,7 +101,7 @@ class Listeners:
 
     def tell(
         self,
-        case: Case,
+        case: Problem,
         histories: list[Any],
         target: Path,
         picture: Path | None,
@@ -126,7 +127,7 @@ class Listeners:
 
 
 def solved(
-    case: Case,
+    case: Problem,
     store: Store,
     heard: tuple[int, int],
     name: str,
@@ -156,7 +157,7 @@ def overview(path: Path) -> Path:
 
 
 def summarize(
-    case: Case, histories: list[Any], target: Path, picture: Path | None, refined: Result | None = None
+    case: Problem, histories: list[Any], target: Path, picture: Path | None, refined: Result | None = None
 ) -> None:
     """Print what came out: history, last step, how it compares with Hertz; lattices and errors."""
     console, last = summary.console(), histories[-1]

@@ -20,13 +20,13 @@ from .window import kind_of
 
 if TYPE_CHECKING:
     from .adaptive_steps import AdaptivePath
-    from .case import Case
     from .lattice import Lattice
     from .load_history import LoadStep
+    from .problem import Problem
     from .store import Store
 
 
-def metadata_of(case: Case) -> Metadata:
+def metadata_of(case: Problem) -> Metadata:
     """Return what the result of `case` says about where it comes from."""
     return Metadata(
         title=case.title,
@@ -39,7 +39,7 @@ def metadata_of(case: Case) -> Metadata:
     )
 
 
-def parameters_of(case: Case) -> dict[str, Any]:
+def parameters_of(case: Problem) -> dict[str, Any]:
     """Return what describes a case and how it is solved, and the machine that does it."""
     return {
         "effective_modulus": case.pair.effective_modulus,
@@ -65,7 +65,7 @@ def _machine() -> str:
 
 
 def run(
-    case: Case,
+    case: Problem,
     output: str | Path | None = None,
     overwrite: bool = False,
     on_step: Callable[[Step], object] | None = None,
@@ -75,7 +75,7 @@ def run(
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The checked problem.
     output : path, optional
         netCDF file to write; each step is on the disk before the next begins. Without it the
@@ -146,7 +146,7 @@ def checked(result: Result) -> Result:
 
 
 def record(
-    case: Case,
+    case: Problem,
     store: Store,
     shown: Reporter,
     on_step: Callable[[Step], object] | None = None,
@@ -156,7 +156,7 @@ def record(
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The checked problem.
     store : Store
         Where the steps go.
@@ -218,7 +218,7 @@ def stops(on_step: Callable[[Step], object] | None, step: Step, more: bool = Fal
 
 
 def steps(
-    case: Case,
+    case: Problem,
     kept_in_memory: bool = False,
     before: Sequence[Step] = (),
     targets: Iterable[LoadStep] | None = None,
@@ -227,7 +227,7 @@ def steps(
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The checked problem.
     kept_in_memory : bool
         The caller keeps all steps, so there has to be memory for them.
@@ -263,7 +263,7 @@ def steps(
 
 
 def _solved(
-    case: Case,
+    case: Problem,
     lattice: Lattice,
     kept_in_memory: bool,
     before: Sequence[Step],
@@ -307,7 +307,7 @@ def _solved(
         state, reached_by_now = reached, _standing(step.history)
 
 
-def _adaptive(case: Case, window: Any, before: Sequence[Step]) -> AdaptivePath | None:
+def _adaptive(case: Problem, window: Any, before: Sequence[Step]) -> AdaptivePath | None:
     """Return what chooses load steps, if there are some to choose."""
     if not case.adaptive:
         return None

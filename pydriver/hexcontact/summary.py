@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from .case import Body, Case
+    from .case import Case
+    from .case_settings import Body
+    from .problem import Problem
     from .result import Result
     from .surfaces import Surface
 
@@ -63,7 +65,7 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
 # --- before the run -------------------------------------------------------------------------------
 
 
-def case_rows(case: Case) -> list[Row]:
+def case_rows(case: Problem) -> list[Row]:
     """Return what would be run."""
     from .estimates import work
 
@@ -92,7 +94,7 @@ def case_rows(case: Case) -> list[Row]:
     ]  # fmt: skip
 
 
-def _memory(case: Case) -> str:
+def _memory(case: Problem) -> str:
     from .refinement import least_and_most
     from .window import memory_needed
 
@@ -100,7 +102,7 @@ def _memory(case: Case) -> str:
     return " to ".join(quantity(memory_needed(one, one.lattice), "B", 3) for one in last)
 
 
-def _accuracy(case: Case) -> str:
+def _accuracy(case: Problem) -> str:
     """Say what is to be reached, and between which lattices the refinement will end."""
     from .refinement import least_and_most
 
@@ -113,7 +115,7 @@ def _accuracy(case: Case) -> str:
     )
 
 
-def _friction(case: Case) -> str:
+def _friction(case: Problem) -> str:
     if not case.frictional:
         return "none"
     mu = case.friction_coefficient
@@ -124,7 +126,7 @@ def _friction(case: Case) -> str:
     return f"{law}, {case.solver.algorithm}{entry}{goodman}"
 
 
-def _history(case: Case) -> str:
+def _history(case: Problem) -> str:
     segments = case.load_steps[-1].segment + 1
     if case.adaptive:
         chosen = sum(step.ramp is not None for step in case.load_steps)
@@ -135,7 +137,7 @@ def _history(case: Case) -> str:
     return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "")
 
 
-def _largest(case: Case) -> str:
+def _largest(case: Problem) -> str:
     """Return the largest load along each direction, as far as the deck tells."""
     largest = {}
     for direction in ("z", "x", "y"):
@@ -285,12 +287,12 @@ def _columns(histories: Sequence[History], told: _Told) -> dict[str, Callable[[H
 # --- against Hertz --------------------------------------------------------------------------------
 
 
-def against_hertz(case: Case, history: History) -> list[tuple[str, float, float, str]]:
+def against_hertz(case: Problem, history: History) -> list[tuple[str, float, float, str]]:
     """Compare a load step with Hertz's solution.
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The case.
     history : mapping
         History of one of its steps.
@@ -330,7 +332,7 @@ def against_hertz(case: Case, history: History) -> list[tuple[str, float, float,
     ]
 
 
-def hertz_rows(case: Case, history: History) -> list[Row]:
+def hertz_rows(case: Problem, history: History) -> list[Row]:
     """Return the rows of `against_hertz`: quantity, Hertz, computed, difference."""
     named = {
         "contact_radius_fit": "contact radius (to the edge)",

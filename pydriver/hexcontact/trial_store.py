@@ -15,7 +15,7 @@ from .trial_folder import TrialFolder
 
 if TYPE_CHECKING:
     from .accuracy import Solution
-    from .case import Case
+    from .problem import Problem
     from .store import Journal, Store
 
 _SAME = 1e-12  # relative difference of spacings that are the same
@@ -41,7 +41,7 @@ class OnDisk(Solver):
         with store.writing("the journal"):
             self._trials.write(store.metadata, self._solutions)
 
-    def solve(self, trial: Trial, case: Case) -> Solution:
+    def solve(self, trial: Trial, case: Problem) -> Solution:
         """Solve the load history on a lattice, or what is missing of it."""
         for solution in self._solutions:
             if (solution.level, solution.copy) == (trial.level, trial.copy):
@@ -60,7 +60,7 @@ class OnDisk(Solver):
                 self._trials.drop(trial.level - 1)
         return solution
 
-    def _solved(self, trial: Trial, case: Case) -> Solution:
+    def _solved(self, trial: Trial, case: Problem) -> Solution:
         from .solve import steps, stops
 
         with self._opened(trial) as (store, last):
@@ -117,13 +117,13 @@ class _WithErrors:
 
 
 def record(
-    case: Case, store: Store, shown: Reporter, on_step: Callable[[Step], object] | None = None
+    case: Problem, store: Store, shown: Reporter, on_step: Callable[[Step], object] | None = None
 ) -> None:
     """Solve a case into a store until its accuracy is reached, or a limit; errors as `hexcontact.solve.run`.
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The case, with an accuracy to reach.
     store : Store
         Where the result goes; what it has already of the case is not solved again.

@@ -26,11 +26,11 @@ from .result import Step
 from .variables import FIELDS
 
 if TYPE_CHECKING:
-    from .case import Case
     from .lattice import Lattice
     from .load_history import LoadStep
     from .native import FlexibilityOperator, NormalContact, NormalSolution
     from .native_friction import ContactState
+    from .problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when 
 # --- memory ---------------------------------------------------------------------------------------
 
 
-def memory_needed(case: Case, lattice: Lattice) -> int:
+def memory_needed(case: Problem, lattice: Lattice) -> int:
     """Return the memory (bytes) that solving and writing a load step on a window takes."""
     from . import native
 
@@ -59,12 +59,12 @@ def memory_needed(case: Case, lattice: Lattice) -> int:
     return case.memory_needed(lattice) + len(bodies) * operator + arrays * _ITEM * lattice.size
 
 
-def require_memory(case: Case, lattice: Lattice, steps_held: int = 0) -> None:
+def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
     """Refuse a window that does not fit into memory.
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The problem.
     lattice : Lattice
         The window.
@@ -88,7 +88,7 @@ def require_memory(case: Case, lattice: Lattice, steps_held: int = 0) -> None:
     )
 
 
-def fields_of(case: Case) -> tuple[str, ...]:
+def fields_of(case: Problem) -> tuple[str, ...]:
     """Return the fields that each step of a case has: its whole state, and displacements if asked for."""
     return (*kind_of(case).state, *(name for name in DISPLACEMENTS if name in case.output.fields))
 
@@ -101,7 +101,7 @@ class Window(ABC, Generic[S]):
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The problem.
     lattice : Lattice
         The window.
@@ -124,7 +124,7 @@ class Window(ABC, Generic[S]):
     state: ClassVar[tuple[str, ...]]  # fields that every step has, all that the next step needs among them
     arrays: ClassVar[int]  # fields that Python holds while a step is solved and written
 
-    def __init__(self, case: Case, lattice: Lattice, steps_held: int = 0) -> None:
+    def __init__(self, case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
         require_memory(case, lattice, steps_held)
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         gap, self.candidate = case.initial_gap(lattice)
@@ -343,7 +343,7 @@ class NormalWindow(Window["NormalSolution"]):
         }
 
 
-def kind_of(case: Case) -> type[Window[Any]]:
+def kind_of(case: Problem) -> type[Window[Any]]:
     """Return the kind of window that the algorithm of a case needs."""
     if not case.frictional:
         return NormalWindow

@@ -14,7 +14,7 @@ from . import deck as decks
 from . import grid as grids
 from . import native, native_friction
 from .arguments import reals
-from .case_arguments import as_toml, body_keys, given, middle_of, segments
+from .case_arguments import HeightMap, as_toml, body_keys, gap_given, given, middle_of, segments
 from .case_checks import algorithm_of, checked_deck
 from .case_settings import AccuracySettings, Body, OutputSettings, SolverSettings
 from .deck import Deck
@@ -23,7 +23,7 @@ from .errors import DeckError
 from .grid import Estimate, NoContactFound
 from .lattice import Lattice
 from .load_history import LoadStep, Target, load_steps
-from .messages import MISSING, Problem, Source, deck_error
+from .messages import MISSING, Problem, Source, deck_error, listed
 from .native import ElasticPair, Method
 from .surfaces import Separation
 from .validation import SMALLEST
@@ -54,9 +54,10 @@ class Case:
     body_1, body_2 : Body or mapping
         The bodies; a mapping has the keys of [body.1] (an angle carries its unit here, too: "30 deg").
     gap : callable or array_like, optional
-        Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m), or an array
-        (n_row, n_col) over the nodes of the window. Infinite where nothing can touch. The approach is
-        measured from gap = 0.
+        Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m); an array
+        (n_row, n_col) over the nodes of `lattice`; or heights on a rectangular grid, an xarray.DataArray
+        with the coordinates x and y (in m, or in their attribute ``units``), which a cubic spline joins.
+        Infinite where nothing can touch. The approach is measured from gap = 0.
     lattice : Lattice, optional
         The window, instead of the keyword arguments of the grid.
     spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
@@ -173,13 +174,14 @@ class Case:
         every: int | None = None,
         title: str = "",
     ) -> None:
-        array = None if gap is None or callable(gap) else reals(gap, "gap").copy()
+        given_gap = gap_given(gap, lattice)
         if lattice is not None:
+            for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
+                if value is not None:
+                    raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
-            if gap is None:  # so that the deck of the case finds the same window again
+            if not callable(given_gap):  # so that the deck of the case finds the same window again
                 center = middle_of(lattice)
-        elif array is not None and window is None and array.ndim == 2:
-            window = array.shape
         if loads is None:
             loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
         elif normal_load is not None or approach is not None or steps is not None:
@@ -210,7 +212,7 @@ class Case:
             load=segments(loads),
             output=given(fields=fields, every=every) or None,
         )
-        self._set_up(assemble(data, None, Source(), Path()), gap if callable(gap) else array, lattice)
+        self._set_up(assemble(data, None, Source(), Path()), given_gap, lattice)
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
@@ -468,7 +470,7 @@ class Case:
         changes : mapping
             New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
             "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is found
-            anew, also where a `Lattice` was given.
+            anew, also where a `Lattice` was given; that of a gap over its nodes cannot change.
 
         Raises
         ------
@@ -480,7 +482,14 @@ class Case:
             del data["body"]["1"]["surface"]  # stands for the gap
         folder = self.deck_file.parent if self.deck_file else Path()
         case = type(self).__new__(type(self))
-        case._set_up(assemble(data, None, Source(), folder, changes), self._given_gap, None)
+        lattice = self.lattice if isinstance(self._given_gap, np.ndarray) else None
+        case._set_up(assemble(data, None, Source(), folder, changes), self._given_gap, lattice)
+        if lattice is not None and case.deck.grid != self.deck.grid:
+            changed = listed([key for key in changes if key.partition(".")[0] == "grid"], "and")
+            raise DeckError(
+                f"{changed}: the gap of this case is an array over the nodes of its lattice, which stays as "
+                "it is; make a new Case with gap=... and lattice=..."
+            )
         case.deck_file = self.deck_file
         return case
 
@@ -550,15 +559,12 @@ class Case:
 
     def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:
         """Return the window, checked against an estimate of the contact wherever there is one."""
-        touch = self._surface_gap.first_touch[:2] if self._surface_gap is not None else (0.0, 0.0)
-        center = grid.center or touch
-        if isinstance(self._given_gap, np.ndarray):
-            if grid.spacing is None or grid.window is None:
-                sentence = "an array gap needs a spacing and a window of its shape"
-                raise deck_error([Problem(("grid",), MISSING, sentence)], source)
-            lattice = lattice or grids.centered(grid.spacing, center, grid.window, grid.origin)
+        if isinstance(self._given_gap, np.ndarray) and lattice is not None:
             self.initial_gap(lattice)
             return lattice
+        gap = self._surface_gap or self._given_gap
+        touch = gap.first_touch[:2] if isinstance(gap, Separation | HeightMap) else (0.0, 0.0)
+        center = grid.center or touch
         try:
             estimate = self._estimate(center if self._surface_gap is None else touch, grid.origin)
         except NoContactFound as error:

@@ -35,7 +35,7 @@ _NAMES = {"cone": "Sneddon", "power": "Sneddon", "punch": "Sneddon", "rounded_pu
 
 
 def closed_solutions(result: Result, number: int) -> tuple[list[Exact], str]:
-    """Return the closed solutions that hold for a load step, and a sentence if there are none.
+    """Return the closed solutions that hold for a load step, and what there is to know about them.
 
     Parameters
     ----------
@@ -56,7 +56,9 @@ def closed_solutions(result: Result, number: int) -> tuple[list[Exact], str]:
         *_dissimilar(so_far, load),
     ]
     if known:
-        return known, ""
+        from_python = 'shape = "python"' in str(result.dataset.attrs.get("deck", ""))
+        note = "the gap was given in Python; the solutions are those of its values at the nodes"
+        return known, note if from_python else ""
     if _pressure_is_frictionless(so_far):
         return [], "no closed solution is known for these surfaces"
     return [], (

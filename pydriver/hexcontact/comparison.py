@@ -181,8 +181,9 @@ def compare(result: Result, exact: Mapping[str, float] | object | None, step: in
         known = [_own(exact, name, result)]
     entries = [entry for one in known for entry in _entries(data, one)]
     radius = float(data["contact_radius"]) if "contact_radius" in data else 0.0
-    if entries and radius and not note:
-        note = f"{radius / result.lattice.spacing:.3g} spacings in the contact radius"
+    if entries and radius:
+        spacings = f"{radius / result.lattice.spacing:.3g} spacings in the contact radius"
+        note = f"{spacings}; {note}" if note else spacings
     return Comparison(entries, number, note)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .messages import escaped, visible
 from .progress import quantity
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ _PIXELS = 240  # of the longer side of a picture
 
 def text_table(headers: Row, rows: Iterable[Row]) -> str:
     """Return a table as plain text; numbers are at the right of their columns."""
-    table = [list(headers), *map(list, rows)]
+    table = [[visible(cell) for cell in row] for row in (headers, *rows)]
     widths = [max(len(row[k]) for row in table) for k in range(len(headers))]
     left = [k == 0 or not _numbers(row[k] for row in table[1:]) for k in range(len(headers))]
     lines = [
@@ -49,15 +49,15 @@ def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") ->
 
     def line(row: Row, tag: str, style: str) -> str:
         cells = (
-            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{html.escape(cell)}</{tag}>'
+            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{escaped(cell)}</{tag}>'
             for cell, at_right in zip(row, right, strict=True)
         )
         return f'<tr style="background:none">{"".join(cells)}</tr>'
 
     head = f"<thead>{line(headers, 'th', _HEAD)}</thead>" if any(headers) else ""
     body = "".join(line(row, "td", _CELL) for row in rows)
-    caption = f'<caption style="{_TITLE}">{html.escape(title)}</caption>' if title else ""
-    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{html.escape(note)}</div>' if note else ""
+    caption = f'<caption style="{_TITLE}">{escaped(title)}</caption>' if title else ""
+    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{escaped(note)}</div>' if note else ""
     return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
 
 
@@ -80,7 +80,7 @@ def result_header(result: Result) -> str:
     named = [f"Result of {result.case_title!r}" if result.case_title else "Result", result.path]
     about = f"{steps}, {sizes['row']} x {sizes['col']} nodes"
     spacing = quantity(float(attributes.get("lattice_spacing", np.nan)), "m")
-    return ", ".join(filter(None, named)) + f"\n  {about}, spacing {spacing}"
+    return visible(", ".join(filter(None, named))) + f"\n  {about}, spacing {spacing}"
 
 
 def result_rows(result: Result) -> list[Row]:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from .errors import DeckError, HexcontactError
+from .messages import visible
 from .progress import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ class _Lines(logging.Formatter):
         self.converter = time.gmtime
 
     def format(self, record: logging.LogRecord) -> str:
-        return "; ".join(super().format(record).splitlines())
+        return visible("; ".join(super().format(record).splitlines()))
 
 
 class _File(logging.FileHandler):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import html
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -127,6 +129,24 @@ def shown(value: object, width: int = 60, depth: int = 5) -> str:
     else:
         text = str(value)
     return text if len(text) <= width else text[: width - 3] + "..."
+
+
+# Control characters but tab and ends of lines, separators of lines, marks that change the direction of
+# reading, halves of surrogate pairs, and what is no character: terminals obey them, XML forbids most.
+_UNSEEN = re.compile(
+    "[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+    "|\r(?!\n)"
+)
+
+
+def visible(text: str) -> str:
+    r"""Write text of a user so that a terminal or a page only shows it: an escape character as ``\u001b``."""
+    return _UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def escaped(text: str) -> str:
+    """Write text of a user for HTML and XML."""
+    return html.escape(visible(text))
 
 
 def listed(entries: Sequence[str], conjunction: str) -> str:

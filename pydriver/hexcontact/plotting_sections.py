@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .closed_forms import ClosedForms, PartialSlip
 from .plotting_maps import step_label
 from .plotting_style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, legend_below, new_figure, set_title, shades
-from .step_view import StepView, dataset_of, scaled, worded
+from .step_view import StepView, dataset_of, scaled, title_of, worded
 
 if TYPE_CHECKING:
     import xarray
@@ -285,7 +285,7 @@ def tractions(
             upper.legend(loc="lower center")
             set_title(figure, views[0].title)
         else:
-            figure = _family(views, exact, cut, str(dataset_of(result).attrs.get("title", "")))
+            figure = _family(views, exact, cut, title_of(dataset_of(result)))
         return figure
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from . import log, nonconvergence
 from .errors import AccuracyWarning, HexcontactError, StopRun
 from .load_series import LOADS
+from .messages import visible
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
 from .window import kind_of
@@ -31,7 +32,7 @@ def metadata_of(case: Case) -> Metadata:
     return Metadata(
         title=case.title,
         deck=case.deck_text,
-        deck_file=str(case.deck_file or ""),
+        deck_file=visible(str(case.deck_file or "")),
         fields=tuple(case.output.fields),
         every=case.output.every,
         planned_steps=case.planned_steps,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .errors import HexcontactError
-from .messages import listed
+from .messages import listed, visible
 from .progress import (
     LOADS_AND_MOTIONS,
     PREFIXES,
@@ -64,14 +64,14 @@ def table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: bool =
     from rich.text import Text
 
     shown = Table(
-        title=Text(title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, show_header=any(headers),
-        pad_edge=False, collapse_padding=tight,
+        title=Text(visible(title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD,
+        show_header=any(headers), pad_edge=False, collapse_padding=tight,
     )  # fmt: skip
     for header in headers:
         text = header in ("", "label")
         shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
     for row in rows:
-        shown.add_row(*map(Text, row))
+        shown.add_row(*(Text(visible(cell)) for cell in row))
     return shown
 
 

@@ -362,6 +362,27 @@ class Case:
             raise DeckError(f"gap: expected lengths of at most {LARGEST:g} m, or inf where nothing can touch")
         return gap, np.isfinite(gap)
 
+    def check_contact(self, step: Step) -> None:
+        """Refuse a load step whose contact reaches the end of a height map, where it stops with the data.
+
+        Parameters
+        ----------
+        step : Step
+            The load step, with its zones.
+
+        Raises
+        ------
+        DeckError
+            If it does.
+        """
+        if isinstance(self._given_gap, HeightMap):
+            contact, lattice = step.fields["zone"] > 0, step.lattice
+            if self._given_gap.ends_within(lattice.spacing, lattice.x[contact], lattice.y[contact]):
+                raise DeckError(
+                    f"gap: the contact of load step {step.number} reaches the end of the height map; "
+                    "expected heights of a larger part, or a function that says what lies beyond"
+                )
+
     def grown(self, lattice: Lattice, contact: NDArray[np.bool_] | None = None) -> Lattice:
         """Return a larger window with the same nodes, for a contact that reached the rim.
 

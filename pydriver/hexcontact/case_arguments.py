@@ -107,6 +107,12 @@ class HeightMap:
         kx, ky = (min(3, len(along) - 1) for along in (self.x, self.y))
         return RectBivariateSpline(self.x, self.y, self.gap, kx=kx, ky=ky)
 
+    def ends_within(self, distance: float, x: Array, y: Array) -> bool:
+        """Tell whether one of some points is that near to the end of what was measured."""
+        inside = [along[0] + distance <= at for along, at in ((self.x, x), (self.y, y))]
+        inside += [at <= along[-1] - distance for along, at in ((self.x, x), (self.y, y))]
+        return not np.all(inside)
+
     def __call__(self, x: Array, y: Array) -> Array:
         """Return the gap (m) at points of the plane."""
         inside = (self.x[0] <= x) & (x <= self.x[-1]) & (self.y[0] <= y) & (y <= self.y[-1])

@@ -258,6 +258,7 @@ def steps(
     started = time.perf_counter()
     done = len(before)
     for step in _solved(case, lattice, kept_in_memory, before, targets):
+        case.check_contact(step)
         yield step
         done = step.number
     log.logger.info(log.words("finished", steps=done, seconds=time.perf_counter() - started))

@@ -368,6 +368,20 @@ def test_a_rectangular_height_map_is_where_its_coordinates_are() -> None:
         )
 
 
+@pytest.mark.parametrize("side", ["left", "right", "bottom", "top"])
+@pytest.mark.parametrize("keys", [{"window": [81, 81]}, {}])
+def test_contact_at_the_end_of_a_height_map_is_an_error(side: str, keys: dict[str, Any]) -> None:
+    ends = {name: 0.26e-3 if name == side else 0.5e-3 for name in ("left", "right", "bottom", "top")}
+    x = np.linspace(-ends["left"], ends["right"], 41)
+    y = np.linspace(-ends["bottom"], ends["top"], 41)
+    case = sphere_on_flat(body_1=STEEL, gap=measured(x, y), spacing=1e-5, steps=4, normal_load=300.0, **keys)
+    assert 0.25e-3 < hertz_radius(case, 0.01, 300.0) < 0.27e-3
+    done = []
+    with pytest.raises(DeckError, match="gap: the contact of load step 4 reaches the end of the height map"):
+        case.run(on_step=done.append)
+    assert len(done) == 3
+
+
 def test_the_window_of_a_height_map_is_about_its_lowest_point() -> None:
     moved = measured().assign_coords(x=HALF_MM + 3e-3, y=HALF_MM - 2e-3)
     case = sphere_on_flat(body_1=STEEL, gap=moved, nodes_in_radius=8, origin=(3e-3, -2e-3))

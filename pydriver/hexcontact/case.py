@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import reals
-from .case_arguments import body_keys, given, middle_of, segments
+from .case_arguments import body_keys, gap_given, given, middle_of, segments
 from .case_settings import Body, OutputSettings, SolverSettings
 from .deck_assembly import assemble
 from .errors import DeckError
@@ -41,9 +40,10 @@ class Case(Problem):
     body_1, body_2 : Body or mapping
         The bodies; a mapping has the keys of [body.1] (an angle carries its unit here, too: "30 deg").
     gap : callable or array_like, optional
-        Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m), or an array
-        (n_row, n_col) over the nodes of the window. Infinite where nothing can touch. The approach is
-        measured from gap = 0.
+        Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m); an array
+        (n_row, n_col) over the nodes of `lattice`; or heights on a rectangular grid, an xarray.DataArray
+        with the coordinates x and y (in m, or in their attribute ``units``), which a cubic spline joins.
+        Infinite where nothing can touch. The approach is measured from gap = 0.
     lattice : Lattice, optional
         The window, instead of the keyword arguments of the grid.
     spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
@@ -117,13 +117,14 @@ class Case(Problem):
         every: int | None = None,
         title: str = "",
     ) -> None:
-        array = None if gap is None or callable(gap) else reals(gap, "gap").copy()
+        given_gap = gap_given(gap, lattice)
         if lattice is not None:
+            for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
+                if value is not None:
+                    raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
-            if gap is None:  # so that the deck of the case finds the same window again
+            if not callable(given_gap):  # so that the deck of the case finds the same window again
                 center = middle_of(lattice)
-        elif array is not None and window is None and array.ndim == 2:
-            window = array.shape
         if loads is None:
             loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
         elif normal_load is not None or approach is not None or steps is not None:
@@ -154,7 +155,7 @@ class Case(Problem):
             load=segments(loads),
             output=given(fields=fields, every=every) or None,
         )
-        self._set_up(assemble(data, None, Source(), Path()), gap if callable(gap) else array, lattice)
+        self._set_up(assemble(data, None, Source(), Path()), given_gap, lattice)
 
     def run(
         self,

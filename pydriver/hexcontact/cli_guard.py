@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from .errors import DeckError, HexcontactError, KernelFolderWarning, ResourceError
+from .text import visible
 
 if TYPE_CHECKING:
     from .errors import Fault
@@ -78,6 +79,8 @@ def _told(error: BaseException) -> _Told | None:
     if isinstance(error, HexcontactError):
         message = "\n".join([str(error), *getattr(error, "__notes__", ())])
         return _Told(message, error.exit_code, getattr(error, "faults", ()), getattr(error, "details", None))
+    if isinstance(error, UnicodeEncodeError):
+        return _Told(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError):
         return _Told("the machine has not enough memory for this", ResourceError.exit_code)
     if isinstance(error, OSError) and error.strerror:
@@ -91,7 +94,12 @@ def _told(error: BaseException) -> _Told | None:
 def complain(message: str) -> None:
     """Print a message on standard error, each line marked as ours."""
     for line in message.splitlines() or [""]:
-        print(f"hexcontact: {line}", file=sys.stderr)
+        print(f"hexcontact: {visible(line)}", file=sys.stderr)
+
+
+def say(message: str) -> None:
+    """Print a message on standard output."""
+    print(visible(message))
 
 
 def warn_plainly() -> None:

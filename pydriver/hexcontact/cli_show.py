@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_guard import Content, guarded
+from .cli_guard import Content, guarded, say
 from .cli_options import AsJson, ResultFile
 from .errors import DeckError
 
@@ -123,16 +123,16 @@ def plot(
     if not files:
         if chosen:
             raise DeckError(f"--{next(iter(chosen))}: not an option of --what {what}")
-        print(f"written: {command.general_picture(what, output or Path(f'{what}{suffix}'))}")
+        say(f"written: {command.general_picture(what, output or Path(f'{what}{suffix}'))}")
         return
     results, first = [_open(file) for file in files], output or files[0].with_suffix(suffix)
     if what == "all":
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
-        print("\n".join(command.all_pictures(results[0], first, chosen)))
+        say("\n".join(command.all_pictures(results[0], first, chosen)))
         return
     picture = first if output else first.with_stem(f"{first.stem}_{what}")
-    print(f"written: {command.picture_of(results, what, picture, chosen)}")
+    say(f"written: {command.picture_of(results, what, picture, chosen)}")
 
 
 @guarded
@@ -145,7 +145,7 @@ def report(
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
     from .plotting.report import write_report
 
-    print(f"written: {write_report(_open(file), output or file.with_suffix('.html'))}")
+    say(f"written: {write_report(_open(file), output or file.with_suffix('.html'))}")
 
 
 @guarded
@@ -177,4 +177,4 @@ def export(
     written = [write.to_vtk(result, folder, stem, steps)] if vtk else []
     written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps)] if ugrid else []
     written += write.to_csv(result, folder, stem, steps) if csv else []
-    print("\n".join(f"written: {path}" for path in written))
+    say("\n".join(f"written: {path}" for path in written))

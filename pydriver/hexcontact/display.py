@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .text import Row, html_table, quantity
+from .text import Row, html_table, quantity, visible
 
 if TYPE_CHECKING:
     from .result import Result
@@ -32,7 +32,7 @@ def result_header(result: Result) -> str:
     named = [f"Result of {result.case_title!r}" if result.case_title else "Result", result.path]
     about = f"{steps}, {sizes['row']} x {sizes['col']} nodes"
     spacing = quantity(float(attributes.get("lattice_spacing", np.nan)), "m")
-    return ", ".join(filter(None, named)) + f"\n  {about}, spacing {spacing}"
+    return visible(", ".join(filter(None, named))) + f"\n  {about}, spacing {spacing}"
 
 
 def result_rows(result: Result) -> list[Row]:

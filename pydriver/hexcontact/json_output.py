@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ._version import __version__
 from .errors import ConvergenceError, DeckError, Fault, ResourceError
 from .progress import RESIDUALS
+from .text import visible
 
 if TYPE_CHECKING:
     from .problem import Problem
@@ -37,7 +38,7 @@ def write(command: str, content: Mapping[str, Any]) -> None:
         What it has to say; `plain` makes JSON of it.
     """
     whole = {"hexcontact": __version__, "command": command, "exit_code": 0, **content}
-    print(json.dumps(plain(whole), ensure_ascii=False, allow_nan=False), flush=True)
+    print(visible(json.dumps(plain(whole), ensure_ascii=False, allow_nan=False)), flush=True)
 
 
 def plain(value: Any) -> Any:

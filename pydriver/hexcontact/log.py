@@ -18,6 +18,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from .errors import DeckError, HexcontactError
 from .progress import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
+from .text import visible
 
 if TYPE_CHECKING:
     from .lattice import Lattice
@@ -137,7 +138,7 @@ class _Lines(logging.Formatter):
         self.converter = time.gmtime
 
     def format(self, record: logging.LogRecord) -> str:
-        return "; ".join(super().format(record).splitlines())
+        return visible("; ".join(super().format(record).splitlines()))
 
 
 class _File(logging.FileHandler):

@@ -54,10 +54,16 @@ def checked_mask(candidate: ArrayLike | None, lattice: Lattice) -> NDArray[np.bo
 
 
 def shaped(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
-    """Return values over the window, whatever they are."""
+    """Return values over the window, whatever they are; of an xarray.DataArray x and y must be its nodes."""
     array = reals(values, name)
     if array.shape != lattice.shape:
         raise DeckError(f"{name}: an array of shape {array.shape}, expected {lattice.shape} (rows, columns)")
+    labeled: Any = values if hasattr(values, "coords") else None
+    for key in ("x", "y"):
+        if labeled is not None and key in labeled.coords:
+            points, nodes, near = labeled.coords[key], getattr(lattice, key), 1e-6 * lattice.spacing
+            if points.dims != labeled.dims or not np.allclose(points, nodes, rtol=0.0, atol=near):
+                raise DeckError(f"{name}: its coordinate {key} is not that of the nodes of the lattice")
     return array
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from . import mesh
 from .errors import DeckError, HexcontactError
+from .files import require_ordinary
 from .result import Layout, Metadata, Result, Step
 from .result_check import fault_of_dimensions, fault_of_result
 from .variables import SCHEMA_VERSION, VARIABLES
@@ -188,6 +189,7 @@ def read_output(path: Path) -> Result:
     """
     import netCDF4
 
+    require_ordinary(path, "a netCDF file")
     with reading(path), _alone(), netCDF4.Dataset(path) as file:
         attributes = _attributes(file)
         _check_ours(attributes, path)

@@ -14,7 +14,7 @@ from . import deck as decks
 from . import grid as grids
 from . import native, native_friction
 from .arguments import reals
-from .case_arguments import as_toml
+from .case_arguments import HeightMap, as_toml
 from .case_checks import algorithm_of, checked_deck
 from .case_settings import AccuracySettings, Body, OutputSettings, SolverSettings
 from .deck import Deck
@@ -23,7 +23,7 @@ from .errors import DeckError
 from .grid import Estimate, NoContactFound
 from .lattice import Lattice
 from .load_history import LoadStep, load_steps
-from .messages import MISSING, Source, deck_error
+from .messages import MISSING, Source, deck_error, listed
 from .messages import Problem as Mistake
 from .native import ElasticPair, Method
 from .surfaces import Separation
@@ -233,6 +233,32 @@ class Problem:
             raise DeckError(f"gap: expected lengths of at most {LARGEST:g} m, or inf where nothing can touch")
         return gap, np.isfinite(gap)
 
+    def check_contact(self, number: int, lattice: Lattice, contact: NDArray[np.bool_]) -> None:
+        """Refuse a load step whose contact reaches the end of a height map, where it stops with the data.
+
+        Parameters
+        ----------
+        number : int
+            Number of the load step.
+        lattice : Lattice
+            Its window.
+        contact : ndarray of bool, (n_row, n_col)
+            The nodes in contact.
+
+        Raises
+        ------
+        DeckError
+            If it does.
+        """
+        gap = self._given_gap
+        if isinstance(gap, HeightMap) and gap.ends_within(
+            lattice.spacing, lattice.x[contact], lattice.y[contact]
+        ):
+            raise DeckError(
+                f"gap: the contact of load step {number} reaches the end of the height map; expected heights "
+                "of a larger part, or a function that says what lies beyond"
+            )
+
     def grown(self, lattice: Lattice, contact: NDArray[np.bool_] | None = None) -> Lattice:
         """Return a larger window with the same nodes, for a contact that reached the rim.
 
@@ -286,7 +312,7 @@ class Problem:
         changes : mapping
             New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
             "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is found
-            anew, also where a `Lattice` was given.
+            anew, also where a `Lattice` was given; that of a gap over its nodes cannot change.
 
         Raises
         ------
@@ -298,7 +324,14 @@ class Problem:
             del data["body"]["1"]["surface"]  # stands for the gap
         folder = self.deck_file.parent if self.deck_file else Path()
         case = type(self).__new__(type(self))
-        case._set_up(assemble(data, None, Source(), folder, changes), self._given_gap, None)
+        lattice = self.lattice if isinstance(self._given_gap, np.ndarray) else None
+        case._set_up(assemble(data, None, Source(), folder, changes), self._given_gap, lattice)
+        if lattice is not None and case.deck.grid != self.deck.grid:
+            changed = listed([key for key in changes if key.partition(".")[0] == "grid"], "and")
+            raise DeckError(
+                f"{changed}: the gap of this case is an array over the nodes of its lattice, which stays as "
+                "it is; make a new Case with gap=... and lattice=..."
+            )
         case.deck_file = self.deck_file
         return case
 
@@ -362,15 +395,12 @@ class Problem:
 
     def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:
         """Return the window, checked against an estimate of the contact wherever there is one."""
-        touch = self._surface_gap.first_touch[:2] if self._surface_gap is not None else (0.0, 0.0)
-        center = grid.center or touch
-        if isinstance(self._given_gap, np.ndarray):
-            if grid.spacing is None or grid.window is None:
-                sentence = "an array gap needs a spacing and a window of its shape"
-                raise deck_error([Mistake(("grid",), MISSING, sentence)], source)
-            lattice = lattice or grids.centered(grid.spacing, center, grid.window, grid.origin)
+        if isinstance(self._given_gap, np.ndarray) and lattice is not None:
             self.initial_gap(lattice)
             return lattice
+        gap = self._surface_gap or self._given_gap
+        touch = gap.first_touch[:2] if isinstance(gap, Separation | HeightMap) else (0.0, 0.0)
+        center = grid.center or touch
         try:
             estimate = self._estimate(center if self._surface_gap is None else touch, grid.origin)
         except NoContactFound as error:

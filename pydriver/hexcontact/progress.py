@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from typing import IO, TYPE_CHECKING, Any
 
-from .text import percent, quantity
+from .text import percent, quantity, visible
 
 if TYPE_CHECKING:
     from .step import Step
@@ -103,7 +103,7 @@ class Lines(Reporter):
 
     def _print(self, line: str) -> None:
         with contextlib.suppress(OSError):  # nobody listens any more; the run goes on
-            print(line, file=self.stream, flush=True)
+            print(visible(line), file=self.stream, flush=True)
 
 
 class Bar(Reporter):
@@ -126,9 +126,10 @@ class Bar(Reporter):
 
         self._counted = steps > 0  # else by the share of the load history
         count = MofNCompleteColumn() if self._counted else TextColumn("{task.percentage:.0f} %")
-        columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), count]
+        columns = [SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(), count]
         self._bar = Progress(*columns, TimeElapsedColumn())
-        self._title, self._task = title, self._bar.add_task(title, total=steps or 1.0)
+        self._title = visible(title)
+        self._task = self._bar.add_task(self._title, total=steps or 1.0)
         self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
         with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
             yield
@@ -139,11 +140,11 @@ class Bar(Reporter):
 
     def says(self, words: str) -> None:
         """Show it until the next step."""
-        self._latest.plain = f"  {words}"
+        self._latest.plain = f"  {visible(words)}"
 
     def finished(self, step: Step) -> None:
         """Move the bar on by one step."""
-        self._latest.plain = "  " + describe(step.history, short=True)
+        self._latest.plain = "  " + visible(describe(step.history, short=True))
         self._bar.update(self._task, completed=step.number if self._counted else step.done)
 
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from . import json_output, log, solve, summary
-from .cli_guard import complain
+from .cli_guard import complain, say
 from .cli_options import LogLevel, setting
 from .errors import AccuracyWarning, DeckError
 from .interruption import Interrupted, in_background
 from .progress import reporter
 from .store import open_result
-from .text import rich_table
+from .text import rich_table, visible
 
 if TYPE_CHECKING:
     from .case import Case
@@ -171,7 +171,7 @@ def summarize(
         console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
     if remark := summary.limited_steps(histories, case.solver.step_tolerance):
         console.print(f"note: {remark}", soft_wrap=True)
-    console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)
+    console.print(visible(f"written: {target}" + (f", {picture}" if picture else "")), soft_wrap=True)
 
 
 def was_finished(file: Path, picture: Path | None, listeners: Listeners) -> dict[str, Any] | None:
@@ -183,5 +183,5 @@ def was_finished(file: Path, picture: Path | None, listeners: Listeners) -> dict
         return written | json_output.of_run(case, result.case_title, histories)
     if not listeners.quiet:
         drawn = f"; written: {picture}" if picture else ""
-        print(f"{file} is finished, all its load steps are there{drawn}")
+        say(f"{file} is finished, all its load steps are there{drawn}")
     return None

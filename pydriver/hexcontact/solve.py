@@ -16,6 +16,7 @@ from .errors import AccuracyWarning, HexcontactError, StopRun
 from .load_series import LOADS
 from .progress import Reporter, reporter
 from .result import Metadata, Result, Step, assemble
+from .text import visible
 from .window import kind_of
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def metadata_of(case: Problem) -> Metadata:
     return Metadata(
         title=case.title,
         deck=case.deck_text,
-        deck_file=str(case.deck_file or ""),
+        deck_file=visible(str(case.deck_file or "")),
         fields=tuple(case.output.fields),
         every=case.output.every,
         planned_steps=case.planned_steps,
@@ -257,6 +258,7 @@ def steps(
     started = time.perf_counter()
     done = len(before)
     for step in _solved(case, lattice, kept_in_memory, before, targets):
+        case.check_contact(step.number, step.lattice, step.fields["zone"] > 0)
         yield step
         done = step.number
     log.logger.info(log.words("finished", steps=done, seconds=time.perf_counter() - started))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .analytic.hertz_gap import SIMILAR, QuadraticGap
 from .pressure_field import PressureField, linear
 from .result import Result
+from .text import visible
 from .variables import LARGEST, NOT_KEPT
 
 if TYPE_CHECKING:
@@ -51,6 +52,11 @@ def worded(value: float, unit: str) -> str:
     """Write a quantity with four digits and a prefix: "747.6 µm", "1 kN"."""
     factor, scaled_unit = scaled(value, unit)
     return f"{value * factor:.4g} {scaled_unit}"
+
+
+def title_of(dataset: xarray.Dataset) -> str:
+    """Return the title of a result for pictures, in which no dollar begins a formula."""
+    return visible(str(dataset.attrs.get("title", ""))).replace("$", r"\$")
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,7 @@ class StepView:
             center = (float((pressure * x).sum() / weight), float((pressure * y).sum() / weight))
         else:
             center = gap.center
-        named = [str(dataset.attrs.get("title", ""))]
+        named = [title_of(dataset)]
         if dataset.sizes["step"] > 1:
             named.append(f"step {int(one['step'])}")
         title = ", ".join(filter(None, named)) + f" ({_loads(one)})"

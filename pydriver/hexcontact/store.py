@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from .errors import DeckError, HexcontactError, ResourceError
+from .files import require_ordinary
 from .lock import Lock
 from .netcdf import flush, read_output, reading, write
 from .record import SUFFIX, read_record, write_record
@@ -235,6 +236,7 @@ class Store:
             raise
 
     def _at(self, path: str | os.PathLike[str]) -> None:
+        require_ordinary(path, "a netCDF file")
         """Take up a place where an output can be written."""
         self.path = Path(os.path.realpath(path))
         self.folder = journal_of(self.path)

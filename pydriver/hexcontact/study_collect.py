@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import DeckError, ResourceError
+from .files import require_ordinary
 from .netcdf import flush, reading
 from .study_plan import Axis, Plan
 from .study_store import StudyFolder
@@ -130,6 +131,7 @@ def is_study(path: Path) -> bool:
     """Tell whether a file is the result of a study."""
     import netCDF4
 
+    require_ordinary(path, "the result of a study")
     try:
         with netCDF4.Dataset(path) as file:
             return "study_version" in file.ncattrs()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,24 @@ _TABLE = "border-collapse:collapse;margin:0.3em 0"
 _CELL = "padding:0.15em 1.2em 0.15em 0;border:0;background:none"
 _HEAD = f"{_CELL};border-bottom:1px solid currentColor;font-weight:600"
 _TITLE = "font-weight:600;text-align:left;padding:0.2em 0;color:inherit;caption-side:top"
+
+# Control characters but tab and ends of lines, separators of lines, marks that change the direction of
+# reading, halves of surrogate pairs, and what is no character: terminals obey them, XML forbids most.
+_UNSEEN = re.compile(
+    "[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+    "|\r(?!\n)"
+)
+
+
+def visible(text: str) -> str:
+    r"""Write text of a user so that a terminal or a page only shows it: an escape character as ``\u001b``."""
+    return _UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def escaped(text: str) -> str:
+    """Write text of a user for HTML and XML."""
+    return html.escape(visible(text))
+
 
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
@@ -51,7 +70,7 @@ def percent(share: float) -> str:
 
 def text_table(headers: Row, rows: Iterable[Row]) -> str:
     """Return a table as plain text; numbers are at the right of their columns."""
-    table = [list(headers), *map(list, rows)]
+    table = [[visible(cell) for cell in row] for row in (headers, *rows)]
     widths = [max(len(row[k]) for row in table) for k in range(len(headers))]
     left = [k == 0 or not _numbers(row[k] for row in table[1:]) for k in range(len(headers))]
     lines = [
@@ -71,15 +90,15 @@ def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") ->
 
     def line(row: Row, tag: str, style: str) -> str:
         cells = (
-            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{html.escape(cell)}</{tag}>'
+            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{escaped(cell)}</{tag}>'
             for cell, at_right in zip(row, right, strict=True)
         )
         return f'<tr style="background:none">{"".join(cells)}</tr>'
 
     head = f"<thead>{line(headers, 'th', _HEAD)}</thead>" if any(headers) else ""
     body = "".join(line(row, "td", _CELL) for row in rows)
-    caption = f'<caption style="{_TITLE}">{html.escape(title)}</caption>' if title else ""
-    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{html.escape(note)}</div>' if note else ""
+    caption = f'<caption style="{_TITLE}">{escaped(title)}</caption>' if title else ""
+    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{escaped(note)}</div>' if note else ""
     return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
 
 
@@ -96,12 +115,13 @@ def rich_table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: b
     from rich.text import Text
 
     shown = Table(
-        title=Text(title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, show_header=any(headers),
+        title=Text(visible(title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD,
+        show_header=any(headers),
         pad_edge=False, collapse_padding=tight,
     )  # fmt: skip
     for header in headers:
         text = header in ("", "label")
         shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
     for row in rows:
-        shown.add_row(*map(Text, row))
+        shown.add_row(*(Text(visible(cell)) for cell in row))
     return shown

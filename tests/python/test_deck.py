@@ -215,7 +215,7 @@ WRONG = [
         '"sphere"',
         '"heights"',
         'body.1.surface.shape = "heights": this version reads no height maps from files; give the gap '
-        "as an array in Python: hexcontact.Case(gap=..., lattice=...)",
+        "in Python, as an xarray.DataArray with coordinates x and y: hexcontact.Case(gap=...)",
     ),
     (
         'fields = ["pressure", "traction_x"]',

@@ -89,7 +89,7 @@ def case(**keys: Any) -> Case:
 
 
 def flat(gap: Any) -> Case:
-    return case(body_1=ELASTIC, gap=gap, nodes_in_radius=None, spacing=1e-4, window=(9, 9))
+    return case(body_1=ELASTIC, gap=gap, nodes_in_radius=None, lattice=LATTICE)
 
 
 def friction(**changed: Any) -> ContactState:
@@ -196,7 +196,7 @@ def pressure(result: Any) -> np.ndarray:
 def bad() -> Iterator[tuple[str, str, str]]:
     yield "gap", "complex", "gap: an array of real numbers expected"
     yield "gap", "masked", "gap: an array without masked values expected"
-    yield "gap", "a row less", r"gap: expected an array of shape \(9, 9\)"
+    yield "gap", "a row less", r"gap: an array of shape \(8, 9\), expected \(9, 9\)"
     yield "gap", "huge", r"gap: expected lengths of at most 1e\+30 m"
     yield "gap of a function", "words", "gap: an array of real numbers expected"
     yield (

@@ -155,9 +155,9 @@ def compare(
         known = [_own(exact, name, dataset)]
     entries = [entry for one in known for entry in _entries(data, one)]
     radius = float(data["contact_radius"]) if "contact_radius" in data else 0.0
-    if entries and radius and not note:
-        spacings = radius / float(dataset.attrs["lattice_spacing"])
-        note = f"{spacings:.3g} spacings in the contact radius"
+    if entries and radius:
+        spacings = f"{radius / float(dataset.attrs['lattice_spacing']):.3g} spacings in the contact radius"
+        note = f"{spacings}; {note}" if note else spacings
     return Comparison(entries, number, note)
 
 

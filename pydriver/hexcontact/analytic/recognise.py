@@ -56,7 +56,7 @@ class Exact:
 
 
 def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact], str]:
-    """Return the closed solutions that hold for a load step, and a sentence if there are none.
+    """Return the closed solutions that hold for a load step, and what there is to know about them.
 
     Parameters
     ----------
@@ -77,7 +77,9 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
         *_dissimilar(so_far, load),
     ]
     if known:
-        return known, ""
+        from_python = 'shape = "python"' in str(dataset.attrs.get("deck", ""))
+        note = "the gap was given in Python; the solutions are those of its values at the nodes"
+        return known, note if from_python else ""
     if _pressure_is_frictionless(so_far):
         return [], "no closed solution is known for these surfaces"
     return [], (

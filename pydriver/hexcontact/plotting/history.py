@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, line_of
-from ..step_view import dataset_of, scaled
+from ..step_view import dataset_of, scaled, title_of
 from .style import COMPUTED, EXACT, GUIDE, STYLE, new_figure, set_title
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def history(
             draw_history(axes, dataset, names, over)
         for axes in grid[:-1].flat:
             axes.set_xlabel("")
-        set_title(figure, str(dataset.attrs.get("title", "")))
+        set_title(figure, title_of(dataset))
         return figure
 
 
@@ -232,7 +232,7 @@ def loop(result: Result | xarray.Dataset) -> Figure:
                 low, high = min(low, level - room), max(high, level + room)
         axes.set_ylim(low, high)
         axes.legend(*_once(axes))
-        set_title(figure, str(dataset.attrs.get("title", "")))
+        set_title(figure, title_of(dataset))
         return figure
 
 
@@ -267,7 +267,7 @@ def torsion(result: Result | xarray.Dataset) -> Figure:
             "Lubkin",
         )
         axes.legend()
-        set_title(figure, str(dataset.attrs.get("title", "")))
+        set_title(figure, title_of(dataset))
         return figure
 
 

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from ..step_view import StepView, as_list, dataset_of, scaled
+from ..step_view import StepView, as_list, dataset_of, scaled, title_of
 from .style import EXACT, STYLE, new_figure, set_title
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def views_of(results: Results, steps: int | Sequence[int]) -> tuple[list[StepVie
     several = as_list(results)
     chosen = [steps] if isinstance(steps, int) else list(steps)
     views = [StepView.of(result, step) for result in several for step in chosen]
-    titles = [str(dataset_of(result).attrs.get("title", "")) for result in several]
+    titles = [title_of(dataset_of(result)) for result in several]
     if len(set(titles)) < len(titles) and all(getattr(result, "path", "") for result in several):
         titles = [Path(cast("Result", result).path).stem for result in several]
     if len(several) == 1:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-import html
 import json
 import os
 import re
@@ -24,7 +23,7 @@ from .._version import __version__
 from ..errors import DeckError
 from ..progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
 from ..step_view import scaled
-from ..text import quantity
+from ..text import escaped, quantity
 from ..variables import VARIABLES
 from .report_fields import kept_steps, maps_of, rounded
 
@@ -117,7 +116,7 @@ def report(result: Result) -> str:
     title = result.case_title or Path(result.path).stem or "hexcontact result"
     page = resources.files("hexcontact").joinpath("data/report.html").read_text(encoding="utf-8")
     parts = dict(
-        title=html.escape(title),
+        title=escaped(title),
         status=_status(result),
         kept=_kept(len(numbers), len(histories)),
         inputs=_pairs(_inputs(result)),
@@ -137,14 +136,14 @@ def report(result: Result) -> str:
 
 def _status(result: Result) -> str:
     if result.shortfall:
-        return f'<p class="warning" role="note">{html.escape(result.shortfall)}</p>'
+        return f'<p class="warning" role="note">{escaped(result.shortfall)}</p>'
     if result.complete:
         return ""
     planned = int(result.dataset.attrs.get("planned_steps", 0))
     reason = str(result.dataset.attrs.get("stopped", ""))
     of = f" of {planned}" if planned else ""
     text = f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
-    return f'<p class="warning" role="note">{html.escape(text)}</p>'
+    return f'<p class="warning" role="note">{escaped(text)}</p>'
 
 
 def _kept(shown: int, steps: int) -> str:
@@ -204,7 +203,7 @@ def _provenance(result: Result, histories: Sequence[History]) -> list[tuple[str,
 
 
 def _pairs(rows: Iterable[tuple[str, ...]]) -> str:
-    cells = (f'<tr><th scope="row">{html.escape(n)}</th><td>{html.escape(v)}</td></tr>' for n, v in rows)
+    cells = (f'<tr><th scope="row">{escaped(n)}</th><td>{escaped(v)}</td></tr>' for n, v in rows)
     return f'<table class="pairs"><tbody>{"".join(cells)}</tbody></table>'
 
 
@@ -212,8 +211,8 @@ def _table(caption: str, headers: Sequence[str], rows: Iterable[Sequence[str]], 
     def line(row: Sequence[str]) -> str:
         cells = zip(kinds[1:], row[1:], strict=True)
         first, rest = (
-            html.escape(row[0]),
-            "".join(f"<td{kind}>{html.escape(cell)}</td>" for kind, cell in cells),
+            escaped(row[0]),
+            "".join(f"<td{kind}>{escaped(cell)}</td>" for kind, cell in cells),
         )
         mark = f' id="row-{first}"' if link else ""
         start = f'<a href="#step={first}">{first}</a>' if link else first
@@ -221,9 +220,9 @@ def _table(caption: str, headers: Sequence[str], rows: Iterable[Sequence[str]], 
 
     kinds = [' class="text"' * (name == "label") for name in headers]
     names = zip(kinds, headers, strict=True)
-    head = "".join(f'<th scope="col"{kind}>{html.escape(name)}</th>' for kind, name in names)
+    head = "".join(f'<th scope="col"{kind}>{escaped(name)}</th>' for kind, name in names)
     return (
-        f'<table class="numbers"><caption>{html.escape(caption)}</caption><thead><tr>{head}</tr></thead>'
+        f'<table class="numbers"><caption>{escaped(caption)}</caption><thead><tr>{head}</tr></thead>'
         f"<tbody>{''.join(map(line, rows))}</tbody></table>"
     )
 
@@ -248,7 +247,7 @@ def _deck(deck: str) -> str:
         return "<p>The case was made in Python, without a deck.</p>"
     return (
         "<details><summary>The whole deck</summary>"
-        f'<pre tabindex="0" aria-label="deck">{html.escape(deck)}</pre></details>'
+        f'<pre tabindex="0" aria-label="deck">{escaped(deck)}</pre></details>'
     )
 
 

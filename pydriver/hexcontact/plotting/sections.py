@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, PartialSlip
-from ..step_view import StepView, dataset_of, scaled, worded
+from ..step_view import StepView, dataset_of, scaled, title_of, worded
 from .maps import step_label
 from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, legend_below, new_figure, set_title, shades
 
@@ -285,7 +285,7 @@ def tractions(
             upper.legend(loc="lower center")
             set_title(figure, views[0].title)
         else:
-            figure = _family(views, exact, cut, str(dataset_of(result).attrs.get("title", "")))
+            figure = _family(views, exact, cut, title_of(dataset_of(result)))
         return figure
 
 

@@ -241,6 +241,7 @@ class Store:
         self.heads: list[Step] = []
         self._mutex = threading.RLock()  # close() may come from another thread than append()
         self._closed = False
+        self.finished = False  # whether the output is complete and in its place
         self._published = (0, time.monotonic())
         self.interim = True  # whether a long run also writes outputs on the way
         if self.path.is_dir():
@@ -320,12 +321,6 @@ class Store:
 
     def _take_over(self, overwrite: bool) -> None:
         """Deal with what is there: an output, or what an unfinished run left."""
-        if self.path.exists() and not overwrite:
-            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
-        if self.path.exists() and not _may_be_a_result(self.path):
-            raise DeckError(
-                f"{self.path} is not a netCDF file, so it is not overwritten; choose another output"
-            )
         left, trials = Journal(self.folder), TrialFolder(self.folder)
         if (left or trials) and not overwrite:
             count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
@@ -333,6 +328,12 @@ class Store:
                 f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in "
                 "Python) starts anew"
+            )
+        if self.path.exists() and not overwrite:
+            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
+        if self.path.exists() and not _may_be_a_result(self.path):
+            raise DeckError(
+                f"{self.path} is not a netCDF file, so it is not overwritten; choose another output"
             )
         with self.writing("the journal"):
             if left:  # they become the old output, which is only replaced by a complete new one
@@ -355,6 +356,13 @@ class Store:
         self.close((str(error) or "interrupted") if known else "")
         if isinstance(error, HexcontactError) and self.kept:
             error.add_note(self.kept)
+
+    @property
+    def has_all_steps(self) -> bool:
+        """Whether only the output is to be made of the steps."""
+        return bool(self.heads) and (
+            len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
+        )
 
     @property
     def kept(self) -> str:
@@ -439,8 +447,11 @@ class Store:
             If it cannot be written; the journal is kept.
         """
         with self._mutex:
+            if self._closed:  # by a signal, while the last step was on its way
+                raise ValueError("the store is closed")
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
             self._publish(complete=True)
+            self.finished = True
             Journal(self.folder).remove()
             self.close()
 
@@ -465,8 +476,11 @@ class Store:
         """
         layout = Layout(metadata, [step.head for step in steps], trials)
         with self._mutex:
+            if self._closed:
+                raise ValueError("the store is closed")
             with self.writing("the output"):
                 self._replace(self.path, lambda path: write(path, layout, steps, complete=True))
+            self.finished = True
             Journal(self.folder).remove()
             self.close()
 

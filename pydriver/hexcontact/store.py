@@ -22,9 +22,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from .errors import DeckError, HexcontactError, ResourceError
+from .errors import LACKING, DeckError, HexcontactError, ResourceError
 from .lock import Lock
-from .netcdf import flush, read_output, reading, write
+from .netcdf import check_name, flush, read_output, reading, write
 from .record import SUFFIX, read_record, write_record
 from .result import Layout, Metadata, Result, Step, assemble
 from .trial_folder import TrialFolder
@@ -32,7 +32,7 @@ from .trial_folder import TrialFolder
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _STOPPED = "stopped.txt"  # in the journal: why the run ended before its time
-_LACKING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, None}
+_LACKING = {*LACKING, None}
 
 
 def journal_of(path: Path) -> Path:
@@ -244,6 +244,7 @@ class Store:
         self.finished = False  # whether the output is complete and in its place
         self._published = (0, time.monotonic())
         self.interim = True  # whether a long run also writes outputs on the way
+        check_name(self.path)
         if self.path.is_dir():
             raise DeckError(f"{self.path} is a folder; a file name is expected")
         if self.path.exists() and not self.path.is_file():  # to replace it would take a device away

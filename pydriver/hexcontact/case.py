@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import deck as decks
 from . import grid as grids
-from . import native, native_friction
+from . import estimates, memory, native, native_friction
 from .arguments import reals
 from .case_arguments import as_toml, body_keys, given, middle_of, segments
 from .case_checks import algorithm_of, checked_deck
@@ -304,6 +305,7 @@ class Case:
         )
         self.window_fixed = grids.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # where the window follows from it alone
+        self._contact_radius = math.inf  # estimated; of an array of gaps nothing is known
         self.lattice = self._size(deck.grid, source, lattice)
         if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
             raise deck_error(problems, source)
@@ -401,9 +403,20 @@ class Case:
         return "direct" if self.solver.method == "direct" else "fft"
 
     def memory_needed(self, lattice: Lattice) -> int:
-        """Return the memory (bytes) that solving on a window takes."""
+        """Return the memory (bytes) that solving on a window takes, with a contact as large as estimated."""
         method, shape = self.method_for(lattice), lattice.shape
-        return (native_friction if self.frictional else native).memory_needed(method, *shape)
+        disc = math.pi * self._contact_radius**2 / lattice.cell_area
+        contact = math.ceil(min(disc, lattice.size))
+        if not self.frictional:
+            return native.memory_needed(method, *shape, contact=contact, threads=memory.threads())
+        return native_friction.memory_needed(
+            method,
+            *shape,
+            contact=contact,
+            loads=max(sum(t.control == "force" for t in step.targets) for step in self.load_steps),
+            coupled=estimates.coupled(self),
+            threads=memory.threads(),
+        )
 
     def run(
         self,
@@ -565,6 +578,7 @@ class Case:
             raise deck_error(
                 [Problem(("grid",), MISSING, f"no window can be found: {error}")], source
             ) from None
+        self._contact_radius = estimate.radius
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or grids.window(grid, center, estimate)

@@ -29,20 +29,21 @@ def operator_applications(case: Case) -> float | None:
         return None
     if not case.frictional:
         return _FRICTIONLESS * len(case.load_steps)
-    each = _DISSIMILAR if _coupled(case) else _SIMILAR
+    each = _DISSIMILAR if coupled(case) else _SIMILAR
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         each *= _INTERPOLATED
     return each * _solutions(case)
 
 
-def _coupled(case: Case) -> bool:
+def coupled(case: Case) -> bool:
+    """Tell whether pressure and shear move each other."""
     return case.solver.coupling == "full" and abs(case.pair.beta) > _SMALLEST_BETA
 
 
 def _solutions(case: Case) -> int:
     """Return how many solutions a case takes; a guess for segments whose steps are chosen on the way."""
     adaptive = sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
-    each = _ADAPTIVE if _coupled(case) else _ADAPTIVE_SIMILAR
+    each = _ADAPTIVE if coupled(case) else _ADAPTIVE_SIMILAR
     return len(case.load_steps) - adaptive + each * adaptive
 
 

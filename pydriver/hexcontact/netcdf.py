@@ -111,6 +111,8 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
     column = file.createVariable(name, variable.dtype, variable.dims, **options)
+    if options:
+        column.set_var_chunk_cache(size=0)  # chunks are written once; HDF5 kept 64 MB of each variable
     column.setncatts(layout.attributes_of(name))
     if variable.dims[-2:] == ("row", "col") and name not in ("x", "y"):
         column.coordinates = "x y"

@@ -85,8 +85,8 @@ contains
       ! the first guess is where undeformed bodies would overlap, twice the contact and more; half of the matrix is touched
       dense_memory = dense_memory + 8*min(9*n/4, int(extent(1), long)*extent(2))**2/2
     else
-      ! beside the matrix its factors of single precision, on their way, too
-      dense_memory = dense_memory + (8 + 2*4)*(3*n)**2
+      ! beside the matrix its factors of single precision, on their way, too; at first the contact is larger
+      dense_memory = dense_memory + (8 + 2*4)*(3*n + n/10)**2
     end if
   end function dense_memory
 

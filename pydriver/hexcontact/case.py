@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import deck as decks
-from . import grid as grids
 from . import estimates, memory, native, native_friction
+from . import grid as grids
 from .arguments import reals
 from .case_arguments import as_toml, body_keys, given, middle_of, segments
 from .case_checks import algorithm_of, checked_deck

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # the last comes from Slurm, before a time limit
 
-ends_process = False  # whether the process ends with the command: then no signal changes its exit code any more
+ends_process = False  # whether it ends with the command: then no signal changes its exit code any more
 
 
 class Interrupted(BaseException):

@@ -364,8 +364,7 @@ def memory_needed(
     contact
         Nodes in contact; default: all.
     part
-        The whole problem; or the full 3x3 flexibility operator alone, or what it takes besides while it is set
-        up.
+        The whole problem; the full 3x3 flexibility operator alone; or what that takes besides at its set-up.
     threads
         Threads that will be used.
     """

@@ -125,9 +125,7 @@ def interrupted(study: Study) -> str:
     )
 
 
-def run_case(
-    study: Study, number: int, retry: bool, listeners: Listeners, heard: tuple[int, int]
-) -> Outcome:
+def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard: tuple[int, int]) -> Outcome:
     """Run one case for a job array; signals end the process unless it is done, and what is finished stays."""
     from .progress import reporter
 

@@ -48,14 +48,14 @@ _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when 
 
 
 def peak_memory(case: Case, lattice: Lattice) -> int:
-    """Return the memory (bytes) that a run on a window takes at most, with the interpreter and all libraries."""
+    """Return the memory (bytes) that a run on a window takes at most, with interpreter and libraries."""
     return memory.resident() + memory_needed(case, lattice)
 
 
 def memory_needed(case: Case, lattice: Lattice) -> int:
     """Return the memory (bytes) that solving and writing load steps on a window takes.
 
-    The contact is taken as large as estimated at the largest load, all of the window where there is no estimate.
+    The contact is taken as large as estimated at the largest load; as the window where there is no estimate.
     """
     from . import native
 

@@ -104,7 +104,9 @@ def measured(text: str, threads: int = 1) -> Memory:
 
 def main() -> None:
     """Measure and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--sizes", default="64,256,512,1024", help="nodes along a side of the window")
     parser.add_argument("--share", type=float, default=0.8, help="width of the contact over the window's")
     parser.add_argument("--steps", type=int, default=2, help="load steps of each segment")
@@ -130,11 +132,8 @@ def main() -> None:
     print("| problem | side | method | peak [MB] | estimate [MB] | off |\n|---|---|---|---|---|---|")
     for (problem, side, method), text in tasks.items():
         memory = measured(text, options.threads)
-        off = f"{100 * memory.error:+.1f} %"
-        print(
-            f"| {problem} | {side} | {method} | {memory.peak / 1e6:.1f} | {memory.estimate / 1e6:.1f} | {off} |",
-            flush=True,
-        )
+        sizes_found = f"{memory.peak / 1e6:.1f} | {memory.estimate / 1e6:.1f} | {100 * memory.error:+.1f} %"
+        print(f"| {problem} | {side} | {method} | {sizes_found} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -182,7 +182,7 @@ def test_a_run_is_sent_to_resume_wherever_steps_are_kept(
         state(out)
         with pytest.raises(
             hexcontact.DeckError,
-            match=rf"holds \d finished steps of an unfinished run; hexcontact resume {out} goes on, --overwrite",
+            match=rf"holds \d finished steps of an unfinished run; hexcontact resume {out} goes on, ",
         ):
             Case.from_text(DECK).run(out)
     again = tmp_path / "again.nc"

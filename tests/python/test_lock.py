@@ -67,7 +67,9 @@ def test_what_is_no_lock_is_left_alone(tmp_path: Path, put: Callable[[Path, Path
         assert place.read_text().startswith((THESIS, "{", "["))
 
 
-@pytest.mark.parametrize("left", [b"", b"\0" * 80, b'{"process": 1, "host": "%s"}' % os.uname().nodename.encode()])
+@pytest.mark.parametrize(
+    "left", [b"", b"\0" * 80, b'{"process": 1, "host": "%s"}' % os.uname().nodename.encode()]
+)
 def test_what_a_run_that_died_left_is_taken_over(tmp_path: Path, left: bytes) -> None:
     place = tmp_path / "lock"
     place.write_bytes(left)

@@ -1,7 +1,6 @@
 """What `check` says of the memory of a run, and what the run takes at most."""
 
 import pytest
-
 from bench.memory import deck, measured
 
 DIRECT = '[solver]\nmethod = "direct"\n'

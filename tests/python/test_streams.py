@@ -1,4 +1,4 @@
-"""The command where standard streams are closed, full or not read, descriptors are few, names are odd bytes."""
+"""The command with standard streams that are closed, full or not read, few descriptors, odd names."""
 
 import json
 import os
@@ -59,9 +59,7 @@ def shell(place: Path, words: str, code: int) -> subprocess.CompletedProcess[str
     return done
 
 
-@pytest.mark.parametrize(
-    "streams", [">&-", "2>&-", "<&- >&- 2>&-", "2>/dev/full", "2>&1 | true"]
-)
+@pytest.mark.parametrize("streams", [">&-", "2>&-", "<&- >&- 2>&-", "2>/dev/full", "2>&1 | true"])
 def test_a_run_that_nobody_hears_is_done(folder: Path, streams: str) -> None:
     out = folder / "out.nc"
     shell(folder, f"set -o pipefail; {COMMAND} run sphere.toml --overwrite -o {out.name} {streams}", code=0)

@@ -22,7 +22,7 @@ module hc_convolution
   implicit none
   private
 
-  public :: convolution_t, new_convolution, convolution_memory, kernel_source_t, threads_for
+  public :: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t, threads_for
 
   !> Bytes that one component of a column block should take, so that blocks stay in cache.
   integer, parameter :: block_bytes = 32768
@@ -189,7 +189,7 @@ contains
     end if
   end function threads_for
 
-  !> Bytes that a convolution takes while its kernels are transformed.
+  !> Bytes that a convolution takes: spectra, row transforms, buffers.
   pure integer(selected_int_kind(18)) function convolution_memory(extent, padded, n_kernel, n_component, n_threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -201,13 +201,36 @@ contains
     integer(long) :: leading, n_row, length, width
 
     width = block_width(padded(2))
-    leading = padded(1)/2 + width
-    n_row = extent(2)
+    leading = leading_size(padded)
+    n_row = even(extent(2))
     length = padded(2)
-    convolution_memory = n_kernel*leading*length + 2*(n_component + n_kernel)*leading*n_row &
+    convolution_memory = n_kernel*leading*length + 2*n_component*leading*n_row &
                          + n_threads*(4*padded(1) + 4*n_component*width*length)
     convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
   end function convolution_memory
+
+  !> Bytes that are needed besides while the kernels of a padded convolution are transformed: their rows.
+  pure integer(selected_int_kind(18)) function transform_memory(extent, padded, n_kernel)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+    !> Number of kernels
+    integer, intent(in) :: n_kernel
+    integer, parameter :: long = selected_int_kind(18)
+
+    transform_memory = storage_size((1.0_wp, 0.0_wp))/8*n_kernel*leading_size(padded)*int(even(extent(2)), long)
+  end function transform_memory
+
+  !> Leading dimension that holds the frequencies along the first direction, in whole blocks.
+  pure integer function leading_size(padded)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+
+    associate (width => block_width(padded(2)))
+      leading_size = (padded(1)/2 + width)/width*width
+    end associate
+  end function leading_size
 
   !> Rows are transformed in pairs.
   elemental integer function even(n)

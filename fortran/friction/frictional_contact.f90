@@ -17,7 +17,7 @@ module hc_frictional_contact
   implicit none
   private
 
-  public :: frictional_contact_t, new_frictional_contact, frictional_contact_memory
+  public :: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
 
   !> Windows below this many nodes a side are not coarsened any further.
   integer, parameter :: smallest_side = 20
@@ -72,7 +72,7 @@ contains
     end do
   end subroutine new_frictional_contact
 
-  !> Bytes that a problem takes, for a window of the given size.
+  !> Bytes that a problem takes between its steps: operators and what is given, on all lattices.
   pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, n_threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -81,10 +81,49 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
-    ! fields: problem, iterate, states, frames, vectors of conjugate gradients, a dozen directions of GMRES with their products
-    finest = operators_memory(extent, n_threads) + 150*8*int(extent(1), long)*extent(2)
+    ! initial gap, coordinates, candidates
+    finest = operators_memory(extent, n_threads) + 28*int(extent(1), long)*extent(2)
     frictional_contact_memory = finest + finest/3
   end function frictional_contact_memory
+
+  !> Bytes that are needed besides while a step is solved; the coarse lattices have done by then.
+  pure integer(selected_int_kind(18)) function friction_step_memory(extent, n_contact, n_force, coupled)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Nodes in contact
+    integer, intent(in) :: n_contact
+    !> Loads that are prescribed, the normal one among them; the other motions are
+    integer, intent(in) :: n_force
+    !> Pressure and shear move each other
+    logical, intent(in) :: coupled
+    integer, parameter :: long = selected_int_kind(18)
+    !> Bytes of a field of numbers, and of logical values or in single precision
+    integer, parameter :: field = 8, half = 4
+    !> Directions of GMRES: so many are enough as a rule
+    integer, parameter :: n_direction = 5
+    integer(long) :: n, everywhere, inside
+
+    n = int(extent(1), long)*extent(2)
+    ! states before and after, tractions to start from, displacements
+    everywhere = 2*(9*field + half + 2*half) + 3*field + 3*field
+    ! iterate; shear system: directions, compliance, weights, vectors in both precisions
+    everywhere = everywhere + 9*field + 4*half + 9*field + 5*half
+    ! zones, gap, edge of the contact, values of expressions; constraints of the loads and what they drag along
+    everywhere = everywhere + 2*field + 2*half + 4*field + (2 + 2*2*max(n_force - 1, 1))*field
+    if (coupled) then
+      ! active nodes, unknowns, product, right-hand side, weights, shear in the plane, slope; constraints thrice
+      everywhere = everywhere + 3*half + (4*3 + 2 + 1 + 3*3*n_force)*field
+      ! the product; GMRES: vector and image, the products of all directions
+      everywhere = everywhere + (2 + 3 + 3 + 3*(2 + n_direction))*field
+      ! packed: directions, residuals, weights, constraints thrice
+      inside = 3*(n_direction + 5 + 3*n_force)*field
+    else
+      ! unknowns, product, right-hand side, shear; conjugate gradients: vector and image; preconditioned constraints
+      everywhere = everywhere + (4*2 + 2*2 + 5)*field
+      inside = 2*(7 + 2*max(n_force - 1, 1))*field
+    end if
+    friction_step_memory = n*everywhere + n_contact*inside
+  end function friction_step_memory
 
   subroutine displacements(self, pressure, traction, displacement, error)
     class(frictional_contact_t), intent(inout) :: self

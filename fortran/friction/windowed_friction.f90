@@ -9,9 +9,9 @@ module hc_windowed_friction
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
-  use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory
+  use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_kernel_cache, only: kernel_cache_t
-  use hc_window_part, only: frame, is_worth, part_of
+  use hc_window_part, only: frame, is_worth, part_of, worth
   implicit none
   private
 
@@ -59,15 +59,30 @@ contains
     self%problem%n_threads = self%whole%problem%n_threads
   end subroutine new_windowed_friction
 
-  !> Bytes that a problem takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_threads)
+  !> Bytes that a problem takes while a step is solved on the window; on a part alone it is less.
+  pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_contact, n_force, coupled, n_threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
+    !> Nodes in contact
+    integer, intent(in) :: n_contact
+    !> Loads that are prescribed, the normal one among them
+    integer, intent(in) :: n_force
+    !> Pressure and shear move each other
+    logical, intent(in) :: coupled
     !> Threads to use
     integer, intent(in) :: n_threads
+    integer, parameter :: long = selected_int_kind(18)
+    real(wp) :: share
 
-    ! the vectors of a part take the place of those of the window, its operators are extra
-    windowed_friction_memory = 5*frictional_contact_memory(extent, n_threads)/4
+    ! what is given is there twice
+    windowed_friction_memory = frictional_contact_memory(extent, n_threads) &
+                               + friction_step_memory(extent, n_contact, n_force, coupled) &
+                               + 28*int(extent(1), long)*extent(2)
+    if (.not. coupled) return
+    ! steps that move the edge of the contact are tried on a part first, about as large as the contact will be;
+    ! its operators stay meanwhile
+    share = min(worth, n_contact/(real(extent(1), wp)*extent(2)))
+    windowed_friction_memory = windowed_friction_memory + frictional_contact_memory(int(sqrt(share)*extent), n_threads)
   end function windowed_friction_memory
 
   subroutine displacements(self, pressure, traction, displacement, error)

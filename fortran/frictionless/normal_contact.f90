@@ -114,13 +114,18 @@ contains
     !> Threads to use
     integer, intent(in) :: n_threads
     integer, parameter :: long = selected_int_kind(18)
-    integer(long) :: finest
+    !> Bytes of a field of numbers, and of logical values or in single precision
+    integer, parameter :: field = 8, half = 4
+    integer(long) :: n, each
 
-    ! the operators of a part besides; fields: gap, candidates, state, what an iteration needs, and the kernel
-    finest = 7*fft_memory(extent, .true., n_threads)/5 + preconditioner_memory(extent, n_threads, .false.) &
-             + convolution_memory(extent, good_size(2*extent - 1), 1, 1, n_threads) &
-             + 16*8*int(extent(1), long)*extent(2) + 8*int(maxval(extent), long)**2
-    normal_contact_memory = finest + finest/3
+    n = int(extent(1), long)*extent(2)
+    ! on all lattices: products in single precision; gap, candidates; pressure, closing, vectors, zones, punch
+    each = preconditioner_memory(extent, n_threads, .false.) - 2*half*n &
+           + convolution_memory(extent, good_size(2*extent - 1), 1, 1, n_threads) &
+           + n*(field + half + 2*field + 4*half + 2*half)
+    ! on the finest: products in double precision, the kernel; states, start, zones to come, edge of the contact
+    normal_contact_memory = each + each/3 + fft_memory(extent, .true., n_threads) &
+                            + field*int(maxval(extent), long)**2 + n*(2*field + half + 2*field + 4*half)
   end function normal_contact_memory
 
   !> Solve for a normal load or an approach.

@@ -5,7 +5,7 @@ module hc_window_part
   implicit none
   private
 
-  public :: frame, is_worth, part_of
+  public :: frame, is_worth, part_of, worth
 
   !> A part is worth operators of its own below this share of the nodes of the window.
   real(wp), parameter :: worth = 0.6_wp

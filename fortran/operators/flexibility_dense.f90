@@ -68,16 +68,26 @@ contains
     !$omp end parallel do
   end subroutine new_dense_flexibility
 
-  !> Bytes that the matrix of the whole window takes, factorized.
-  pure integer(selected_int_kind(18)) function dense_memory(extent, normal_only)
+  !> Bytes that the influence coefficients and the matrix of a contact take, factorized.
+  pure integer(selected_int_kind(18)) function dense_memory(extent, n_contact, normal_only)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
+    !> Nodes in contact; with friction all stick
+    integer, intent(in) :: n_contact
     !> Contact without friction
     logical, intent(in) :: normal_only
     integer, parameter :: long = selected_int_kind(18)
+    integer(long) :: n
 
-    ! with friction the factors are of single precision, beside the matrix
-    dense_memory = merge(8_long, 12_long, normal_only)*(merge(1_long, 3_long, normal_only)*extent(1)*extent(2))**2
+    n = n_contact
+    dense_memory = 8*n_block*4*int(extent(1), long)*extent(2)
+    if (normal_only) then
+      ! the first guess is where undeformed bodies would overlap, twice the contact and more; half of the matrix is touched
+      dense_memory = dense_memory + 8*min(9*n/4, int(extent(1), long)*extent(2))**2/2
+    else
+      ! beside the matrix its factors of single precision, on their way, too; at first the contact is larger
+      dense_memory = dense_memory + (8 + 2*4)*(3*n + n/10)**2
+    end if
   end function dense_memory
 
   !> Displacements along the normal by a unit pressure on one node [m/Pa].

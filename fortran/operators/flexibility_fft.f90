@@ -7,14 +7,14 @@ module hc_flexibility_fft
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility, only: flexibility_t, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
-  use hc_convolution, only: convolution_t, new_convolution, convolution_memory, kernel_source_t
+  use hc_convolution, only: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t
   use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
   use hc_kernel_cache, only: kernel_cache_t
   use hc_normal_kernel, only: normal_kernel_t
   implicit none
   private
 
-  public :: fft_flexibility_t, new_fft_flexibility, fft_memory
+  public :: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
 
   !> Convolution operator over a window.
   type, extends(flexibility_t) :: fft_flexibility_t
@@ -101,6 +101,14 @@ contains
     fft_memory = convolution_memory(extent, good_size(2*extent - 1), merge(1, n_block, normal_only), &
                                     merge(1, 3, normal_only), n_threads)
   end function fft_memory
+
+  !> Bytes that are needed besides while the full operator is set up.
+  pure integer(selected_int_kind(18)) function fft_setup_memory(extent)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+
+    fft_setup_memory = transform_memory(extent, good_size(2*extent - 1), n_block)
+  end function fft_setup_memory
 
   pure subroutine lattice_block_row(self, j, k)
     class(lattice_blocks_t), intent(in) :: self

@@ -133,8 +133,12 @@ contains
     integer, intent(in) :: n_threads
     !> For shear tractions instead of the pressure
     logical, intent(in) :: tangential
+    integer, parameter :: long = selected_int_kind(18)
+
     preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), &
                                                merge(2, 1, tangential), n_threads)
+    ! fields in single precision; those of the tangential one belong to the shear system
+    if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
   end function preconditioner_memory
 
   subroutine apply(self, displacement, traction, edge)

@@ -11,7 +11,7 @@ module hc_f2py_api
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
   use hc_contact_state, only: contact_state_t, normal
   use hc_normal_contact, only: new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: new_direct_contact
@@ -60,12 +60,14 @@ contains
   end subroutine elastic_constants
 
   !> Bytes that a frictionless problem, or an operator, takes.
-  subroutine memory_needed(method, extent, operator_only, n_threads, bytes)
+  subroutine memory_needed(method, extent, n_contact, operator_only, n_threads, bytes)
     !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Number of columns and rows of the window
     integer(c_int), intent(in) :: extent(2)
-    !> Not zero: the full 3x3 operator alone; zero: a frictionless problem
+    !> Nodes in contact
+    integer(c_int), intent(in) :: n_contact
+    !> 1: the full 3x3 operator alone, 2: what it takes besides while it is set up; 0: a frictionless problem
     integer(c_int), intent(in) :: operator_only
     !> Threads
     integer(c_int), intent(in) :: n_threads
@@ -73,9 +75,11 @@ contains
     integer(c_int64_t), intent(out) :: bytes
 
     if (method == direct) then
-      bytes = dense_memory(extent, normal_only=operator_only == 0)
-    else if (operator_only /= 0) then
+      bytes = dense_memory(extent, n_contact, normal_only=.true.)
+    else if (operator_only == 1) then
       bytes = fft_memory(extent, .false., n_threads)
+    else if (operator_only == 2) then
+      bytes = fft_setup_memory(extent)
     else
       bytes = normal_contact_memory(extent, n_threads)
     end if

@@ -29,21 +29,27 @@ module hc_f2py_friction
 
 contains
 
-  !> Bytes that a problem takes.
-  subroutine friction_memory_needed(method, extent, n_threads, bytes)
+  !> Bytes that a problem takes while a step is solved.
+  subroutine friction_memory_needed(method, extent, n_contact, n_force, coupled, n_threads, bytes)
     !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Number of columns and rows of the window
     integer(c_int), intent(in) :: extent(2)
+    !> Nodes in contact
+    integer(c_int), intent(in) :: n_contact
+    !> Loads that are prescribed, the normal one among them
+    integer(c_int), intent(in) :: n_force
+    !> Not zero: pressure and shear move each other
+    integer(c_int), intent(in) :: coupled
     !> Threads
     integer(c_int), intent(in) :: n_threads
     !> Bytes
     integer(c_int64_t), intent(out) :: bytes
 
     if (method == direct) then
-      bytes = dense_memory(extent, normal_only=.false.)
+      bytes = dense_memory(extent, n_contact, normal_only=.false.)
     else
-      bytes = windowed_friction_memory(extent, n_threads)
+      bytes = windowed_friction_memory(extent, n_contact, n_force, coupled /= 0, n_threads)
     end if
   end subroutine friction_memory_needed
 

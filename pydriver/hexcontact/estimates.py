@@ -16,7 +16,6 @@ _ADAPTIVE, _ADAPTIVE_SIMILAR = (
     30,
     6,
 )  # solutions in a segment of adaptive steps: as measured, within a factor of 3
-_SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
 
 # Seconds per application and node of the window on one core of 2020 or so, with all that goes with it.
 _SECONDS_FRICTIONLESS, _SECONDS = 2e-7, 1.3e-7
@@ -29,20 +28,16 @@ def operator_applications(case: Problem) -> float | None:
         return None
     if not case.frictional:
         return _FRICTIONLESS * len(case.load_steps)
-    each = _DISSIMILAR if _coupled(case) else _SIMILAR
+    each = _DISSIMILAR if case.coupled else _SIMILAR
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         each *= _INTERPOLATED
     return each * _solutions(case)
 
 
-def _coupled(case: Problem) -> bool:
-    return case.solver.coupling == "full" and abs(case.pair.beta) > _SMALLEST_BETA
-
-
 def _solutions(case: Problem) -> int:
     """Return how many solutions a case takes; a guess for segments whose steps are chosen on the way."""
     adaptive = sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
-    each = _ADAPTIVE if _coupled(case) else _ADAPTIVE_SIMILAR
+    each = _ADAPTIVE if case.coupled else _ADAPTIVE_SIMILAR
     return len(case.load_steps) - adaptive + each * adaptive
 
 

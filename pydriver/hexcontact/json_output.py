@@ -92,7 +92,7 @@ def of_case(case: Problem, output: Path) -> dict[str, Any]:
     """Return what would be run."""
     from . import estimates
     from .solve import parameters_of
-    from .window import memory_needed
+    from .window import peak_memory
 
     lattice = case.lattice
     return {
@@ -107,7 +107,7 @@ def of_case(case: Problem, output: Path) -> dict[str, Any]:
         "window_fixed": case.window_fixed,
         "load_steps": case.planned_steps or None,
         "segments": case.load_steps[-1].segment + 1,
-        "memory": memory_needed(case, lattice),
+        "memory": peak_memory(case, lattice),
         "operator_applications": estimates.operator_applications(case),
         "seconds": estimates.seconds(case),
     }

@@ -351,7 +351,13 @@ class NormalContact:
 
 
 def memory_needed(
-    method: Method, n_row: int, n_col: int, *, operator_only: bool = False, threads: int = 1
+    method: Method,
+    n_row: int,
+    n_col: int,
+    *,
+    contact: int | None = None,
+    part: Literal["problem", "operator", "set-up of the operator"] = "problem",
+    threads: int = 1,
 ) -> int:
     """Return the bytes that a frictionless problem takes on a window of the given size.
 
@@ -361,9 +367,13 @@ def memory_needed(
         ``"direct"`` or ``"fft"``.
     n_row, n_col
         Rows and columns of the window.
-    operator_only
-        The full 3x3 flexibility operator alone instead.
+    contact
+        Nodes in contact; default: all.
+    part
+        The whole problem; the full 3x3 flexibility operator alone; or what that takes besides at its set-up.
     threads
         Threads that will be used.
     """
-    return int(_api.memory_needed(method_code(method), [n_col, n_row], int(operator_only), threads))
+    code = ("problem", "operator", "set-up of the operator").index(part)
+    nodes = n_row * n_col if contact is None else contact
+    return int(_api.memory_needed(method_code(method), [n_col, n_row], nodes, code, threads))

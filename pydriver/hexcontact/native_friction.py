@@ -334,7 +334,16 @@ def _api_free(handle: int) -> None:
     _core.hc_f2py_api.free_handle(handle)
 
 
-def memory_needed(method: Method, n_row: int, n_col: int, threads: int = 1) -> int:
+def memory_needed(
+    method: Method,
+    n_row: int,
+    n_col: int,
+    *,
+    contact: int | None = None,
+    loads: int = 4,
+    coupled: bool = True,
+    threads: int = 1,
+) -> int:
     """Return the bytes that a problem with friction takes on a window of the given size.
 
     Parameters
@@ -343,7 +352,16 @@ def memory_needed(method: Method, n_row: int, n_col: int, threads: int = 1) -> i
         ``"direct"`` or ``"fft"``.
     n_row, n_col
         Rows and columns of the window.
+    contact
+        Nodes in contact; default: all.
+    loads
+        How many loads are prescribed, 1 to 4; the other motions are.
+    coupled
+        Whether pressure and shear move each other.
     threads
         Threads that will be used.
     """
-    return int(_api.friction_memory_needed(method_code(method), [n_col, n_row], threads))
+    nodes = n_row * n_col if contact is None else contact
+    return int(
+        _api.friction_memory_needed(method_code(method), [n_col, n_row], nodes, loads, coupled, threads)
+    )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import mesh
-from .errors import DeckError, HexcontactError
+from .errors import LACKING, DeckError, HexcontactError, ResourceError
 from .files import require_ordinary
 from .result import Layout, Metadata, Result, Step
 from .result_check import fault_of_dimensions, fault_of_result
@@ -112,6 +112,8 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
     column = file.createVariable(name, variable.dtype, variable.dims, **options)
+    if options:
+        column.set_var_chunk_cache(size=0)  # chunks are written once; HDF5 kept 64 MB of each variable
     column.setncatts(layout.attributes_of(name))
     if variable.dims[-2:] == ("row", "col") and name not in ("x", "y"):
         column.coordinates = "x y"
@@ -147,16 +149,27 @@ def flush(path: Path) -> None:
 # --- reading --------------------------------------------------------------------------------------
 
 
+def check_name(path: Path) -> None:
+    """Refuse names that the netCDF library cannot take."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise DeckError(f"{path}: expected a name in UTF-8, as netCDF files have") from None
+
+
 @contextlib.contextmanager
 def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
     """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
+    check_name(path)
     try:
         yield
-    except (HexcontactError, FileNotFoundError):
+    except (HexcontactError, FileNotFoundError, MemoryError):
         raise
     except PermissionError as error:
         raise DeckError(f"{path} cannot be read: {error.strerror}") from error
     except Exception as error:  # damage takes any form: every library below has its own exceptions
+        if isinstance(error, OSError) and error.errno in LACKING:
+            raise ResourceError(f"{path} cannot be read: {error.strerror}") from error
         raise DeckError(
             f"{path} is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
         ) from error

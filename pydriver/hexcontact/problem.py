@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import deck as decks
 from . import grid as grids
-from . import native, native_friction
+from . import memory, native, native_friction
 from .arguments import reals
 from .case_arguments import HeightMap, as_toml
 from .case_checks import algorithm_of, checked_deck
@@ -34,6 +35,7 @@ Array = NDArray[np.float64]
 
 # Windows of up to so many nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
 MOST_DIRECT_NODES = 200
+_SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
 
 
 class Problem:
@@ -177,6 +179,7 @@ class Problem:
         )
         self.window_fixed = grids.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # where the window follows from it alone
+        self._contact_radius = math.inf  # estimated; of an array of gaps nothing is known
         self.lattice = self._size(deck.grid, source, lattice)
         if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
             raise deck_error(problems, source)
@@ -196,6 +199,11 @@ class Problem:
     def frictional(self) -> bool:
         """Whether shear tractions are solved for."""
         return self.solver.algorithm != "frictionless"
+
+    @property
+    def coupled(self) -> bool:
+        """Whether pressure and shear move each other."""
+        return self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
 
     # --- what solving needs ---------------------------------------------------------------------------------
 
@@ -300,9 +308,20 @@ class Problem:
         return "direct" if self.solver.method == "direct" else "fft"
 
     def memory_needed(self, lattice: Lattice) -> int:
-        """Return the memory (bytes) that solving on a window takes."""
+        """Return the memory (bytes) that solving on a window takes, with a contact as large as estimated."""
         method, shape = self.method_for(lattice), lattice.shape
-        return (native_friction if self.frictional else native).memory_needed(method, *shape)
+        disc = math.pi * self._contact_radius**2 / lattice.cell_area
+        contact = math.ceil(min(disc, lattice.size))
+        if not self.frictional:
+            return native.memory_needed(method, *shape, contact=contact, threads=memory.threads())
+        return native_friction.memory_needed(
+            method,
+            *shape,
+            contact=contact,
+            loads=max(sum(t.control == "force" for t in step.targets) for step in self.load_steps),
+            coupled=self.coupled,
+            threads=memory.threads(),
+        )
 
     def changed(self, changes: Mapping[str, Any]) -> Self:
         """Return the same case with other values for some keys of its deck.
@@ -407,6 +426,7 @@ class Problem:
             raise deck_error(
                 [Mistake(("grid",), MISSING, f"no window can be found: {error}")], source
             ) from None
+        self._contact_radius = estimate.radius
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or grids.window(grid, center, estimate)

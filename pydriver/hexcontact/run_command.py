@@ -134,7 +134,17 @@ def solved(
     listeners: Listeners,
     before: Sequence[Step] = (),
 ) -> list[Any]:
-    """Solve a case into a store and return the histories of all its steps; signals end the process."""
+    """Solve a case into a store and return the histories of all its steps.
+
+    Signals end the process, unless the last step is finished: then the output is completed.
+    """
+
+    def ends(signaled: Interrupted) -> bool:
+        if store.has_all_steps:
+            return False
+        store.close(f"interrupted ({signaled.name})")
+        return not store.finished
+
     shown, histories = reporter(listeners.silent), [step.history for step in before]
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
@@ -142,9 +152,9 @@ def solved(
             in_background(
                 lambda: solve.record(case, store, shown, lambda step: histories.append(step.history), before),
                 heard,
+                ends,
             )
     except Interrupted as signaled:
-        store.close(f"interrupted ({signaled.name})")
         listeners.leave(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories
 

@@ -22,10 +22,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from .errors import DeckError, HexcontactError, ResourceError
+from .errors import LACKING, DeckError, HexcontactError, ResourceError
 from .files import require_ordinary
 from .lock import Lock
-from .netcdf import flush, read_output, reading, write
+from .netcdf import check_name, flush, read_output, reading, write
 from .record import SUFFIX, read_record, write_record
 from .result import Layout, Metadata, Result, Step, assemble
 from .trial_folder import TrialFolder
@@ -33,7 +33,7 @@ from .trial_folder import TrialFolder
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _STOPPED = "stopped.txt"  # in the journal: why the run ended before its time
-_LACKING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, None}
+_LACKING = {*LACKING, None}
 
 
 def journal_of(path: Path) -> Path:
@@ -243,8 +243,10 @@ class Store:
         self.heads: list[Step] = []
         self._mutex = threading.RLock()  # close() may come from another thread than append()
         self._closed = False
+        self.finished = False  # whether the output is complete and in its place
         self._published = (0, time.monotonic())
         self.interim = True  # whether a long run also writes outputs on the way
+        check_name(self.path)
         if self.path.is_dir():
             raise DeckError(f"{self.path} is a folder; a file name is expected")
         if self.path.exists() and not self.path.is_file():  # to replace it would take a device away
@@ -322,12 +324,6 @@ class Store:
 
     def _take_over(self, overwrite: bool) -> None:
         """Deal with what is there: an output, or what an unfinished run left."""
-        if self.path.exists() and not overwrite:
-            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
-        if self.path.exists() and not _may_be_a_result(self.path):
-            raise DeckError(
-                f"{self.path} is not a netCDF file, so it is not overwritten; choose another output"
-            )
         left, trials = Journal(self.folder), TrialFolder(self.folder)
         if (left or trials) and not overwrite:
             count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
@@ -335,6 +331,12 @@ class Store:
                 f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in "
                 "Python) starts anew"
+            )
+        if self.path.exists() and not overwrite:
+            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
+        if self.path.exists() and not _may_be_a_result(self.path):
+            raise DeckError(
+                f"{self.path} is not a netCDF file, so it is not overwritten; choose another output"
             )
         with self.writing("the journal"):
             if left:  # they become the old output, which is only replaced by a complete new one
@@ -357,6 +359,13 @@ class Store:
         self.close((str(error) or "interrupted") if known else "")
         if isinstance(error, HexcontactError) and self.kept:
             error.add_note(self.kept)
+
+    @property
+    def has_all_steps(self) -> bool:
+        """Whether only the output is to be made of the steps."""
+        return bool(self.heads) and (
+            len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
+        )
 
     @property
     def kept(self) -> str:
@@ -441,8 +450,11 @@ class Store:
             If it cannot be written; the journal is kept.
         """
         with self._mutex:
+            if self._closed:  # by a signal, while the last step was on its way
+                raise ValueError("the store is closed")
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
             self._publish(complete=True)
+            self.finished = True
             Journal(self.folder).remove()
             self.close()
 
@@ -467,8 +479,11 @@ class Store:
         """
         layout = Layout(metadata, [step.head for step in steps], trials)
         with self._mutex:
+            if self._closed:
+                raise ValueError("the store is closed")
             with self.writing("the output"):
                 self._replace(self.path, lambda path: write(path, layout, steps, complete=True))
+            self.finished = True
             Journal(self.folder).remove()
             self.close()
 

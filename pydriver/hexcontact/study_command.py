@@ -7,12 +7,13 @@ import os
 import shlex
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from .cli_guard import complain, say
 from .errors import DeckError
+from .interruption import Interrupted, in_background
 from .study import Outcome, PlannedCase, Study, StudyWatcher
 from .study_deck import batch_text
 from .text import quantity, visible
@@ -126,27 +127,31 @@ def interrupted(study: Study) -> str:
     )
 
 
-def run_case(study: Study, number: int, retry: bool, listeners: Listeners) -> Outcome:
-    """Run one case for a job array; signals end the process, and what is finished stays."""
-    from .interruption import Interrupted, in_background, news
+def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard: tuple[int, int]) -> Outcome:
+    """Run one case for a job array; signals end the process unless it is done, and what is finished stays."""
     from .progress import reporter
 
     outcomes: list[Outcome] = []
     shown = reporter(listeners.silent)
-    with news() as heard:
-        try:
-            in_background(lambda: outcomes.append(study.run_case(number, retry, shown)), heard)
-        except Interrupted as signaled:
-            listeners.leave(
-                signaled,
-                f"the finished load steps of case {number} are kept; the same command goes on after them",
-            )
+    try:
+        in_background(
+            lambda: outcomes.append(study.run_case(number, retry, shown)),
+            heard,
+            lambda _: not outcomes,
+        )
+    except Interrupted as signaled:
+        listeners.leave(
+            signaled,
+            f"the finished load steps of case {number} are kept; the same command goes on after them",
+        )
     return outcomes[0]
 
 
-def run_in_background(study: Study, cancel: threading.Event, options: dict[str, Any]) -> Any:
-    """Return what to do in a second thread, and the event that is set when it is over."""
-    over = threading.Event()
+def run_in_background(
+    study: Study, cancel: threading.Event, options: dict[str, Any]
+) -> tuple[Callable[[], None], Callable[[Interrupted], bool]]:
+    """Return what to do in a second thread, and what cancels it, unless the study is complete by then."""
+    over, complete = threading.Event(), threading.Event()
     if (where := study.cluster(options.get("jobs"), options.get("dask"))) is not None:
         from .study_dask import load
 
@@ -154,11 +159,17 @@ def run_in_background(study: Study, cancel: threading.Event, options: dict[str, 
 
     def work() -> None:
         try:
-            study.run(cancel=cancel, **options)
+            if study.run(cancel=cancel, **options) is not None:
+                complete.set()
         finally:
             over.set()
 
-    return work, over
+    def ends(_: Interrupted) -> bool:
+        cancel.set()
+        over.wait()
+        return not complete.is_set()
+
+    return work, ends
 
 
 def slurm_script(study: Study, path: Path, retry: bool) -> str:

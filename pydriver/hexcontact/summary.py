@@ -96,10 +96,10 @@ def case_rows(case: Problem) -> list[Row]:
 
 def _memory(case: Problem) -> str:
     from .refinement import least_and_most
-    from .window import memory_needed
+    from .window import peak_memory
 
     last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
-    return " to ".join(quantity(memory_needed(one, one.lattice), "B", 3) for one in last)
+    return " to ".join(quantity(peak_memory(one, one.lattice), "B", 3) for one in last)
 
 
 def _accuracy(case: Problem) -> str:

@@ -38,6 +38,8 @@ DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"
 S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
+_WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
+_LEFT = 0.7  # share of what solving takes that the system does not have back by then, as measured
 _COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
 _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
 
@@ -45,18 +47,33 @@ _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when 
 # --- memory ---------------------------------------------------------------------------------------
 
 
+def peak_memory(case: Problem, lattice: Lattice) -> int:
+    """Return the memory (bytes) that a run on a window takes at most, with interpreter and libraries."""
+    return memory.resident() + memory_needed(case, lattice)
+
+
 def memory_needed(case: Problem, lattice: Lattice) -> int:
-    """Return the memory (bytes) that solving and writing a load step on a window takes."""
+    """Return the memory (bytes) that solving and writing load steps on a window takes.
+
+    The contact is taken as large as estimated at the largest load; as the window where there is no estimate.
+    """
     from . import native
 
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
-    operator = native.memory_needed("fft", lattice.n_row, lattice.n_col, operator_only=True)
+    operator, set_up = (
+        native.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
+        for part in ("operator", "set-up of the operator")
+    )
     arrays = kind_of(case).arrays
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         arrays += _ENTRY_ARRAYS
     if case.adaptive:
         arrays += _COMPANION_ARRAYS
-    return case.memory_needed(lattice) + len(bodies) * operator + arrays * _ITEM * lattice.size
+    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size
+    if bodies:
+        # beside a solver with friction, whose vectors are gone by then, the set-up needs nothing more
+        needed += len(bodies) * operator + (0 if case.frictional else set_up)
+    return max(needed, int(_LEFT * needed) + _WRITING)
 
 
 def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
@@ -297,7 +314,7 @@ class NormalWindow(Window["NormalSolution"]):
     """Contact without friction; every step stands for itself."""
 
     state = ("pressure", "gap", "zone")
-    arrays = 24  # of a rough surface, whose edges are everywhere
+    arrays = 8  # initial gap, pressure, gap, zones, on their way through the core
 
     def _set_up(self, gap: Array) -> None:
         from .native import NormalContact

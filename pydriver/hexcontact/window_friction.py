@@ -35,7 +35,7 @@ class FrictionWindow(Window["ContactState"]):
         *("relative_displacement_x", "relative_displacement_y"),
         *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
     )
-    arrays = 60  # the states before and after, both once more on their way through the core, or edges
+    arrays = 34  # the state before, itself and on its way through the core both ways; gaps, coordinates
 
     def _set_up(self, gap: Array) -> None:
         from .native_friction import FrictionalContact

@@ -314,13 +314,25 @@ def test_a_fixed_window_does_not_grow() -> None:
 
 def test_memory_is_that_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     case, plain = sphere(), sphere(friction_coefficient=None, loads=[{"normal_load": 31.5}])
-    rows, cols = case.lattice.shape
-    assert case.memory_needed(case.lattice) == native_friction.memory_needed("fft", rows, cols)
-    assert plain.memory_needed(case.lattice) == native.memory_needed("fft", rows, cols)
-    assert memory_needed(case, case.lattice) > memory_needed(plain, case.lattice)
-    # Python holds the state at both ends of a step, and each again on its way into the core and out of it
-    in_python = memory_needed(case, case.lattice) - case.memory_needed(case.lattice)
-    assert in_python >= 4 * 8 * len(FrictionWindow.state) * case.lattice.size
+    lattice, radius = case.lattice, float(sphere().run().dataset["contact_radius"].values[-1])
+    threads = memory.threads()
+    core = case.memory_needed(lattice)
+    assert plain.memory_needed(lattice) < native.memory_needed("fft", *lattice.shape, threads=threads) + 1
+    assert core < native_friction.memory_needed("fft", *lattice.shape, threads=threads)
+    contact = int(np.pi * radius**2 / lattice.cell_area)
+    loads = sum(target.control == "force" for target in case.load_steps[-1].targets)
+    near = [
+        native_friction.memory_needed(
+            "fft", *lattice.shape, contact=int(factor * contact), loads=loads, threads=threads
+        )
+        for factor in (0.8, 1.2)
+    ]
+    assert near[0] < core < near[1]
+    assert memory_needed(case, lattice) > memory_needed(plain, lattice)
+    # Python holds the state before a step, which is also on its way into the core and out of it
+    large = case.on_lattice(lattice.spacing / 100, lattice.origin)
+    in_python = memory_needed(large, large.lattice) - large.memory_needed(large.lattice)
+    assert in_python >= 3 * 8 * len(FrictionWindow.state) * large.lattice.size
     monkeypatch.setattr(memory, "available", lambda: 1000)
     monkeypatch.setattr("hexcontact.native_friction.FrictionalContact", None)  # must not be reached
     with pytest.raises(ResourceError, match="a window of .* needs .* GB of memory"):

@@ -1,0 +1,27 @@
+"""What `check` says of the memory of a run, and what the run takes at most."""
+
+import pytest
+from bench.memory import deck, measured
+
+DIRECT = '[solver]\nmethod = "direct"\n'
+MOVED = '[output]\nfields = ["displacement_1_z"]\n'
+
+
+@pytest.mark.parametrize(
+    ("problem", "side", "options"),
+    [
+        ("frictionless", 48, {}),
+        ("frictionless", 256, {}),
+        ("frictionless", 256, {"more": MOVED}),
+        ("frictionless", 64, {"more": DIRECT}),
+        ("friction, alike", 128, {}),
+        ("friction, alike", 256, {"steps": 4}),
+        ("friction, unlike", 128, {"share": 0.4}),
+        ("friction, unlike", 256, {}),
+        ("friction, unlike", 44, {"more": DIRECT}),
+    ],
+)
+def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, options: dict[str, object]) -> None:
+    """With the interpreter and all libraries, as the system counts it."""
+    memory = measured(deck(problem, side, **options))  # type: ignore[arg-type]
+    assert abs(memory.error) < 0.1, f"{memory.peak / 1e6:.1f} MB, estimated {memory.estimate / 1e6:.1f}"

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import socket
@@ -22,15 +23,22 @@ import pytest
 import xarray
 from numpy.testing import assert_array_equal
 
+from hexcontact import journal as journal_module
 from hexcontact import lock as lock_module
 from hexcontact import store as store_module
+from hexcontact.accuracy import Solution
 from hexcontact.errors import DeckError, ResourceError
 from hexcontact.lattice import Lattice
 from hexcontact.lock import Lock
-from hexcontact.record import read_record
+from hexcontact.record import read_record, write_record
 from hexcontact.result import Metadata, Step, assemble
 from hexcontact.store import Journal, Store, journal_of, open_result
+from hexcontact.trial_folder import TrialFolder
 
+MATERIALS = {
+    **{"effective_modulus": 2e11, "dundurs_beta": 0.0, "tangential_compliance_ratio": 1.0},
+    **{"friction_coefficient": 0.2, "algorithm": "incremental", "coupling": "full", "tolerance": 1e-8},
+}
 WINDOW = Lattice(spacing=1e-4, row_first=-4, col_first=-5, n_row=9, n_col=10)
 
 
@@ -189,14 +197,14 @@ def test_the_journal_of_another_run_does_not_mix_in(out: Path) -> None:
 def test_interim_outputs_cost_linear_time(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store_module, "PUBLISH_INTERVAL", 0.0)
     reads = 0
-    original = store_module.read_record
+    original = journal_module.read_record
 
     def counted(path: Path) -> tuple[Metadata, Step]:
         nonlocal reads
         reads += 1
         return original(path)
 
-    monkeypatch.setattr(store_module, "read_record", counted)
+    monkeypatch.setattr(journal_module, "read_record", counted)
     written(out, count=33, planned=34)
     assert reads == 1 + 2 + 4 + 8 + 16 + 32
 
@@ -258,9 +266,80 @@ def test_overwriting_an_abandoned_overwrite_keeps_the_first_output(out: Path) ->
         assert open_result(out).case_title == "a case"
 
 
+FOREIGN = {
+    "a record": "000001.npz",
+    "a temporary record": "000002.npz.tmp",
+    "a temporary output": "out.nc.tmp",
+    "a reason": "stopped.txt",
+    "a list of lattices": "lattices/trials.json",
+    "a step of a lattice": "lattices/1_0.nc.d/000001.npz",
+}
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("name", FOREIGN.values(), ids=FOREIGN)
+def test_a_folder_that_no_run_has_written_to_is_refused(out: Path, name: str, overwrite: bool) -> None:
+    theirs = journal_of(out) / name
+    theirs.parent.mkdir(parents=True)
+    theirs.write_bytes(b"measured for a year")
+    before = content(out.parent)
+    with pytest.raises(DeckError, match=rf"{re.escape(str(theirs))} is not of a run of hexcontact.*move "):
+        Store(out, Metadata(), overwrite)
+    assert content(out.parent) == before
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_other_files_in_the_folder_stay(out: Path, overwrite: bool) -> None:
+    """Names of their own do no harm, in the folder of an unfinished run too."""
+    theirs = ["a.tmp", "1.npz", "lattices/notes.txt", "lattices/a/000001.npz", "other.nc.tmp"]
+    for name in theirs:
+        file = journal_of(out) / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(b"measured for a year")
+    before = content(out.parent)
+    for planned, replaced in ((5, overwrite), (2, True)):
+        with Store(out, Metadata(planned_steps=planned), replaced) as store:
+            store.append(made_step(0))
+            store.append(made_step(1))
+            if planned == 2:
+                store.finish()
+    assert len(before) == len(theirs)
+    assert content(out.parent).items() - before.items() == {("out.nc", out.read_bytes())}
+
+
+def test_what_a_killed_run_left_before_its_first_step_is_taken_over(out: Path) -> None:
+    journal_of(out).mkdir()
+    (journal_of(out) / "000001.npz.tmp").write_bytes(b"PK")
+    lock = {"process": 1, "host": socket.gethostname(), "since": "2030-01-01 00:00:00", "time": 0.0}
+    (journal_of(out) / "lock").write_text(json.dumps(lock))
+    written(out)
+    assert [p.name for p in out.parent.iterdir()] == ["out.nc"]
+
+
+def test_only_results_are_overwritten(out: Path) -> None:
+    written(out)
+    kept = out.read_bytes()
+    sealed = len(kept) - 48  # bytes of HDF5
+    ours = {"as written": kept, "damaged": kept[:3000] + bytes(999) + kept[3999:], "empty": b""}
+    ours["of an earlier version"] = kept[:sealed]
+    xarray.Dataset({"a": ("x", [1.0])}).to_netcdf(out)
+    theirs = {"netCDF": out.read_bytes(), "classic": b"CDF\x01measured", "HDF5": b"\x89HDF\r\n\x1a\nmeasured"}
+    for what, data in theirs.items():
+        out.write_bytes(data)
+        with pytest.raises(DeckError, match=r"out\.nc is not a result of hexcontact that can be read, so it"):
+            Store(out, Metadata(), overwrite=True)
+        assert content(out.parent) == {"out.nc": data}, what
+    for what, data in ours.items():
+        out.write_bytes(data)
+        with Store(out, Metadata(title=what, planned_steps=1), overwrite=True) as store:
+            store.append(made_step(0))
+            store.finish()
+        assert open_result(out).case_title == what
+
+
 def test_a_link_is_followed(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
-    (tmp_path / "disk" / "real.nc").write_bytes(b"CDF\x01old")
+    written(tmp_path / "disk" / "real.nc")
     (tmp_path / "out.nc").symlink_to(tmp_path / "disk" / "real.nc")
     with Store(tmp_path / "out.nc", Metadata(planned_steps=1), overwrite=True) as store:
         store.append(made_step(0))
@@ -642,6 +721,148 @@ def test_flipped_bytes_in_a_record_are_noticed(out: Path) -> None:
         else:
             assert read.identical(expected)
     assert noticed > 0.9 * len(places)
+
+
+def test_every_flipped_bit_in_a_list_of_lattices_is_noticed(out: Path) -> None:
+    trials = TrialFolder(out.parent)
+    solution = Solution(1, 0, 1e-6, (0.0, 1e-9), 99, [{"max_pressure": 1.0 / 3.0, "label": "é", "cuts": 0}])
+    trials.write(Metadata(title="a case", deck="deck = 1", parameters=MATERIALS), [solution])
+    data, read, noticed = trials.ledger.read_bytes(), trials.read(), 0
+    for place in range(8 * len(data)):
+        changed = bytearray(data)
+        changed[place // 8] ^= 1 << place % 8
+        trials.ledger.write_bytes(changed)
+        try:
+            found = trials.read()
+        except DeckError as error:
+            assert str(error).startswith(f"{trials.ledger} ")
+            noticed += 1
+        else:
+            assert found == read  # E for e in a number
+    assert noticed > 0.99 * 8 * len(data)
+    trials.ledger.write_bytes(data)
+    assert trials.read() == read
+    earlier = {name: value for name, value in json.loads(data).items() if name != "sha256"}
+    trials.ledger.write_text(json.dumps(earlier | {"trials_version": 1}))  # which had no checksum
+    assert trials.read() == read
+
+
+def changed_record(record: Path, **changes: object) -> None:
+    """Write a record again with other metadata."""
+    metadata, step = read_record(record)
+    write_record(record, replace(metadata, **changes), step)  # type: ignore[arg-type]
+
+
+DECK = """[body.1]
+young_modulus = {modulus}
+[[load]]
+steps = {steps}
+[solver]
+tolerance = {tolerance}
+"""
+OTHER_RUNS: dict[str, tuple[dict[str, object], str]] = {
+    "run": ({"run": "another"}, "run"),
+    "start": ({"created": "2030-01-01T00:00:00Z"}, "created"),
+    "program": ({"version": "0.1"}, "version"),
+    "material": ({"parameters": MATERIALS | {"effective_modulus": 2.1e11}}, "effective_modulus"),
+    "friction": ({"parameters": MATERIALS | {"friction_coefficient": 0.3}}, "friction_coefficient"),
+    "law": ({"parameters": MATERIALS | {"algorithm": "static"}}, "algorithm"),
+    "deck": ({"deck": DECK.format(modulus=3e11, steps=5, tolerance=1e-8)}, "deck"),
+    "fields": ({"fields": ("pressure",)}, "fields"),
+    "earlier": ({"resumed": ()}, "written before"),
+}
+
+
+@pytest.mark.parametrize(("changes", "named"), OTHER_RUNS.values(), ids=OTHER_RUNS)
+def test_records_of_a_journal_are_of_one_run(out: Path, changes: dict[str, object], named: str) -> None:
+    deck = DECK.format(modulus=2e11, steps=5, tolerance=1e-8)
+    described = Metadata(deck=deck, planned_steps=5, parameters=MATERIALS, resumed=("once",))
+    with Store(out, described) as store:
+        for index in range(3):
+            store.append(made_step(index))
+    record = journal_of(out) / "000002.npz"
+    # what a run that goes on, or a session, may change
+    last = {"deck": DECK.format(modulus=2e11, steps=9, tolerance=1e-6), "resumed": ("once", "twice")}
+    changed_record(journal_of(out) / "000003.npz", **last, parameters=MATERIALS | {"tolerance": 1e-6})
+    assert len(open_result(out)) == 3
+    changed_record(record, **changes)
+    with pytest.raises(DeckError, match=rf"000002\.npz does not belong to the records before it: .*{named}"):
+        open_result(out)
+    with pytest.raises(DeckError, match=r"000002\.npz does not belong to the records before it") as caught:
+        Store.reopened(out)
+    assert "goes on after step 1" in caught.value.__notes__[0]
+
+
+@pytest.mark.parametrize("story", ["", "resumed, tolerance = 1e-07 instead of 1e-05"])
+def test_values_that_no_step_has_are_refused(out: Path, story: str) -> None:
+    """In a record, and in a result without a checksum, which another program has written again."""
+    step, tolerance = made_step(0), 1e-5 if story else 1e-8
+    described = Metadata(
+        planned_steps=2, resumed=(story,), parameters=MATERIALS | {"algorithm": "frictionless"}
+    )
+    fields = dict(step.fields)
+    contact = fields["zone"] > 0
+    history = dict(step.history) | {
+        **{"max_pressure": fields["pressure"].max(), "contact_area": contact.sum() * WINDOW.cell_area},
+        **{"contact_radius": 1.0, "approach": 1.0, "sweeps": 7, "operator_applications": 7.5, "cuts": 0},
+        **{"residual_normal": tolerance, "residual_tangential": tolerance, "residual_force": 0.0},
+    }
+    places = (f"{n}.nc" for n in range(99))
+
+    def fault(of_fields: dict[str, object], of_history: dict[str, object]) -> str:
+        changed = replace(step, fields=fields | of_fields, history=history | of_history)  # type: ignore[arg-type]
+        record, result = out.parent / "000001.npz", out.parent / next(places)
+        write_record(record, described, changed)
+        assemble(described, [changed]).to_netcdf(result)
+        found = []
+        for path, read in ((record, read_record), (result, open_result)):
+            try:
+                read(path)
+                found.append("")
+            except DeckError as error:
+                assert str(error).startswith(f"{path} is damaged: ")
+                found.append(str(error).removeprefix(f"{path} is damaged: ").removesuffix(" in step 1"))
+        assert found[0] == found[1]
+        return found[0]
+
+    assert fault({}, {}) == ""
+    for name, value in {
+        **{"residual_normal": 1.0, "residual_tangential": 3 * tolerance, "residual_force": -1e-9},
+        **{"max_pressure": -1.0, "cuts": -2, "seconds": -1.0, "contact_area": -1e-9, "step_limited": 7},
+        **{"approach": 1e31, "sweeps": -3},
+    }.items():
+        assert fault({}, {name: value}) == f"{name} holds numbers that no load step has"
+    assert fault({}, {"cuts": 1, "residual_tangential": 0.04}) == ""  # of the parts one after the other
+    assert fault({}, {"cuts": 1, "residual_normal": 0.04}) != ""
+    for name, wrong in (("pressure", -1.0), ("pressure", np.nan), ("zone", 7), ("zone", -1), ("gap", np.nan)):
+        values = fields[name].copy()
+        values[contact] = wrong
+        assert fault({name: values}, {}) == f"{name} holds numbers that no node has"
+    outside = np.where(contact, fields["gap"], np.nan)
+    assert fault({"gap": outside}, {}) == ""
+    assert fault({"pressure": fields["pressure"] * 2}, {}) == "pressure does not fit to max_pressure"
+    assert fault({"zone": 0 * fields["zone"]}, {}) == "zone does not fit to contact_area"
+
+
+def test_files_of_earlier_versions_are_read_and_searched(out: Path) -> None:
+    """Without a checksum, an index of chunks that is damaged shows by what it leads to."""
+    written(out, every=2)
+    data = out.read_bytes()
+    expected = open_result(out).dataset.load()
+    earlier = data[:-48]
+    out.write_bytes(earlier)
+    assert open_result(out).dataset.identical(expected)
+    for part in (1, 24, 47):
+        out.write_bytes(data[:-part])
+        with pytest.raises(DeckError, match=r"out\.nc is damaged: the checksum at its end cannot be read"):
+            open_result(out)
+    for name, missing in (("pressure", np.nan), ("zone", -1)):
+        other = out.with_name(f"{name}.nc")
+        other.write_bytes(earlier)
+        with netCDF4.Dataset(other, "a") as file:
+            file[name][1] = missing
+        with pytest.raises(DeckError, match=rf"{name}\.nc is damaged: {name} holds numbers .* in step 2"):
+            open_result(other)
 
 
 def test_a_record_of_another_version_is_refused(out: Path) -> None:

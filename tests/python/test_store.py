@@ -687,21 +687,14 @@ def test_a_truncated_file_is_damaged_not_a_crash(out: Path) -> None:
             open_result(out)
 
 
-def test_flipped_bytes_in_a_field_are_noticed(out: Path) -> None:
-    """Checksums: a field that can be read is the field that was written."""
+def test_flipped_bytes_in_a_result_are_noticed(out: Path) -> None:
+    """Before HDF5, which damage may crash, reads any of them."""
     written(out, 1, planned=1)
     whole = out.read_bytes()
-    expected = made_step(0).fields["pressure"]
-    noticed = 0
-    for at in range(0, len(whole), 211):
+    for at in range(0, len(whole) - 8, 211):
         out.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
-        try:
-            values = open_result(out).pressure.values
-        except (DeckError, RuntimeError):
-            noticed += 1
-        else:
-            assert_array_equal(values[0], expected)
-    assert noticed > 3
+        with pytest.raises(DeckError, match=r"out\.nc is damaged: its bytes are not those"):
+            open_result(out)
 
 
 def test_flipped_bytes_in_a_record_are_noticed(out: Path) -> None:

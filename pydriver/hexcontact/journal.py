@@ -54,8 +54,9 @@ class Journal:
             metadata, step = read_record(record)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
-            if before is not None and (fault := fault_of_sequence(before, metadata)):
-                raise DeckError(f"{record} does not belong to the records before it: {fault}")
+            with reading(record, "a record of a journal"):
+                if fault := fault_of_sequence(before or metadata, metadata):
+                    raise DeckError(f"{record} does not belong to the records before it: {fault}")
             before = metadata
             yield step
 

@@ -56,7 +56,7 @@ def check_seal(path: Path) -> bool:
     with path.open("rb") as file:
         head, size = file.read(_END.stop), file.seek(0, os.SEEK_END)
         file.seek(max(0, size - _SIZE))
-        end = file.read()
+        end = file.read(_SIZE)
         if end.startswith(_MARK):
             if _digest(file.fileno(), size - _SIZE) == end[len(_MARK) :]:
                 return True

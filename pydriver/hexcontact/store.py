@@ -240,7 +240,7 @@ class Store:
             left = names_a_run(self.folder / "lock")
             if not left and (foreign := Journal(self.folder).foreign()):
                 raise DeckError(
-                    f"{foreign} is not of a run of hexcontact, which would write its load steps there; move "
+                    f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"
                 )
             with contextlib.suppress(FileNotFoundError):  # a run that just ended took the folder away

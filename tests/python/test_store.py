@@ -33,6 +33,7 @@ from hexcontact.lock import Lock
 from hexcontact.record import read_record, write_record
 from hexcontact.result import Metadata, Step, assemble
 from hexcontact.store import Journal, Store, journal_of, open_result
+from hexcontact.study_collect import histories
 from hexcontact.trial_folder import TrialFolder
 
 MATERIALS = {
@@ -283,7 +284,7 @@ def test_a_folder_that_no_run_has_written_to_is_refused(out: Path, name: str, ov
     theirs.parent.mkdir(parents=True)
     theirs.write_bytes(b"measured for a year")
     before = content(out.parent)
-    with pytest.raises(DeckError, match=rf"{re.escape(str(theirs))} is not of a run of hexcontact.*move "):
+    with pytest.raises(DeckError, match=rf"{re.escape(str(theirs))} may not be of hexcontact.*move "):
         Store(out, Metadata(), overwrite)
     assert content(out.parent) == before
 
@@ -304,7 +305,7 @@ def test_other_files_in_the_folder_stay(out: Path, overwrite: bool) -> None:
             if planned == 2:
                 store.finish()
     assert len(before) == len(theirs)
-    assert content(out.parent).items() - before.items() == {("out.nc", out.read_bytes())}
+    assert content(out.parent) == before | {"out.nc": out.read_bytes()}
 
 
 def test_what_a_killed_run_left_before_its_first_step_is_taken_over(out: Path) -> None:
@@ -693,8 +694,9 @@ def test_flipped_bytes_in_a_result_are_noticed(out: Path) -> None:
     whole = out.read_bytes()
     for at in range(0, len(whole) - 8, 211):
         out.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
-        with pytest.raises(DeckError, match=r"out\.nc is damaged: its bytes are not those"):
-            open_result(out)
+        for read in (open_result, histories):
+            with pytest.raises(DeckError, match=r"out\.nc is damaged: its bytes are not those"):
+                read(out)
 
 
 def test_flipped_bytes_in_a_record_are_noticed(out: Path) -> None:
@@ -746,12 +748,26 @@ def changed_record(record: Path, **changes: object) -> None:
     write_record(record, replace(metadata, **changes), step)  # type: ignore[arg-type]
 
 
+def test_lattices_of_another_run_are_refused(out: Path) -> None:
+    trials = TrialFolder(out.parent)
+    for steps_of, of in (("one", "one"), ("one", "another")):
+        trials.write(Metadata(run=of), [])
+        with Store(trials.path(0), Metadata(run=steps_of, planned_steps=3), overwrite=True) as store:
+            store.append(made_step(0))
+        if of == steps_of:
+            assert len(trials.result(out)) == 1
+    with pytest.raises(DeckError, match=r"lattices holds load steps of another run than .*trials\.json"):
+        trials.result(out)
+
+
 DECK = """[body.1]
 young_modulus = {modulus}
 [[load]]
 steps = {steps}
 [solver]
 tolerance = {tolerance}
+[grid]
+spacing = 1e-6
 """
 OTHER_RUNS: dict[str, tuple[dict[str, object], str]] = {
     "run": ({"run": "another"}, "run"),
@@ -761,6 +777,7 @@ OTHER_RUNS: dict[str, tuple[dict[str, object], str]] = {
     "friction": ({"parameters": MATERIALS | {"friction_coefficient": 0.3}}, "friction_coefficient"),
     "law": ({"parameters": MATERIALS | {"algorithm": "static"}}, "algorithm"),
     "deck": ({"deck": DECK.format(modulus=3e11, steps=5, tolerance=1e-8)}, "deck"),
+    "loads": ({"deck": DECK.format(modulus=2e11, steps=6, tolerance=1e-8)}, "deck"),
     "fields": ({"fields": ("pressure",)}, "fields"),
     "earlier": ({"resumed": ()}, "written before"),
 }
@@ -775,7 +792,10 @@ def test_records_of_a_journal_are_of_one_run(out: Path, changes: dict[str, objec
             store.append(made_step(index))
     record = journal_of(out) / "000002.npz"
     # what a run that goes on, or a session, may change
-    last = {"deck": DECK.format(modulus=2e11, steps=9, tolerance=1e-6), "resumed": ("once", "twice")}
+    last = {
+        "deck": DECK.format(modulus=2e11, steps=9, tolerance=1e-6) + "origin = [0, 0]",
+        "resumed": ("once", "twice"),
+    }
     changed_record(journal_of(out) / "000003.npz", **last, parameters=MATERIALS | {"tolerance": 1e-6})
     assert len(open_result(out)) == 3
     changed_record(record, **changes)

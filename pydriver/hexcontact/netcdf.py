@@ -18,7 +18,8 @@ from . import mesh
 from .errors import LACKING, DeckError, HexcontactError, ResourceError
 from .files import require_ordinary
 from .result import Layout, Metadata, Result, Step
-from .result_check import fault_of_dimensions, fault_of_result
+from .result_check import fault_of_dimensions, fault_of_fields, fault_of_result
+from .seal import check_seal, is_sealed, seal
 from .variables import SCHEMA_VERSION, VARIABLES
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
 
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Create a file; in the end close it and flush it to disk."""
+    """Create a file; in the end close it, add its checksum and flush it to disk."""
     import netCDF4
 
     try:
@@ -98,6 +99,7 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
                 file.close()
     except RuntimeError as error:  # the HDF5 library hides the reason, a full disk mostly
         raise OSError(None, str(error), str(path)) from error
+    seal(path)
     flush(path)
 
 
@@ -186,12 +188,26 @@ def _check_ours(attributes: dict[str, Any], path: Path) -> None:
         )
 
 
+def is_ours(path: Path) -> bool:
+    """Tell whether a file is a result, of whatever version, or was one before it was damaged."""
+    import netCDF4
+
+    if is_sealed(path):
+        return True
+    with contextlib.suppress(OSError, RuntimeError), _alone(), netCDF4.Dataset(path) as file:
+        return {"schema_version", "hexcontact_version"} <= set(file.ncattrs())
+    return False
+
+
 def _attributes(file: netCDF4.Dataset) -> dict[str, Any]:
     return {name: file.getncattr(name) for name in file.ncattrs()}
 
 
 def read_output(path: Path) -> Result:
     """Open an output file; its fields are read when they are asked for.
+
+    All bytes are checked first. In a file without a checksum, of an earlier version or rewritten by another
+    program, the fields are read once to see that they can be values of a solution.
 
     Raises
     ------
@@ -203,6 +219,8 @@ def read_output(path: Path) -> Result:
     import netCDF4
 
     require_ordinary(path, "a netCDF file")
+    with reading(path):
+        sealed = check_seal(path)
     with reading(path), _alone(), netCDF4.Dataset(path) as file:
         attributes = _attributes(file)
         _check_ours(attributes, path)
@@ -219,9 +237,9 @@ def read_output(path: Path) -> Result:
         dataset = xarray.open_dataset(path, engine="netcdf4", drop_variables=mesh.VARIABLES)
         result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
-            if variable.ndim < 2:
+            if variable.ndim < 3:
                 variable.load()
-        if fault := fault_of_result(result.dataset):
+        if fault := fault_of_result(result.dataset) or ("" if sealed else fault_of_fields(result.dataset)):
             result.close()
             raise DeckError(f"{path} is damaged: {fault}")
         _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)

@@ -18,6 +18,7 @@ from ._version import __version__
 from .errors import DeckError, HexcontactError
 from .netcdf import read_output
 from .progress import Reporter, reporter
+from .record import PHYSICS, physics
 from .result import Metadata, Result, Step, now
 from .solve import checked, metadata_of, record
 from .store import Store, journal_of, open_result
@@ -26,8 +27,6 @@ from .trial_folder import TrialFolder
 if TYPE_CHECKING:
     from .problem import Problem
 
-_PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that decide what is solved
-_NOT_PHYSICS = ("title", "solver", "output")  # tables of a deck that do not
 _SAME = 1e-9  # relative difference of initial gaps that are the same
 
 
@@ -168,14 +167,14 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
 
     for key in overrides:
         table, _, name = key.partition(".")
-        if table != "solver" or name.partition(".")[0] in ("", *_PHYSICS):
+        if table != "solver" or name.partition(".")[0] in ("", *PHYSICS):
             raise DeckError(
                 f"{key}: a run that goes on may only change how it is solved, such as solver.tolerance"
             )
     if case is not None:
         if overrides:
             raise DeckError("expected a case or overrides, not both")
-        if not metadata.deck or _physics(metadata.deck) != _physics(case.deck_text):
+        if not metadata.deck or physics(metadata.deck) != physics(case.deck_text):
             raise DeckError(f"the case is not the one that {path} is the result of: their decks differ")
         return case
     if not metadata.deck:
@@ -197,13 +196,6 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
 def _from_python(deck: str) -> bool:
     body = tomllib.loads(deck).get("body", {})
     return body.get("1", {}).get("surface", {}).get("shape") == "python"
-
-
-def _physics(deck: str) -> dict[str, Any]:
-    """Return what a deck says about the problem, not about how it is solved and what is kept."""
-    tables = tomllib.loads(deck)
-    solver = {key: value for key, value in tables.get("solver", {}).items() if key in _PHYSICS}
-    return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
 
 
 def _check(case: Problem, store: Store, last: Step | None) -> None:

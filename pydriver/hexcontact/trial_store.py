@@ -15,8 +15,9 @@ from .trial_folder import TrialFolder
 
 if TYPE_CHECKING:
     from .accuracy import Solution
+    from .journal import Journal
     from .problem import Problem
-    from .store import Journal, Store
+    from .store import Store
 
 _SAME = 1e-12  # relative difference of spacings that are the same
 
@@ -81,11 +82,13 @@ class OnDisk(Solver):
     @contextlib.contextmanager
     def _opened(self, trial: Trial) -> Iterator[tuple[Store, Step | None]]:
         """Open the journal of a lattice; yield its last finished step, too."""
-        from .store import Journal, Store, journal_of
+        from .journal import Journal, journal_of
+        from .store import Store
 
         path, last = self._trials.path(trial.level, trial.copy), None
         if Journal(journal_of(path)):
             store, last = Store.reopened(path)
+            self._trials.check(self._store.metadata, store.metadata)
         else:
             store = Store(path, self._store.metadata, overwrite=True)
         store.interim = False
@@ -97,7 +100,7 @@ class OnDisk(Solver):
     def finish(self, outcome: Outcome) -> None:
         """Put the output in its place and clear the journal away."""
         from .accuracy import finest
-        from .store import Journal, journal_of
+        from .journal import Journal, journal_of
 
         best = finest(outcome.solutions)
         journal = Journal(journal_of(self._trials.path(best.level)))

@@ -211,6 +211,16 @@ contains
     first = real(base(:n_1, :n_1), real32)
     call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
     call check_true(error, .not. solved, 'too large for single precision')
+    if (allocated(error)) return
+    matrix(n, n) = -1.0_wp
+    first = real(base(:n_1, :n_1), real32)
+    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call check_true(error, .not. solved, 'second block not positive definite')
+    if (allocated(error)) return
+    matrix(n, n) = base(n, n)
+    first(n_1, n_1) = -1.0_real32
+    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call check_true(error, .not. solved, 'first block not positive definite')
   end subroutine test_blocks
 
   !> gamma = 0: c/a = (1 - Q/muP)^(1/3), shift = (3 mu P S/16 a) [1 - (1 - Q/muP)^(2/3)], S = 4 for E* = 1.

@@ -42,6 +42,19 @@ module test_load_path
     procedure :: solve_step => record_step
   end type recorder_t
 
+  !> The real method, that does not converge unless it is asked for an accuracy.
+  type, extends(frictional_contact_t) :: demanding_t
+    real(wp) :: loosest = 0.0_wp
+    !> Whatever it finds counts as converged
+    logical :: content = .false.
+    !> Steps that it was asked for, and those that did not converge
+    integer :: calls = 0, failures = 0
+    !> Sweeps of all of them
+    integer :: sweeps = 0
+  contains
+    procedure :: solve_step => accurate_step
+  end type demanding_t
+
   integer, parameter :: f = force_control, d = displacement_control
 
 contains
@@ -62,7 +75,10 @@ contains
       new_test('part_of_window', test_part_of_window), &
       new_test('entry_ring', test_entry_ring), &
       new_test('entry_patch', test_entry_patch), &
-      new_test('entry_oblique', test_entry_oblique) &
+      new_test('entry_rim', test_entry_rim), &
+      new_test('entry_oblique', test_entry_oblique), &
+      new_test('entry_accurate', test_entry_accurate), &
+      new_test('entry_endless', test_entry_endless) &
     ]
   end subroutine collect_load_path
 
@@ -545,5 +561,126 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_part_of_window
+
+  !> The real method, not converged if asked for less than it demands.
+  subroutine accurate_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(demanding_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+
+    self%calls = self%calls + 1
+    call self%frictional_contact_t%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
+    if (allocated(error)) return
+    self%sweeps = self%sweeps + state%sweeps
+    state%converged = self%content .or. (state%converged .and. tolerance <= self%loosest)
+    if (.not. state%converged) self%failures = self%failures + 1
+  end subroutine accurate_step
+
+  !> Entry states begin with inaccurate solutions. If one of them fails, the step is solved accurately before it is
+  !> halved, once; if that fails, too, it is halved as often as it may be.
+  subroutine test_entry_accurate(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(demanding_t) :: solver
+    type(frictional_contact_t) :: plain
+    type(contact_state_t) :: virgin, pressed, expected, next
+    type(load_target_t) :: target
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.3_wp, tolerance = 1.0e-8_wp
+    integer :: k
+
+    call new_sphere(plain, 10, 0.3_wp, 0.1_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_sphere(solver%frictional_contact_t, 10, 0.3_wp, 0.1_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, plain%problem%lattice)
+    call advance(plain, virgin, load_target_t(value=[0.4_wp*load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., tolerance, 60, 0, &
+                 pressed, error)
+    if (allocated(error)) return
+    ! under load and under approach: both say whether nodes will enter
+    do k = 1, 2
+      target = load_target_t(value=[load, 0.1_wp*mu*load, 0.0_wp, 0.0_wp])
+      if (k == 2) then
+        target%control(normal) = d
+        target%value(normal) = expected%motion(normal)
+      end if
+      call advance(plain, pressed, target, .false., tolerance, 60, 0, expected, error, interpolated=.true.)
+      if (allocated(error)) return
+      solver%loosest = tolerance
+      solver%failures = 0
+      call advance(solver, pressed, target, .false., tolerance, 60, 0, next, error, interpolated=.true.)
+      if (allocated(error)) return
+      call check_true(error, expected%converged .and. next%converged, 'converged')
+      if (allocated(error)) return
+      call check(error, solver%failures, 1, 'an inaccurate solution is tried once')
+      if (allocated(error)) return
+      call check(error, maxval(abs(next%traction - expected%traction)), 0.0_wp, 1.0e-6_wp*mu, 'same traction')
+      if (allocated(error)) return
+    end do
+
+    solver%loosest = 0.0_wp
+    solver%calls = 0
+    call advance(solver, pressed, target, .false., tolerance, 60, 2, next, error, interpolated=.true.)
+    if (allocated(error)) return
+    call check_true(error, .not. next%converged .and. next%cuts == 2, 'halved in vain')
+    if (allocated(error)) return
+    call check(error, solver%calls, 6, 'each part inaccurately and accurately')
+  end subroutine test_entry_accurate
+
+  !> A patch that enters at a corner of the window has the entry states of one inside; where all nodes of the window
+  !> enter, none is left that moved outside, and nothing is known of their motion.
+  subroutine test_entry_rim(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(recorder_t) :: solver
+    type(contact_state_t) :: before, after
+    real(wp), allocatable :: u(:, :, :), gap(:, :)
+    real(wp), parameter :: closing = 0.3_wp, shift = 2.0_wp
+
+    call new_sphere(solver%frictional_contact_t, 20, 0.0_wp, 0.0_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    associate (x => solver%problem%x, y => solver%problem%y)
+      gap = 0.5_wp*((x - x(1, 1))**2 + (y - y(1, 1))**2)
+    end associate
+    solver%problem%initial_gap = gap
+    call new_friction_state(before, solver%problem%lattice)
+    call new_friction_state(after, solver%problem%lattice)
+    after%relative_displacement(:, :, 1) = shift
+    after%gap = max(gap - closing, 0.0_wp)
+    after%pressure = max(closing - gap, 0.0_wp)
+    u = entry_displacement(solver%problem, before, after)
+    call check_true(error, after%pressure(1, 1) > 0.0_wp .and. count(after%pressure > 0.0_wp) > 50, 'contact at the corner')
+    if (allocated(error)) return
+    call check(error, maxval(abs(u(:, :, 1) - merge(shift*gap/closing, 0.0_wp, after%pressure > 0.0_wp))), 0.0_wp, &
+               1.0e-12_wp, 'share of the shift')
+    if (allocated(error)) return
+    after%gap = 0.0_wp
+    after%pressure = 1.0_wp
+    u = entry_displacement(solver%problem, before, after)
+    call check(error, maxval(abs(u)), 0.0_wp, 0.0_wp, 'all nodes enter')
+  end subroutine test_entry_rim
+
+  !> Entry states that never settle are corrected so many times, and the step has not converged.
+  subroutine test_entry_endless(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(demanding_t) :: solver
+    type(contact_state_t) :: virgin, next
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, unreachable = 1.0e-30_wp
+
+    call new_sphere(solver%frictional_contact_t, 6, 0.3_wp, 0.1_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, solver%problem%lattice)
+    solver%content = .true.
+    call advance(solver, virgin, load_target_t(value=[load, 0.1_wp*load, 0.0_wp, 0.0_wp]), .false., unreachable, 3, 0, &
+                 next, error, interpolated=.true.)
+    if (allocated(error)) return
+    call check_true(error, .not. next%converged, 'not converged')
+    if (allocated(error)) return
+    call check(error, solver%calls, 40, 'corrections')
+    if (allocated(error)) return
+    call check(error, next%sweeps, solver%sweeps, 'sweeps of all of them')
+  end subroutine test_entry_endless
 
 end module test_load_path

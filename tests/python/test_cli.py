@@ -276,6 +276,7 @@ def test_signals_that_follow_do_not_disturb_the_leaving(deck: Path, sent: tuple[
     assert f"stopped interrupted ({signal.Signals(sent[0]).name})" in told
 
 
+@pytest.mark.alone
 def test_a_long_step_can_be_interrupted(deck: Path) -> None:
     process = start(
         deck.parent, "run", "sphere.toml", "--set", "grid.nodes_in_radius=1000", "--set", "load.1.steps=1"
@@ -416,6 +417,7 @@ def test_a_plain_ascii_terminal_is_enough(solved: Path) -> None:
     assert "Against Hertz" in done.stdout
 
 
+@pytest.mark.alone
 def test_help_is_quick(tmp_path: Path) -> None:
     """The target is 0.3 s; the bound leaves room for a busy machine."""
     times = []

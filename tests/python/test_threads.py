@@ -152,6 +152,7 @@ class Timed:
         return timed
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("work", [lambda: press("fft"), lambda: press("direct"), shear, apply])
 def test_python_goes_on_while_the_core_works(
     ticks: list[float], work: Callable[[], Callable[[], object]], monkeypatch: pytest.MonkeyPatch

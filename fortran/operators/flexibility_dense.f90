@@ -77,16 +77,18 @@ contains
     !> Contact without friction
     logical, intent(in) :: normal_only
     integer, parameter :: long = selected_int_kind(18)
+    !> What BLAS packs matrices into
+    integer(long), parameter :: buffers = 15000000
     integer(long) :: n
 
     n = n_contact
-    dense_memory = 8*n_block*4*int(extent(1), long)*extent(2)
+    dense_memory = buffers + 8*n_block*4*int(extent(1), long)*extent(2)
     if (normal_only) then
       ! the first guess is where undeformed bodies would overlap, twice the contact and more; half of the matrix is touched
-      dense_memory = dense_memory + 8*min(9*n/4, int(extent(1), long)*extent(2))**2/2
+      dense_memory = dense_memory + 8*min(15*n/7, int(extent(1), long)*extent(2))**2/2
     else
-      ! beside the matrix its factors of single precision, on their way, too; at first the contact is larger
-      dense_memory = dense_memory + (8 + 2*4)*(3*n + n/10)**2
+      ! beside the matrix its factors of single precision; on its way the area may be a seventh larger
+      dense_memory = dense_memory + (8 + 4)*(3*(n + n/7))**2
     end if
   end function dense_memory
 

@@ -189,3 +189,23 @@ def test_a_run_is_sent_to_resume_wherever_steps_are_kept(
     shutil.copy(tmp_path / "with_an_interim_output.nc", again)  # without its steps
     with pytest.raises(hexcontact.DeckError, match="exists already; --overwrite"):
         Case.from_text(DECK).run(again)
+
+
+# --- signals at random moments ----------------------------------------------------------------------------
+
+
+def test_signals_at_random_moments_leave_what_the_code_says(tmp_path: Path) -> None:
+    """20 runs, signaled in the course of their time: 0 for a complete result, else one that can go on."""
+    command = [
+        sys.executable,
+        str(Path(__file__).with_name("killed_runs.py")),
+        str(tmp_path),
+        "20",
+        "3",
+        "signals",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    *runs, signals = done.stdout.splitlines()
+    assert len(runs) == 20
+    assert int(signals.removeprefix("signals ")) > 10

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from .errors import DeckError, HexcontactError, ResourceError
-from .files import require_ordinary
+from .files import require_utf8
 from .lock import Lock
 from .netcdf import flush, read_output, reading, write
 from .record import SUFFIX, read_record, write_record
@@ -236,7 +236,7 @@ class Store:
             raise
 
     def _at(self, path: str | os.PathLike[str]) -> None:
-        require_ordinary(path, "a netCDF file")
+        require_utf8(path, "a netCDF file")
         """Take up a place where an output can be written."""
         self.path = Path(os.path.realpath(path))
         self.folder = journal_of(self.path)

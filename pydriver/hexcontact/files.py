@@ -36,7 +36,7 @@ def text_of(path: str | Path, expected: str) -> str:
                     return content.decode("utf-8-sig")
                 fault = f"is larger than {LARGEST_TEXT >> 20} MB"
             else:
-                fault = "is not an ordinary file"
+                fault = "is not a regular file"
     except FileNotFoundError:
         fault = "no such file"
     except IsADirectoryError:
@@ -57,9 +57,14 @@ def require_ordinary(path: str | os.PathLike[str], expected: str) -> None:
         If it is a device or a pipe, or its name is not UTF-8; missing files and folders are left to the
         library.
     """
+    require_utf8(path, expected)
+    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
+        raise DeckError(f"{path}: is not a regular file; expected {expected}")
+
+
+def require_utf8(path: str | os.PathLike[str], expected: str) -> None:
+    """Refuse a file whose whole name is not UTF-8, which netCDF cannot open."""
     try:
         os.path.abspath(path).encode()
     except UnicodeEncodeError:
         raise DeckError(f"{os.path.abspath(path)}: is no name in UTF-8; expected {expected}") from None
-    if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
-        raise DeckError(f"{path}: is not an ordinary file; expected {expected}")

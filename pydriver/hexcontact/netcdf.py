@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from . import mesh
 from .errors import LACKING, DeckError, HexcontactError, ResourceError
-from .files import require_ordinary
+from .files import require_ordinary, require_utf8
 from .result import Layout, Metadata, Result, Step
 from .result_check import fault_of_dimensions, fault_of_fields, fault_of_result
 from .seal import check_seal, is_sealed, seal
@@ -151,18 +151,10 @@ def flush(path: Path) -> None:
 # --- reading --------------------------------------------------------------------------------------
 
 
-def check_name(path: Path) -> None:
-    """Refuse names that the netCDF library cannot take."""
-    try:
-        str(path).encode()
-    except UnicodeEncodeError:
-        raise DeckError(f"{path}: expected a name in UTF-8, as netCDF files have") from None
-
-
 @contextlib.contextmanager
 def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
     """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
-    check_name(path)
+    require_utf8(path, kind)
     try:
         yield
     except (HexcontactError, FileNotFoundError, MemoryError):

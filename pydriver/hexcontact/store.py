@@ -22,12 +22,12 @@ from pathlib import Path
 from typing import Any, Self
 
 from .errors import LACKING, DeckError, HexcontactError, ResourceError
-from .files import require_ordinary
+from .files import require_utf8
 from .journal import STOPPED, names_a_run
 from .journal import Journal as Journal
 from .journal import journal_of as journal_of
 from .lock import Lock
-from .netcdf import check_name, flush, is_ours, read_output, reading, write
+from .netcdf import flush, is_ours, read_output, reading, write
 from .record import SUFFIX, write_record
 from .result import Layout, Metadata, Result, Step
 from .trial_folder import TrialFolder
@@ -158,8 +158,8 @@ class Store:
             raise
 
     def _at(self, path: str | os.PathLike[str]) -> None:
-        require_ordinary(path, "a netCDF file")
         """Take up a place where an output can be written."""
+        require_utf8(path, "a netCDF file")
         self.path = Path(os.path.realpath(path))
         self.folder = journal_of(self.path)
         self.heads: list[Step] = []
@@ -168,7 +168,6 @@ class Store:
         self.finished = False  # whether the output is complete and in its place
         self._published = (0, time.monotonic())
         self.interim = True  # whether a long run also writes outputs on the way
-        check_name(self.path)
         if self.path.is_dir():
             raise DeckError(f"{self.path} is a folder; a file name is expected")
         if self.path.exists() and not self.path.is_file():  # to replace it would take a device away

@@ -84,7 +84,9 @@ class Parameter(Table):
 
     key: Annotated[str, Text()] = Field(description="dotted key of the deck, such as load.1.normal_load")
     name: Annotated[str, VariableName()] | None = Field(
-        None, description="what the result calls it; the key with _ for . if absent"
+        None,
+        description="what the result calls it; the key with _ for . if absent",
+        examples=['"load"'],
     )
     values: Annotated[tuple[Any, ...], Several(Anything(), "values", '["1 N", "2 N"]')] | None = Field(
         None, description="the values"

@@ -21,7 +21,7 @@ from typing import Any
 from .errors import ConvergenceError, DeckError, ResourceError
 from .files import require_ordinary, text_of
 from .lock import Lock
-from .netcdf import check_name, flush
+from .netcdf import flush
 from .study_plan import Plan, PlannedCase, hash_of
 
 _INDEX = "index.json"
@@ -73,7 +73,6 @@ class StudyFolder:
         require_ordinary(output, "a netCDF file")
         if not output.parent.is_dir():
             raise DeckError(f"cannot write {output}: the folder {output.parent} does not exist")
-        check_name(output.absolute())
         self.output = output
         self.folder = output.with_suffix("")
         if self.folder.exists() and not self.folder.is_dir():

@@ -274,7 +274,7 @@ def test_devices_pipes_and_endless_files_are_refused(folder: Path) -> None:
     os.mkfifo("pipe.nc")
     os.symlink("/dev/zero", "zero.nc")
     for name in ("pipe", "/dev/zero", "pipe.nc", "zero.nc"):
-        odd = f"{name}: is not an ordinary file; expected "
+        odd = f"{name}: is not a regular file; expected "
         Path("includes.toml").write_text(toml({"include": [name]}) + toml(BODIES) + PRESS)
         Path("series.toml").write_text(toml(BODIES | {"load": [{"series": {"file": name}}]}))
         Path("study.toml").write_text(
@@ -291,11 +291,10 @@ def test_devices_pipes_and_endless_files_are_refused(folder: Path) -> None:
             ("plot", name),
             ("report", name),
             ("export", name, "--csv"),
-            ("resume", name),
-            ("run", "deck.toml", "-o", name),
-            ("run", "deck.toml", "-o", name, "--overwrite"),
         ):
             assert odd in sentence(*words), words
+        for words in (("resume", name), ("run", "deck.toml", "-o", name, "--overwrite")):
+            assert "is not a regular file" in sentence(*words), words
 
 
 def test_a_study_meets_pipes_in_its_folder(folder: Path) -> None:
@@ -304,7 +303,7 @@ def test_a_study_meets_pipes_in_its_folder(folder: Path) -> None:
         toml({"deck": "deck.toml", "parameter": [{"key": "load.1.normal_load", "values": [1, 2]}]})
     )
     os.mkfifo("study.nc")
-    assert "study.nc: is not an ordinary file" in sentence("study", "study.toml")
+    assert "study.nc: is not a regular file" in sentence("study", "study.toml")
     os.unlink("study.nc")
     assert command("study", "study.toml", "--jobs", "1").exit_code == 0
     os.unlink("study/0001.nc")
@@ -312,7 +311,7 @@ def test_a_study_meets_pipes_in_its_folder(folder: Path) -> None:
     assert not Study.from_toml("study.toml").folder.done(Study.from_toml("study.toml").cases[0])
     os.unlink("study/index.json")
     os.mkfifo("study/index.json")
-    assert "index.json: is not an ordinary file" in sentence("study", "study.toml")
+    assert "index.json: is not a regular file" in sentence("study", "study.toml")
 
 
 def test_files_have_a_largest_size(folder: Path) -> None:
@@ -439,4 +438,4 @@ def test_a_pipe_is_not_waited_for_by_the_installed_command(folder: Path) -> None
     words = [sys.executable, "-m", "hexcontact", "check", "pipe"]
     done = subprocess.run(words, capture_output=True, text=True, timeout=300)
     assert done.returncode == 2
-    assert done.stderr == "hexcontact: pipe: is not an ordinary file; expected a deck (a TOML file)\n"
+    assert done.stderr == "hexcontact: pipe: is not a regular file; expected a deck (a TOML file)\n"

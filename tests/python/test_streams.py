@@ -129,7 +129,7 @@ def test_names_that_are_no_text_get_a_sentence(tmp_path: Path) -> None:
     name = os.fsdecode(b"sph\xe9re")
     (tmp_path / f"{name}.toml").write_text(DECK)
     deck = shlex.quote(f"{name}.toml")
-    refusal = "sph?re.nc: expected a name in UTF-8, as netCDF files have\n"
+    refusal = "sph?re.nc: is no name in UTF-8; expected a netCDF file\n"
     (tmp_path / f"{name}.nc").write_bytes(b"")
     for words in (f"run {deck}", f"info {shlex.quote(name)}.nc", f"resume {shlex.quote(name)}.nc"):
         done = shell(tmp_path, f"{COMMAND} {words}", code=2)

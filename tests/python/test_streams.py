@@ -129,7 +129,7 @@ def test_names_that_are_no_text_get_a_sentence(tmp_path: Path) -> None:
     name = os.fsdecode(b"sph\xe9re")
     (tmp_path / f"{name}.toml").write_text(DECK)
     deck = shlex.quote(f"{name}.toml")
-    refusal = "sph?re.nc: is no name in UTF-8; expected a netCDF file\n"
+    refusal = "sph\\udce9re.nc: is no name in UTF-8; expected a netCDF file\n"
     (tmp_path / f"{name}.nc").write_bytes(b"")
     for words in (f"run {deck}", f"info {shlex.quote(name)}.nc", f"resume {shlex.quote(name)}.nc"):
         done = shell(tmp_path, f"{COMMAND} {words}", code=2)
@@ -140,4 +140,5 @@ def test_names_that_are_no_text_get_a_sentence(tmp_path: Path) -> None:
     assert "written: a.nc" in done.stdout
     assert sorted(os.listdir(os.fsencode(tmp_path))) == [b"a.nc", b"sph\xe9re.log", b"sph\xe9re.toml"]
     done = shell(tmp_path, f"{COMMAND} run {deck} -o b.nc --set title={shlex.quote(name)}", code=2)
-    assert done.stderr.splitlines()[-1] == "hexcontact: sph?re: expected text in UTF-8"
+    last = 'hexcontact: override: title = "sph\\udce9re": expected text in quotes'
+    assert done.stderr.splitlines()[-1] == last

@@ -2,19 +2,22 @@
 !>
 !> A load step that does not converge is cut in half, again and again up to a
 !> bound; a state is only taken over when it has converged. In an incremental
-!> path every part starts from the relative displacement that the last one left.
+!> path every part starts from the relative displacement that the last one left; the slip
+!> increment that is recorded is that of all parts, and the residual of the friction conditions is that of this
+!> record, so that it shows how far the parts are from one implicit step.
 !> A static load is applied at once: parts only serve as starts, and the relative
 !> displacement counts from the undeformed bodies.
 module hc_load_path
   use hc_precision, only: wp
-  use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, load_target_t, force_control
+  use hc_error, only: error_t, status, raise
+  use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached
+  use hc_contact_residuals, only: tangential_residual
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_entry_state, only: solve_with_entry
   implicit none
   private
 
-  public :: advance, touches_rim
+  public :: advance
 
 contains
 
@@ -34,7 +37,8 @@ contains
     integer, intent(in) :: max_sweeps
     !> Times that a step may be halved
     integer, intent(in) :: max_cuts
-    !> The new state; not converged: the attempt that failed; in contact at the rim: nothing was gone on with
+    !> The new state; not converged: the attempt that failed, or a part of the step that reached the rim of the window,
+    !> where nothing was gone on with (stopped is rim_reached, and the residuals of the loads are those of the whole step)
     type(contact_state_t), intent(out) :: next
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
@@ -48,6 +52,14 @@ contains
     real(wp) :: done, part, work
     integer :: cuts, sweeps
 
+    call check_target(target%control, target%value, tolerance, max_sweeps, error)
+    if (allocated(error)) return
+    if (max_cuts < 0) then
+      call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
+      return
+    end if
+    call check_state(state, solver%problem%lattice, error)
+    if (allocated(error)) return
     from_entry = .false.
     if (present(interpolated)) from_entry = interpolated
     if (static) allocate (undeformed, source=0.0_wp*state%relative_displacement)
@@ -79,11 +91,13 @@ contains
         call add_slip(solver%problem, from, static, next)
         if (from_entry) slipped = slipped + next%slip_increment
         done = done + part
-        if (done >= 1.0_wp .or. touches_rim(next)) exit
+        if (done >= 1.0_wp .or. next%clipped) exit
         now = next
         from => now
       else
-        if (cuts == max_cuts) exit
+        ! where an attempt that failed has pressure means nothing
+        next%clipped = .false.
+        if (cuts >= max_cuts) exit
         cuts = cuts + 1
         part = 0.5_wp*part
       end if
@@ -99,6 +113,15 @@ contains
         next%slip_increment = next%relative_displacement - state%relative_displacement
       end if
       where (spread(next%pressure <= 0.0_wp, 3, 2)) next%slip_increment = 0.0_wp
+      associate (problem => solver%problem)
+        next%residual_tangential = tangential_residual(next%traction, next%slip_increment, next%pressure, problem%friction, &
+                                                       problem%tangential_compliance, problem%n_threads)
+      end associate
+    end if
+    if (next%converged .and. done < 1.0_wp) then
+      next%converged = .false.
+      next%stopped = rim_reached
+      call solver%problem%judge_loads(target, next)
     end if
   end subroutine advance
 
@@ -143,16 +166,5 @@ contains
       end associate
     end if
   end function between
-
-  !> Is there contact at the rim of the window?
-  pure logical function touches_rim(state)
-    !> State
-    type(contact_state_t), intent(in) :: state
-
-    associate (p => state%pressure)
-      touches_rim = any(p(1, :) > 0.0_wp) .or. any(p(size(p, 1), :) > 0.0_wp) .or. &
-                    any(p(:, 1) > 0.0_wp) .or. any(p(:, size(p, 2)) > 0.0_wp)
-    end associate
-  end function touches_rim
 
 end module hc_load_path

@@ -4,14 +4,15 @@ module test_load_path
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
-    normal, along_x, along_y, about_z
+  use hc_contact_residuals, only: tangential_residual
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, rim_reached, &
+    force_control, displacement_control, normal, along_x, along_y, about_z
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t, new_friction_problem
   use hc_frictional_contact, only: frictional_contact_t
   use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction
   use hc_entry_state, only: entry_displacement
-  use hc_load_path, only: advance, touches_rim
+  use hc_load_path, only: advance
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_true
   implicit none
@@ -91,6 +92,7 @@ contains
     state%operator_applications = 2.0_wp
     state%residual_normal = maxval(abs(target%value - merge(start%load, start%motion, target%control == f)))
     state%converged = state%residual_normal <= self%reach
+    state%clipped = touches_rim(state)
     if (tolerance < 0.0_wp) allocate (error)
   end subroutine solve_step
 
@@ -273,6 +275,16 @@ contains
     call check_true(error, touches_rim(next) .and. .not. touches_rim(state), 'contact at the rim')
     if (allocated(error)) return
     call check(error, next%load(normal), 4.0_wp, 0.0_wp, 'the first part that reaches the rim is the last')
+    if (allocated(error)) return
+    call check_true(error, next%clipped .and. .not. next%converged .and. next%stopped == rim_reached, 'a part is no solution')
+    if (allocated(error)) return
+    call check(error, next%residual_force, 0.5_wp, 1.0e-15_wp, 'half of the load of the step is missing')
+    if (allocated(error)) return
+    ! an attempt that failed may have pressure anywhere
+    solver%reach = 0.5_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 0, next, error)
+    if (allocated(error)) return
+    call check_true(error, touches_rim(next) .and. .not. (next%clipped .or. next%converged), 'not clipped, but not converged')
   end subroutine test_rim
 
   !> Too few sweeps for a whole step, but enough for its parts: the solution is that of explicit parts.
@@ -322,6 +334,15 @@ contains
     call check(error, reshape(cut%accumulated_slip, [441]), reshape(parts%accumulated_slip, [441]), 1.0e-8_wp, 'slip path')
     if (allocated(error)) return
     call check(error, cut%dissipated_energy, parts%dissipated_energy, 1.0e-8_wp*abs(parts%dissipated_energy), 'energy')
+    if (allocated(error)) return
+    ! each part fulfils the conditions; the record does not, as one step, and its residual says so
+    associate (problem => contact%problem)
+      call check(error, cut%residual_tangential, &
+                 tangential_residual(cut%traction, cut%slip_increment, cut%pressure, problem%friction, &
+                                     problem%tangential_compliance, 1), 0.0_wp, 'residual of what is recorded')
+    end associate
+    if (allocated(error)) return
+    call check_true(error, cut%converged .and. cut%residual_tangential > 1.0e-3_wp, 'a residual that is not hidden')
     if (allocated(error)) return
     ! and it is another solution than that of the whole step
     call advance(contact, pressed, target, .false., tolerance, 60, 0, next, error)

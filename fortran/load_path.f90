@@ -6,7 +6,8 @@
 !> increment that is recorded is that of all parts, and the residual of the friction conditions is that of this
 !> record, so that it shows how far the parts are from one implicit step.
 !> A static load is applied at once: parts only serve as starts, and the relative
-!> displacement counts from the undeformed bodies.
+!> displacement counts from the undeformed bodies. So it is tried with a step that begins without contact, which no
+!> path precedes: it is the same problem as a static load.
 module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -47,8 +48,8 @@ contains
 
     type(contact_state_t), target :: now
     type(contact_state_t), pointer :: from
-    real(wp), allocatable :: undeformed(:, :, :), slipped(:, :, :)
-    logical :: from_entry
+    real(wp), allocatable :: reference(:, :, :), slipped(:, :, :)
+    logical :: from_entry, at_once
     real(wp) :: done, part, work
     integer :: cuts, sweeps
 
@@ -62,7 +63,9 @@ contains
     if (allocated(error)) return
     from_entry = .false.
     if (present(interpolated)) from_entry = interpolated
-    if (static) allocate (undeformed, source=0.0_wp*state%relative_displacement)
+    at_once = static .or. .not. (from_entry .or. any(state%pressure > 0.0_wp))
+    if (at_once) allocate (reference, source=state%relative_displacement)
+    if (static) reference = 0.0_wp
     if (from_entry) then
       allocate (slipped, source=0.0_wp*state%relative_displacement)
     else
@@ -76,8 +79,8 @@ contains
     sweeps = 0
     do
       associate (goal => between(state, target, done + part))
-        if (static) then
-          call solver%solve_step(from, undeformed, goal, tolerance, max_sweeps, next, error)
+        if (at_once) then
+          call solver%solve_step(from, reference, goal, tolerance, max_sweeps, next, error)
         else if (from_entry) then
           call solve_with_entry(solver, from, goal, tolerance, max_sweeps, next, error)
         else
@@ -88,7 +91,11 @@ contains
       work = work + next%operator_applications
       sweeps = sweeps + next%sweeps
       if (next%converged) then
-        call add_slip(solver%problem, from, static, next)
+        if (at_once) then
+          call add_slip(solver%problem, state, static, next)
+        else
+          call add_slip(solver%problem, from, static, next)
+        end if
         if (from_entry) slipped = slipped + next%slip_increment
         done = done + part
         if (done >= 1.0_wp .or. next%clipped) exit
@@ -97,7 +104,15 @@ contains
       else
         ! where an attempt that failed has pressure means nothing
         next%clipped = .false.
-        if (cuts >= max_cuts) exit
+        if (cuts >= max_cuts) then
+          ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
+          if (static .or. .not. at_once .or. max_cuts == 0 .or. next%sliding) exit
+          at_once = .false.
+          from => state
+          done = 0.0_wp
+          part = 1.0_wp
+          cuts = 0
+        end if
         cuts = cuts + 1
         part = 0.5_wp*part
       end if
@@ -105,7 +120,7 @@ contains
     next%cuts = cuts
     next%sweeps = sweeps
     next%operator_applications = work
-    if (.not. static .and. cuts > 0 .and. next%converged) then
+    if (.not. at_once .and. cuts > 0 .and. next%converged) then
       ! the slip of the step is that of all its parts
       if (from_entry) then
         next%slip_increment = slipped

@@ -21,6 +21,7 @@ from .errors import (
     DeckError,
     HexcontactError,
     KernelFolderWarning,
+    PathWarning,
     ResourceError,
     StopRun,
 )
@@ -76,6 +77,7 @@ __all__ = [
     "KernelFolderWarning",
     "Lattice",
     "NormalContact",
+    "PathWarning",
     "ResourceError",
     "Result",
     "Session",

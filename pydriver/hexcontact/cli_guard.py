@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
 import typer
 from typer.core import TyperGroup
 
-from .errors import DeckError, HexcontactError, KernelFolderWarning, ResourceError
+from .errors import DeckError, HexcontactError, KernelFolderWarning, PathWarning, ResourceError
 
 if TYPE_CHECKING:
     from .errors import Fault
@@ -99,7 +99,7 @@ def warn_plainly() -> None:
     shown = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *more: Any, **options: Any) -> None:
-        if issubclass(category, KernelFolderWarning):
+        if issubclass(category, KernelFolderWarning | PathWarning):
             complain(f"warning: {message}")
         else:
             shown(message, category, *more, **options)

@@ -243,7 +243,7 @@ class FrictionalContact:
         ContactState
             Look at ``converged`` (if not, the residuals are those of the attempt that failed, and ``stopped``
             says why) and at ``touches_rim`` (contact at the rim of the window, where the advance ends, be it
-            in a part of the step, which does not count as converged: go on from the old state on a larger one).
+            in a part of the step, and is not converged: go on from the old state on a larger one).
         """
         known = isinstance(control, list | tuple) and len(control) == 4
         if not known or not all(isinstance(kind, str) and kind in _CONTROLS for kind in control):

@@ -22,6 +22,7 @@ import numpy as np
 from . import __version__, summary
 from .errors import DeckError
 from .progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, quantity, worth_showing
+from .remarks import remarks
 from .report_fields import kept_steps, maps_of, rounded
 from .step_view import scaled
 from .variables import VARIABLES
@@ -116,7 +117,7 @@ def report(result: Result) -> str:
     page = resources.files("hexcontact").joinpath("data/report.html").read_text(encoding="utf-8")
     parts = dict(
         title=html.escape(title),
-        status=_status(result),
+        status=_status(result, histories),
         kept=_kept(len(numbers), len(histories)),
         inputs=_pairs(_inputs(result)),
         loads=_loads(histories),
@@ -133,16 +134,18 @@ def report(result: Result) -> str:
 # --- words ----------------------------------------------------------------------------------------
 
 
-def _status(result: Result) -> str:
-    if result.shortfall:
-        return f'<p class="warning" role="note">{html.escape(result.shortfall)}</p>'
-    if result.complete:
-        return ""
+def _status(result: Result, histories: Sequence[History]) -> str:
+    notes = [_unfinished(result), *remarks(histories, result.dataset.attrs)]
+    return "".join(f'<p class="warning" role="note">{html.escape(note)}</p>' for note in notes if note)
+
+
+def _unfinished(result: Result) -> str:
+    if result.shortfall or result.complete:
+        return result.shortfall
     planned = int(result.dataset.attrs.get("planned_steps", 0))
     reason = str(result.dataset.attrs.get("stopped", ""))
     of = f" of {planned}" if planned else ""
-    text = f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
-    return f'<p class="warning" role="note">{html.escape(text)}</p>'
+    return f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
 
 
 def _kept(shown: int, steps: int) -> str:

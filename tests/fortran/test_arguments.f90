@@ -362,7 +362,7 @@ contains
         state%motion(2) = odd(1)
       case (5)
         deallocate (state%traction)
-      case (6)
+      case default
         state%pressure = virgin%pressure(2:, :)
       end select
       call advance(contact, state, target, .false., 1.0e-8_wp, 40, 6, next, caught)

@@ -24,6 +24,8 @@ module test_load_path
   type, extends(friction_solver_t) :: short_sighted_t
     !> How far load or motion may be from the start's
     real(wp) :: reach = huge(1.0_wp)
+    !> The relative displacement has to be counted from somewhere near, too
+    logical :: only_near = .false.
     !> Pressed harder than this, the rim is in contact
     real(wp) :: rim_load = huge(1.0_wp)
     !> Targets so far, and whether the relative displacement was counted from zero
@@ -54,6 +56,7 @@ contains
     tests = [ &
       new_test('whole', test_whole), &
       new_test('halved', test_halved), &
+      new_test('halved_at_first', test_halved_at_first), &
       new_test('bounded', test_bounded), &
       new_test('static', test_static), &
       new_test('motions', test_motions), &
@@ -92,6 +95,7 @@ contains
     state%operator_applications = 2.0_wp
     state%residual_normal = maxval(abs(target%value - merge(start%load, start%motion, target%control == f)))
     state%converged = state%residual_normal <= self%reach
+    if (self%only_near) state%converged = state%converged .and. maxval(abs(state%slip_increment)) <= self%reach
     state%clipped = touches_rim(state)
     if (tolerance < 0.0_wp) allocate (error)
   end subroutine solve_step
@@ -161,6 +165,8 @@ contains
 
     call set_up(solver, state, error)
     if (allocated(error)) return
+    ! contact, without any load
+    state%pressure(2, 2) = tiny(1.0_wp)
     solver%reach = 2.5_wp
     call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
     if (allocated(error)) return
@@ -186,6 +192,38 @@ contains
     ! loads 1, 2, 3, 4 over 1 m each
     call check(error, [next%accumulated_slip(2, 2), next%dissipated_energy], [4.0_wp, 10.0_wp], 1.0e-14_wp, 'path and energy')
   end subroutine test_halved
+
+  !> A step that begins without contact is solved as one, its parts are starts; if that fails they are a path.
+  subroutine test_halved_at_first(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    state%relative_displacement(:, :, 1) = 1.0_wp
+    state%accumulated_slip = 0.5_wp
+    state%dissipated_energy = 2.0_wp
+    solver%reach = 2.5_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    call check(error, solver%value(2, :solver%calls), [4.0_wp, 2.0_wp, 1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp], 0.0_wp, 'starts')
+    if (allocated(error)) return
+    ! from 1 m to -4 m under the last load, and not a part of it under each of them
+    call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
+               [-5.0_wp, 5.5_wp, 22.0_wp], 1.0e-14_wp, 'slip, path and energy of one step')
+    if (allocated(error)) return
+    call check(error, next%cuts, 2, 'cuts')
+    if (allocated(error)) return
+    solver%calls = 0
+    solver%only_near = .true.
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 3, next, error)
+    if (allocated(error)) return
+    call check_true(error, next%converged .and. next%cuts == 2, 'a path')
+    if (allocated(error)) return
+    call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
+               [-5.0_wp, 5.5_wp, 13.0_wp], 1.0e-14_wp, 'slip, path and energy of the parts')
+  end subroutine test_halved_at_first
 
   !> As many cuts as are allowed, then a state that says so; the state handed in is as it was.
   subroutine test_bounded(error)

@@ -66,19 +66,22 @@ contains
     real(wp), intent(in) :: compliance
     !> Threads to use
     integer, intent(in) :: n_threads
-    real(wp) :: p_max, worst
+    real(wp) :: p_max, worst, p, g
     integer :: col, row, n_wrong
 
     p_max = 0.0_wp
     worst = 0.0_wp
     n_wrong = 0
-    !$omp parallel do schedule(static) num_threads(n_threads) private(col) reduction(max: p_max, worst) &
+    !$omp parallel do schedule(static) num_threads(n_threads) private(col, p, g) reduction(max: p_max, worst) &
     !$omp& reduction(+: n_wrong)
     do row = 1, size(pressure, 2)
-      !$omp simd reduction(max: p_max, worst) reduction(+: n_wrong)
+      !$omp simd private(p, g) reduction(max: p_max, worst) reduction(+: n_wrong)
       do col = 1, size(pressure, 1)
-        p_max = max(p_max, pressure(col, row))
-        worst = max(worst, merge(abs(min(pressure(col, row), gap(col, row)/compliance)), 0.0_wp, candidate(col, row)))
+        ! a comparison with NaN may be trapped
+        p = merge(pressure(col, row), 0.0_wp, ieee_is_finite(pressure(col, row)))
+        g = merge(gap(col, row), 0.0_wp, ieee_is_finite(gap(col, row)))
+        p_max = max(p_max, p)
+        worst = max(worst, merge(abs(min(p, g/compliance)), 0.0_wp, candidate(col, row)))
         n_wrong = n_wrong + merge(0, 1, ieee_is_finite(pressure(col, row)) .and. &
                                   (ieee_is_finite(gap(col, row)) .or. .not. candidate(col, row)))
       end do

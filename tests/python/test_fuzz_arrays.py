@@ -160,9 +160,7 @@ TAKERS: dict[str, Callable[[Any], object]] = {
     "lattice, rows": lambda a: (
         Lattice(spacing=1.0, row_first=0, col_first=0, n_row=a, n_col=3).x if a is not True else 0
     ),
-    "lattice, origin": lambda a: Lattice(
-        spacing=1.0, row_first=0, col_first=0, n_row=3, n_col=3, origin=a
-    ).x,
+    "lattice, origin": lambda a: Lattice(spacing=1.0, row_first=0, col_first=0, n_row=3, n_col=3, origin=a).x,
     "pair": lambda a: ElasticPair.from_materials(a, 0.3, 1e9, 0.3),
     "lambda_1": lambda a: contact_of(ElasticPair(a, 0.0, 0.0)),
     "lambda_2": lambda a: contact_of(ElasticPair(1e-11, a, 0.0)),

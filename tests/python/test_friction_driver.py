@@ -31,6 +31,7 @@ from hexcontact.case import Case
 from hexcontact.cli import app
 from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
 from hexcontact.estimators import area_radius
+from hexcontact.lattice import Lattice
 from hexcontact.load_history import LoadStep, Target
 from hexcontact.native_friction import ContactState, FrictionalContact
 from hexcontact.progress import Lines, describe
@@ -561,6 +562,23 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
     shown = CliRunner().invoke(app, ["info", str(file)]).output
     assert all(f"note: {sentence}" in shown for sentence in told)
     assert json_output.of_result(result)["warnings"] == told
+
+
+def test_a_first_step_does_not_depend_on_the_window() -> None:
+    """On the wide window it is found by way of smaller loads; taken as a path they dissipated half as much."""
+    pair = native.ElasticPair.from_materials(None, None, 1e9, 0.1)
+    load = 4.0 / 3.0 * pair.effective_modulus
+    found = []
+    for side in (16, 54):
+        lattice = Lattice(1 / 12, -side, -side, 2 * side + 1, 2 * side + 1)
+        gap = 0.5 * (lattice.x**2 + lattice.y**2)
+        contact = FrictionalContact(lattice, pair, gap, friction_coefficient=1.0)
+        found.append(contact.advance(contact.virgin(), ["force"] * 4, [load, 0.0, 0.0, 0.0]))
+    small, large = found
+    assert small.converged and large.converged
+    assert max(state.residual_tangential for state in found) <= 1e-8
+    assert large.dissipated_energy == pytest.approx(small.dissipated_energy, rel=1e-7)
+    assert (small.zone == 1).sum() == (large.zone == 1).sum()
 
 
 def test_steps_that_were_not_halved_are_not_mentioned() -> None:

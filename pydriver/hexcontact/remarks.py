@@ -23,7 +23,7 @@ def remarks(histories: Sequence[History], parameters: Mapping[str, Any]) -> list
     parameters : mapping
         How they were solved: what `hexcontact.solve.parameters_of` returns, or the attributes of a result.
     """
-    tolerance = float(parameters["tolerance"])
+    tolerance = float(parameters.get("tolerance", 0.0))
     static = parameters.get("algorithm") == "static"
     cold = [
         number

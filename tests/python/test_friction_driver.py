@@ -565,7 +565,7 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
 
 
 def test_a_first_step_does_not_depend_on_the_window() -> None:
-    """On the wide window it is found by way of smaller loads; taken as a path they dissipated half as much."""
+    """On the wide window it is found from smaller loads; taken as a path, these dissipated half as much."""
     pair = native.ElasticPair.from_materials(None, None, 1e9, 0.1)
     load = 4.0 / 3.0 * pair.effective_modulus
     found = []

@@ -1,10 +1,13 @@
 !> How well a state fulfils the contact conditions; dimensionless.
 module hc_contact_residuals
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_contact_state, only: contact_state_t, force_control, normal, separated, slip
+  use hc_error, only: error_t, status, raise
+  use hc_contact_state, only: contact_state_t, touches_rim, force_control, normal, separated, slip, within_tolerance, &
+    not_finite
   use hc_friction_law, only: coulomb_t
   use hc_friction_rows, only: residual_row
   implicit none
@@ -53,7 +56,7 @@ contains
   !>
   !> Bounds tension, penetration and pressure across a gap at once. Without
   !> pressure anywhere the penetration is all there can be: it is 0 if the gap is nowhere
-  !> negative, and else infinite.
+  !> negative, and else infinite; so it is where a number is not finite, which a maximum would hide.
   real(wp) function normal_residual(pressure, gap, candidate, compliance, n_threads)
     !> Pressure [Pa] and gap [m]
     real(wp), intent(in) :: pressure(:, :), gap(:, :)
@@ -63,21 +66,30 @@ contains
     real(wp), intent(in) :: compliance
     !> Threads to use
     integer, intent(in) :: n_threads
-    real(wp) :: p_max, worst
-    integer :: col, row
+    real(wp) :: p_max, worst, p, g
+    integer :: col, row, n_wrong
 
     p_max = 0.0_wp
     worst = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(n_threads) private(col) reduction(max: p_max, worst)
+    n_wrong = 0
+    !$omp parallel do schedule(static) num_threads(n_threads) private(col, p, g) reduction(max: p_max, worst) &
+    !$omp& reduction(+: n_wrong)
     do row = 1, size(pressure, 2)
-      !$omp simd reduction(max: p_max, worst)
+      !$omp simd private(p, g) reduction(max: p_max, worst) reduction(+: n_wrong)
       do col = 1, size(pressure, 1)
-        p_max = max(p_max, pressure(col, row))
-        worst = max(worst, merge(abs(min(pressure(col, row), gap(col, row)/compliance)), 0.0_wp, candidate(col, row)))
+        ! a comparison with NaN may be trapped
+        p = merge(pressure(col, row), 0.0_wp, ieee_is_finite(pressure(col, row)))
+        g = merge(gap(col, row), 0.0_wp, ieee_is_finite(gap(col, row)))
+        p_max = max(p_max, p)
+        worst = max(worst, merge(abs(min(p, g/compliance)), 0.0_wp, candidate(col, row)))
+        n_wrong = n_wrong + merge(0, 1, ieee_is_finite(pressure(col, row)) .and. &
+                                  (ieee_is_finite(gap(col, row)) .or. .not. candidate(col, row)))
       end do
     end do
     !$omp end parallel do
-    if (p_max > 0.0_wp) then
+    if (n_wrong > 0) then
+      normal_residual = huge(1.0_wp)
+    else if (p_max > 0.0_wp) then
       normal_residual = worst/p_max
     else
       normal_residual = merge(0.0_wp, huge(1.0_wp), worst <= 0.0_wp)
@@ -148,7 +160,7 @@ contains
     !$omp end parallel do
   end function largest_pressure
 
-  !> R_P = |sum A_p p - P|/P.
+  !> R_P = |sum A_p p - P|/P; without a load any pressure at all is as wrong as a load that is not carried.
   elemental real(wp) function force_residual(carried, load)
     !> Load carried by the pressure, and prescribed load [N]
     real(wp), intent(in) :: carried, load
@@ -156,12 +168,12 @@ contains
     if (load > 0.0_wp) then
       force_residual = abs(carried - load)/load
     else
-      force_residual = abs(carried)
+      force_residual = merge(1.0_wp, 0.0_wp, abs(carried) > 0.0_wp)
     end if
   end function force_residual
 
   !> Zones, load and residuals of a state whose pressure and gap are known.
-  subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance, n_threads)
+  subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance, n_threads, error)
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
     !> Lattice and window
@@ -178,6 +190,8 @@ contains
     real(wp), intent(in) :: tolerance
     !> Threads to use
     integer, intent(in) :: n_threads
+    !> Allocated on failure: a pressure or a gap that is not a finite number
+    type(error_t), allocatable, intent(out) :: error
     real(wp) :: row_sum(size(state%pressure, 2))
     integer :: row
 
@@ -191,7 +205,14 @@ contains
     state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, n_threads)
     state%residual_force = 0.0_wp
     if (control == force_control) state%residual_force = force_residual(state%load(normal), target)
-    state%converged = max(state%residual_normal, state%residual_force) <= tolerance
+    ! one by one: the largest of several numbers hides one that is not a number
+    state%converged = state%residual_normal <= tolerance .and. state%residual_force <= tolerance
+    state%clipped = touches_rim(state)
+    if (state%converged) state%stopped = within_tolerance
+    if (ieee_is_finite(state%load(normal)) .and. state%residual_normal < huge(1.0_wp)) return
+    ! penetration without any pressure is infinite as well, but a state that can be shown
+    if (all(ieee_is_finite(state%pressure)) .and. all(ieee_is_finite(state%gap) .or. .not. candidate)) return
+    call raise(error, status%no_convergence, not_finite)
   end subroutine conclude
 
 end module hc_contact_residuals

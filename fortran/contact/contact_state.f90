@@ -1,13 +1,18 @@
 !> The state of a contact: tractions, gap, zones, loads and rigid motions over a window.
 module hc_contact_state
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
-  use hc_flexibility, only: normal, along_x, along_y
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: check_operator, normal, along_x, along_y
   implicit none
   private
 
-  public :: contact_state_t, new_contact_state, new_friction_state, take_tractions, check_problem
+  public :: contact_state_t, new_contact_state, new_friction_state, take_tractions, touches_rim
+  public :: check_problem, check_target, check_state
+  public :: not_finite
+  public :: not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, out_of_range
   public :: separated, stick, slip
   public :: load_target_t, force_control, displacement_control
   public :: normal, along_x, along_y, about_z, n_motion
@@ -21,6 +26,15 @@ module hc_contact_state
 
   !> What is prescribed of a motion: its load, or itself.
   integer, parameter :: force_control = 1, displacement_control = 2
+
+  !> Why a solver stopped: nothing was solved yet; all residuals are within the tolerance; all sweeps allowed were
+  !> made; linear solutions broke off, and sweeps do not help; no node sticks and a load cannot be carried; a part of
+  !> the step reached the rim of the window; numbers are not finite.
+  integer, parameter :: not_solved = 0, within_tolerance = 1, sweeps_used_up = 2, no_progress = 3, loads_not_carried = 4, &
+                        rim_reached = 5, out_of_range = 6
+
+  character(len=*), parameter :: not_finite = 'pressure or gap are not finite numbers: expected a gap, loads and elastic '// &
+                                              'constants whose products are neither zero nor infinite'
 
   !> What the bodies are driven to, motion by motion.
   type :: load_target_t
@@ -40,7 +54,7 @@ module hc_contact_state
     real(wp), allocatable :: traction(:, :, :)
     !> With friction: relative displacement s = (u1 - u2) - shift - twist x r (n_col, n_row, 2) [m]
     real(wp), allocatable :: relative_displacement(:, :, :)
-    !> With friction: change of s during the step, on the nodes in contact (n_col, n_row, 2) [m]
+    !> With friction: change of s during the step, all its parts, on the nodes in contact (n_col, n_row, 2) [m]
     real(wp), allocatable :: slip_increment(:, :, :)
     !> With friction: length of the slip path so far (n_col, n_row) [m]
     real(wp), allocatable :: accumulated_slip(:, :)
@@ -52,7 +66,8 @@ module hc_contact_state
     real(wp) :: dissipated_energy = 0.0_wp
     !> Residual of the contact conditions along the normal
     real(wp) :: residual_normal = huge(1.0_wp)
-    !> Residual of the friction conditions
+    !> Residual of the friction conditions, with the slip increment that is recorded; of a load step that was halved it may
+    !> exceed the tolerance, which each part meets by itself
     real(wp) :: residual_tangential = 0.0_wp
     !> Residual of the normal load; 0 where the approach is prescribed
     real(wp) :: residual_force = huge(1.0_wp)
@@ -60,8 +75,12 @@ module hc_contact_state
     real(wp) :: residual_shear_force = 0.0_wp
     !> Residual of the torque; 0 where the twist is prescribed
     real(wp) :: residual_torque = 0.0_wp
-    !> All residuals are within the tolerance
+    !> All residuals are within the tolerance, in each part of the step
     logical :: converged = .false.
+    !> Why the solver stopped: within_tolerance, sweeps_used_up, ...
+    integer :: stopped = not_solved
+    !> There is contact at the rim of the window: a larger window would have another solution, unless nothing can touch there
+    logical :: clipped = .false.
     !> No node sticks and the tangential load cannot be carried
     logical :: sliding = .false.
     !> Active sets that were tried on the finest lattice
@@ -147,22 +166,99 @@ contains
     start%load = state%load
   end subroutine take_tractions
 
+  !> Is there contact at the rim of the window?
+  pure logical function touches_rim(state)
+    !> State
+    type(contact_state_t), intent(in) :: state
+
+    associate (p => state%pressure)
+      touches_rim = any(p(1, :) > 0.0_wp) .or. any(p(size(p, 1), :) > 0.0_wp) .or. &
+                    any(p(:, 1) > 0.0_wp) .or. any(p(:, size(p, 2)) > 0.0_wp)
+    end associate
+  end function touches_rim
+
   !> Does a problem make sense?
-  pure subroutine check_problem(lattice, initial_gap, candidate, error)
+  pure subroutine check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Initial gap (n_col, n_row) [m]
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Initial gap (n_col, n_row) [m]; any value at all where nothing can touch
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
-    !> Allocated on failure: wrong shapes, no candidate at all
+    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use
     type(error_t), allocatable, intent(out) :: error
+    !> Threads to use; 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
 
+    call check_operator(lattice, pair, error, n_threads)
+    if (allocated(error)) return
     if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
       call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
     else if (.not. any(candidate)) then
       call raise(error, status%invalid_input, 'no node of the window may come into contact')
+    else if (any(candidate .and. .not. ieee_is_finite(initial_gap))) then
+      call raise(error, status%invalid_input, 'the initial gap of nodes that may come into contact: finite numbers expected')
     end if
   end subroutine check_problem
+
+  !> Can loads or motions be solved for, to this tolerance, in so many sweeps?
+  pure subroutine check_target(control, value, tolerance, max_sweeps, error)
+    !> How motions are driven, the normal one first: force_control or displacement_control
+    integer, intent(in) :: control(:)
+    !> Loads [N], [N m] or motions [m], [rad]
+    real(wp), intent(in) :: value(:)
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    if (any(control /= force_control .and. control /= displacement_control)) then
+      call raise(error, status%invalid_input, 'the control of a motion: force_control or displacement_control expected')
+    else if (.not. all(ieee_is_finite(value))) then
+      call raise(error, status%invalid_input, 'loads and motions: finite numbers expected')
+    else if (control(normal) == force_control .and. value(normal) < 0.0_wp) then
+      call raise(error, status%invalid_input, 'the normal load: a number not below zero expected')
+    else if (.not. ieee_is_finite(tolerance)) then
+      call raise(error, status%invalid_input, 'the tolerance: a number between 0 and 1 expected')
+    else if (tolerance <= 0.0_wp .or. tolerance >= 1.0_wp) then
+      call raise(error, status%invalid_input, 'the tolerance: a number between 0 and 1 expected')
+    else if (max_sweeps < 1) then
+      call raise(error, status%invalid_input, 'the sweeps that may be made: at least one expected')
+    end if
+  end subroutine check_target
+
+  !> Can a load step with friction start from a state?
+  pure subroutine check_state(state, lattice, error)
+    !> State
+    type(contact_state_t), intent(in) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Allocated on failure: fields that are missing or of another window, numbers that are not finite
+    type(error_t), allocatable, intent(out) :: error
+    logical :: fits
+    integer :: row
+
+    fits = allocated(state%pressure) .and. allocated(state%gap) .and. allocated(state%traction) .and. &
+           allocated(state%relative_displacement) .and. allocated(state%accumulated_slip)
+    if (fits) fits = all([shape(state%pressure), shape(state%gap), shape(state%accumulated_slip)] == [lattice%extent, &
+                                                                                    lattice%extent, lattice%extent])
+    if (fits) fits = all(shape(state%traction) == [lattice%extent, 2]) .and. &
+                     all(shape(state%relative_displacement) == [lattice%extent, 2])
+    if (.not. fits) then
+      call raise(error, status%invalid_input, 'the state to go on from does not have the shape of the lattice window')
+      return
+    end if
+    fits = all(ieee_is_finite([state%load, state%motion, state%dissipated_energy]))
+    do row = 1, lattice%extent(2)
+      fits = fits .and. all(ieee_is_finite(state%pressure(:, row))) .and. all(ieee_is_finite(state%traction(:, row, :))) &
+             .and. all(ieee_is_finite(state%relative_displacement(:, row, :))) &
+             .and. all(ieee_is_finite(state%accumulated_slip(:, row)))
+    end do
+    if (.not. fits) call raise(error, status%invalid_input, 'the state to go on from: finite numbers expected')
+  end subroutine check_state
 
 end module hc_contact_state

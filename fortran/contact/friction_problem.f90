@@ -14,8 +14,9 @@ module hc_friction_problem
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: flexibility_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, separated, slip, &
-    normal, along_x, along_y, about_z, n_motion, force_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
+    normal, along_x, along_y, about_z, n_motion, force_control, within_tolerance, sweeps_used_up, &
+    loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
     tangential_residual, largest_pressure, force_residual, least_traction
   use hc_friction_law, only: coulomb_t
@@ -77,6 +78,8 @@ module hc_friction_problem
     procedure :: classification_parameter
     !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known
     procedure :: conclude
+    !> Residuals of its loads alone
+    procedure :: judge_loads
   end type friction_problem_t
 
   !> A method of solving it.
@@ -144,13 +147,16 @@ contains
     type(coulomb_t), intent(in) :: friction
     !> Goodman's approximation: shear tractions do not move the pressure
     logical, intent(in) :: goodman
-    !> Allocated on failure: wrong shapes, no candidate at all, a negative coefficient
+    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, a negative coefficient
     type(error_t), allocatable, intent(out) :: error
+    logical :: sound
 
-    call check_problem(lattice, initial_gap, candidate, error)
+    call check_problem(lattice, pair, initial_gap, candidate, error)
     if (allocated(error)) return
-    if (.not. friction%no_slip .and. friction%coefficient < 0.0_wp) then
-      call raise(error, status%invalid_input, 'coefficient of friction: a number of at least 0 expected')
+    sound = friction%no_slip .or. ieee_is_finite(friction%coefficient)
+    if (sound .and. .not. friction%no_slip) sound = friction%coefficient >= 0.0_wp
+    if (.not. sound) then
+      call raise(error, status%invalid_input, 'coefficient of friction: a finite number of at least 0 expected, or no_slip')
       return
     end if
     problem%lattice = lattice
@@ -241,6 +247,7 @@ contains
     allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 3), source=0.0_wp)
     call self%conclude(target, tolerance, reference, displacement, state)
     state%sliding = .not. state%converged
+    if (state%sliding) state%stopped = loads_not_carried
   end subroutine separate
 
   !> Relative displacements (w, u_x, u_y) of given tractions, by any operator.
@@ -324,7 +331,7 @@ contains
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
 
-    real(wp) :: r, unit, slope, scale, missing(n_motion)
+    real(wp) :: r, unit, slope
     integer :: col, row, m, n_contact
     logical :: finite
 
@@ -364,6 +371,25 @@ contains
                                             self%n_threads)
     state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
                                                     self%friction, self%tangential_compliance, self%n_threads)
+    call self%judge_loads(target, state)
+    ! one by one: the largest of several numbers hides one that is not a number
+    finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))
+    state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
+                           state%residual_shear_force, state%residual_torque] <= tolerance) .and. finite
+    state%clipped = touches_rim(state)
+    state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
+    if (.not. finite) state%stopped = out_of_range
+  end subroutine conclude
+
+  !> Residuals of the loads that were prescribed.
+  subroutine judge_loads(self, target, state)
+    class(friction_problem_t), intent(in) :: self
+    !> Loads or motions that were prescribed
+    type(load_target_t), intent(in) :: target
+    !> State whose tractions and loads are known
+    type(contact_state_t), intent(inout) :: state
+    real(wp) :: scale, missing(n_motion)
+
     missing = merge(abs(state%load - target%value), 0.0_wp, target%control == force_control)
     state%residual_force = merge(force_residual(state%load(normal), target%value(normal)), 0.0_wp, &
                                  target%control(normal) == force_control)
@@ -375,12 +401,8 @@ contains
     end if
     state%residual_shear_force = relative(norm2(missing(along_x:along_y)), scale)
     state%residual_torque = relative(missing(about_z), &
-                                     scale*sqrt(self%lattice%cell_area()*n_contact/pi))
-    ! one by one: the largest of several numbers hides one that is not a number
-    state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
-                           state%residual_shear_force, state%residual_torque] <= tolerance) .and. &
-                      all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion)) .and. finite
-  end subroutine conclude
+                                     scale*sqrt(self%lattice%cell_area()*count(state%pressure > 0.0_wp)/pi))
+  end subroutine judge_loads
 
   !> A missing load relative to a scale; any at all is too much where the scale vanishes.
   elemental real(wp) function relative(missing, scale)

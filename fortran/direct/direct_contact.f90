@@ -12,7 +12,8 @@ module hc_direct_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, force_control
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target, force_control, &
+    sweeps_used_up, no_progress
   use hc_contact_residuals, only: normal_self_compliance, conclude
   implicit none
   private
@@ -51,10 +52,10 @@ contains
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
-    !> Allocated on failure: wrong shapes, no candidate at all, not enough memory
+    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
 
-    call check_problem(lattice, initial_gap, candidate, error)
+    call check_problem(lattice, pair, initial_gap, candidate, error)
     if (allocated(error)) return
     self%initial_gap = initial_gap
     self%candidate = candidate
@@ -75,7 +76,7 @@ contains
     integer, intent(in) :: max_sweeps
     !> Solution; `converged` tells whether the residuals are within the tolerance
     type(contact_state_t), intent(out) :: state
-    !> Allocated on failure: not enough memory, a matrix that is not positive definite
+    !> Allocated on failure: a target that cannot be solved for, not enough memory, a matrix that is not positive definite
     type(error_t), allocatable, intent(out) :: error
     !> Contact area to start from (n_col, n_row); absent: where the undeformed bodies would overlap
     logical, intent(in), optional :: start(:, :)
@@ -85,6 +86,14 @@ contains
     real(wp) :: delta, gap(self%flexibility%lattice%size())
     integer :: n, fewest, left
 
+    call check_target([control], [target], tolerance, max_sweeps, error)
+    if (allocated(error)) return
+    if (present(start)) then
+      if (any(shape(start) /= self%flexibility%lattice%extent)) then
+        call raise(error, status%invalid_input, 'the contact area to start from does not have the shape of the lattice window')
+        return
+      end if
+    end if
     call new_contact_state(state, self%flexibility%lattice)
     self%flexibility%applications = 0.0_wp
     n = self%flexibility%lattice%size()
@@ -125,7 +134,8 @@ contains
     if (allocated(error)) return
     state%gap = reshape(gap, shape(state%gap))
     state%motion(normal) = delta
-    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance, 1)
+    state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
+    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance, 1, error)
     state%operator_applications = self%flexibility%applications
   end subroutine solve
 

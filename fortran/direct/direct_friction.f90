@@ -12,7 +12,7 @@ module hc_direct_friction
   use hc_error, only: error_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
-    normal, along_x, force_control, displacement_control
+    normal, along_x, force_control, displacement_control, loads_not_carried
   use hc_friction_law, only: linearize, on_cone
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_direct_contact, only: first_guess, exchange, patience
@@ -129,6 +129,7 @@ contains
       call classify(self%problem, share, it)
     end do
     state%sliding = .not. state%converged .and. adrift > 1
+    if (state%sliding) state%stopped = loads_not_carried
   end subroutine solve_step
 
   !> First contact: without shear traction, and then against the slip that its pressure causes.

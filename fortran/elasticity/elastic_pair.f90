@@ -15,7 +15,7 @@ module hc_elastic_pair
   implicit none
   private
 
-  public :: material_t, elastic_pair_t, new_elastic_pair
+  public :: material_t, elastic_pair_t, new_elastic_pair, check_pair
 
   !> An isotropic elastic or a rigid material.
   type :: material_t
@@ -70,6 +70,20 @@ contains
     pair%lambda_2 = coupling(body_1) - coupling(body_2)
     pair%lambda_5 = tangential(body_1) + tangential(body_2)
   end subroutine new_elastic_pair
+
+  !> Refuse constants that no two elastic bodies have; whoever sets them without new_elastic_pair may.
+  pure subroutine check_pair(pair, error)
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Allocated on failure: the bodies would gain energy as they deform
+    type(error_t), allocatable, intent(out) :: error
+    logical :: sound
+
+    sound = all(ieee_is_finite([pair%lambda_1, pair%lambda_2, pair%lambda_5]))
+    if (sound) sound = pair%lambda_1 > 0.0_wp .and. abs(pair%lambda_2) < pair%lambda_1 .and. pair%lambda_5 > -pair%lambda_1
+    if (.not. sound) call raise(error, status%invalid_input, 'the elastic constants of the pair: finite numbers with '// &
+                                'lambda_1 > 0, |lambda_2| < lambda_1 and lambda_5 > -lambda_1 expected')
+  end subroutine check_pair
 
   pure subroutine check(body, name, error)
     type(material_t), intent(in) :: body

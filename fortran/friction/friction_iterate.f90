@@ -14,6 +14,7 @@ module hc_friction_iterate
   use hc_driven_motions, only: driven_motions_t, new_driven_motions
   use hc_friction_operators, only: operators_t
   use hc_friction_systems, only: pressure_system_t, shear_system_t, new_shear_system
+  use hc_krylov, only: solution_accurate
   use hc_vectors, only: fill, copy, add, maximum
   implicit none
   private
@@ -62,6 +63,8 @@ module hc_friction_iterate
     !> About the pressure that an approach of the contact causes, and the shear traction of each rigid motion,
     !> components along x and y: what constraints are fulfilled with
     real(wp), allocatable :: lift(:, :), drag(:, :)
+    !> How the linear solutions of the last sweep ended, the worst of them
+    integer :: outcome = solution_accurate
     !> The start knew of no contact
     logical :: cold = .false.
     !> Nothing has been solved yet

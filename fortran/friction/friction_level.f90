@@ -5,12 +5,14 @@
 module hc_friction_level
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, along_x, force_control
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, along_x, force_control, &
+    sweeps_used_up, no_progress, loads_not_carried, out_of_range
   use hc_friction_problem, only: friction_problem_t
   use hc_friction_operators, only: operators_t
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_friction_sweep, only: staggered_sweep
   use hc_friction_newton, only: coupled_sweep
+  use hc_krylov, only: solution_broke_off
   implicit none
   private
 
@@ -94,6 +96,10 @@ contains
     state%sliding = .not. state%converged .and. any(target%control(along_x:) == force_control) .and. &
                     (now%sliding .or. held > 1)
     state%operator_applications = operators%work()
+    if (state%converged) return
+    state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)
+    if (state%sliding) state%stopped = loads_not_carried
+    if (.not. now%is_finite()) state%stopped = out_of_range
   end subroutine solve_level
 
   !> Tractions of an iterate, without tension and cut to the cone.

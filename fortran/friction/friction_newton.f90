@@ -41,7 +41,7 @@ contains
     logical, allocatable :: active(:), shear_active(:), contact(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
-    real(wp) :: missing(4), multiplier(4), goal
+    real(wp) :: missing(4), multiplier(4), goal, residual
     integer :: n, m, k, n_shear, iterations
     logical :: independent
 
@@ -110,7 +110,7 @@ contains
                  final_accuracy*now%tolerance)
       goal = goal*real(count(active), wp)**0.25_wp
       call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
-                           independent, iterations, error)
+                           independent, residual, iterations, now%outcome, error)
       if (allocated(error)) return
     end if
     ! where all nodes slip, only their directions resist a load: not beyond reason

@@ -13,7 +13,7 @@ module hc_friction_sweep
   use hc_driven_motions, only: driven_motions_t
   use hc_friction_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t, cautious
-  use hc_krylov, only: projected_cg, precondition_constraints, fulfil
+  use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
   use hc_vectors, only: copy, maximum, total
   implicit none
   private
@@ -52,6 +52,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: q(:)
 
+    now%outcome = solution_accurate
     call press(now, error)
     if (allocated(error)) return
     if (now%dragging .and. now%cold .and. now%first) then
@@ -81,7 +82,7 @@ contains
     real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
     logical, allocatable :: contact(:)
     real(wp) :: goal, residual, multiplier(1), missing(1), cell_area, carried, level
-    integer :: n, i, area, n_constraint, iterations
+    integer :: n, i, area, n_constraint, iterations, outcome
     logical :: changed, independent
 
     n = size(now%p)
@@ -126,8 +127,9 @@ contains
       if (changed .or. now%pressing) goal = max(press_accuracy*min(now%residual_normal, 1.0_wp), goal)
       call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, &
                         goal*now%problem%normal_compliance*maximum(now%p, now%pressure%n_threads), max_iterations, &
-                        multiplier(:n_constraint), residual, iterations, error)
+                        multiplier(:n_constraint), residual, iterations, outcome, error)
       if (allocated(error)) return
+      now%outcome = max(now%outcome, outcome)
       if (n_constraint == 1) now%motion(normal) = multiplier(1)
     end do
   end subroutine press
@@ -144,7 +146,7 @@ contains
     real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
     real(wp) :: goal, residual, motion(n_motion)
-    integer :: n, iterations
+    integer :: n, iterations, outcome
     logical :: independent, holding
 
     n = size(now%p)
@@ -179,8 +181,9 @@ contains
         goal = max(goal, final_accuracy*now%tolerance)
         goal = goal*now%problem%tangential_compliance*now%traction_scale()
         call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal, max_iterations, multiplier, &
-                          residual, iterations, error)
+                          residual, iterations, outcome, error)
         if (allocated(error)) return
+        now%outcome = max(now%outcome, outcome)
       end if
       now%sliding = .not. independent
       if (size(missing) == 0 .or. holding .or. any(active(n + 1:))) exit

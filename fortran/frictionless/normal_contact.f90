@@ -12,7 +12,7 @@ module hc_normal_contact
   use hc_flexibility_fft, only: fft_memory
   use hc_normal_kernel, only: normal_kernel_t
   use hc_kernel_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target
   use hc_preconditioner, only: preconditioner_memory
   use hc_normal_level, only: normal_level_t
   use hc_normal_iterate, only: iterate_t
@@ -71,7 +71,7 @@ contains
     real(wp), intent(in) :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
-    !> Allocated on failure: wrong shapes, no candidate at all, not enough memory
+    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
@@ -83,7 +83,7 @@ contains
     self%pair = pair
     if (present(n_threads)) self%n_threads = n_threads
     if (present(cache)) self%cache => cache
-    call check_problem(lattice, initial_gap, candidate, error)
+    call check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
     if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, smallest_side)))
     allocate (self%iterate(size(self%level)))
@@ -141,13 +141,15 @@ contains
     integer, intent(in) :: max_sweeps
     !> Solution; `converged` tells whether the residuals are within the tolerance
     type(contact_state_t), intent(out) :: state
-    !> Allocated on failure: an operator that is not positive definite
+    !> Allocated on failure: a target that cannot be solved for, numbers that are not finite
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: coarse
     real(wp) :: work
     integer :: l
 
+    call check_target([control], [target], tolerance, max_sweeps, error)
+    if (allocated(error)) return
     work = 0.0_wp
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
@@ -231,6 +233,7 @@ contains
           state%pressure(first(1):last(1), first(2):last(2)) = part%pressure
         end associate
         state%motion = part%motion
+        state%stopped = part%stopped
         call whole%conclude_anew(control, target, tolerance, state, error)
         if (allocated(error)) return
         work = work + whole%work()

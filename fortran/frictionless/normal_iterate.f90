@@ -2,6 +2,7 @@
 module hc_normal_iterate
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t, status, raise
+  use hc_contact_state, only: not_finite
   use hc_edge_extension, only: edge_extension_t, new_edge_extension
   use hc_normal_level, only: normal_level_t
   use hc_normal_rows, only: judge_row, add_row, largest_of
@@ -180,15 +181,17 @@ contains
   end subroutine balance
 
   !> Residuals, and the set that the present pressure and gap call for.
-  subroutine judge(level, now, candidate, next, changed)
+  subroutine judge(level, now, candidate, next, changed, error)
     type(normal_level_t), intent(in) :: level
     type(iterate_t), intent(inout) :: now
     logical, intent(in), contiguous :: candidate(:, :)
     logical, intent(out), contiguous :: next(:, :)
     !> The new set is another one
     logical, intent(out) :: changed
+    !> Allocated on failure: a pressure or a gap that is not a finite number
+    type(error_t), allocatable, intent(out) :: error
     real(wp) :: r, stiffness, p_max, worst, worst_active
-    integer :: row, n_next, n_changed
+    integer :: row, n_next, n_changed, n_wrong
 
     r = classification_scale/(2.0_wp*pi*level%pair%lambda_1*sqrt(level%lattice%cell_area()*now%n_active/pi))
     stiffness = 1.0_wp/level%compliance
@@ -197,13 +200,18 @@ contains
     worst_active = 0.0_wp
     n_next = 0
     n_changed = 0
+    n_wrong = 0
     !$omp parallel do schedule(static) num_threads(level%n_threads) &
-    !$omp& reduction(max: p_max, worst, worst_active) reduction(+: n_next, n_changed)
+    !$omp& reduction(max: p_max, worst, worst_active) reduction(+: n_next, n_changed, n_wrong)
     do row = 1, size(now%p, 2)
       call judge_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
-                     candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed)
+                     candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed, n_wrong)
     end do
     !$omp end parallel do
+    if (n_wrong > 0) then
+      call raise(error, status%no_convergence, not_finite)
+      return
+    end if
     now%p_max = p_max
     now%residual = worst/p_max
     now%residual_active = worst_active/(level%compliance*p_max)

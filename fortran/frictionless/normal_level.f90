@@ -146,7 +146,7 @@ contains
       state%gap(:, row) = self%initial_gap(:, row) + state%gap(:, row) - state%motion(normal)
     end do
     !$omp end parallel do
-    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%n_threads)
+    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%n_threads, error)
   end subroutine conclude_anew
 
   !> K d in single precision, in units of the preconditioner.

@@ -1,5 +1,6 @@
 !> Passes over one row of nodes in a frictionless contact, written so that the compiler takes several nodes at a time.
 module hc_normal_rows
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp
   implicit none
   private
@@ -10,7 +11,7 @@ contains
 
   !> Residuals of the nodes of a row, and which of them pressure and gap call for.
   pure subroutine judge_row(n, r, stiffness, approach, initial_gap, pressure, closing, candidate, active, next, &
-                            p_max, worst, worst_active, n_next, n_changed)
+                            p_max, worst, worst_active, n_next, n_changed, n_wrong)
     !> Number of nodes
     integer, intent(in) :: n
     !> Classification parameter, and inverse of the self-compliance [Pa/m]
@@ -22,6 +23,8 @@ contains
     !> What the rows before gave, and now this one too
     real(wp), intent(inout) :: p_max, worst, worst_active
     integer, intent(inout) :: n_next, n_changed
+    !> Nodes whose pressure or gap is not a finite number
+    integer, intent(inout) :: n_wrong
     real(wp) :: gap(n)
     integer :: enters(n), col
 
@@ -30,11 +33,12 @@ contains
       gap(col) = initial_gap(col) + closing(col) - approach
       enters(col) = merge(1, 0, pressure(col) - r*gap(col) > 0.0_wp)*merge(1, 0, candidate(col))
     end do
-    !$omp simd reduction(max: p_max, worst, worst_active)
+    !$omp simd reduction(max: p_max, worst, worst_active) reduction(+: n_wrong)
     do col = 1, n
       p_max = max(p_max, pressure(col))
       worst = max(worst, merge(abs(min(pressure(col), stiffness*gap(col))), 0.0_wp, candidate(col)))
       worst_active = max(worst_active, merge(abs(gap(col)), 0.0_wp, active(col)))
+      n_wrong = n_wrong + merge(0, 1, ieee_is_finite(pressure(col)) .and. (ieee_is_finite(gap(col)) .or. .not. candidate(col)))
     end do
     next = enters == 1
     n_next = n_next + sum(enters)

@@ -14,7 +14,7 @@
 module hc_normal_steps
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal
+  use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
   use hc_contact_residuals, only: conclude
   use hc_normal_level, only: normal_level_t
   use hc_normal_iterate, only: iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, &
@@ -33,6 +33,8 @@ module hc_normal_steps
   real(wp), parameter :: held_accuracy = 0.1_wp
   !> Share of a residual, and of the tolerance, that errors of single precision may make up.
   real(wp), parameter :: residual_share = 0.01_wp, tolerance_share = 0.1_wp
+  !> Times that the pressure of a solution is fitted to the load: a tolerance below rounding errors is not reached by more.
+  integer, parameter :: max_fits = 3
 
 contains
 
@@ -70,6 +72,7 @@ contains
     else
       call iterate(level, now, control == force_control, target, tolerance, max_sweeps, start, state%sweeps, error)
       if (allocated(error)) return
+      state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
       call push_only(level, now, pulls)
       if (pulls .and. level%exact) call find_closing(level, now, error)
       if (allocated(error)) return
@@ -81,7 +84,7 @@ contains
       call move_alloc(now%p, state%pressure)
       state%motion(normal) = now%approach
     end if
-    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%n_threads)
+    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%n_threads, error)
   end subroutine solve_level
 
   !> Iterations up to the tolerance.
@@ -103,6 +106,7 @@ contains
     logical, allocatable :: candidate(:, :), next(:, :)
     real(wp) :: history(3), held_start, rz_old, pressures, share
     logical :: changed, held, fresh
+    integer :: fits
 
     allocate (candidate, source=level%candidate)
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
@@ -117,24 +121,27 @@ contains
     held_start = 1.0_wp
     rz_old = 0.0_wp
     sweeps = 0
+    fits = 0
     do
       if (by_load) call balance(level, now)
-      call judge(level, now, candidate, next, changed)
+      call judge(level, now, candidate, next, changed, error)
+      if (allocated(error)) return
       if (level%exact .and. now%stale > level%compliance*now%p_max*max(residual_share*now%residual, tolerance_share*tolerance)) then
         if (by_load) call fit_load(level, now, pressures)
         call find_closing(level, now, error)
         if (allocated(error)) return
         cycle
       end if
-      if (now%residual <= tolerance .and. by_load .and. level%exact) then
+      if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < max_fits) then
         if (abs(load_lack(level, now, pressures)) > tolerance_share*tolerance*pressures) then
+          fits = fits + 1
           call fit_load(level, now, pressures)
           call find_closing(level, now, error)
           if (allocated(error)) return
           cycle
         end if
       end if
-      if (now%residual <= tolerance .or. sweeps == max_sweeps) return
+      if (now%residual <= tolerance .or. sweeps >= max_sweeps) return
       sweeps = sweeps + 1
       if (sweeps == 1) changed = .true.
 

@@ -10,15 +10,19 @@
 !> other module knows its angle. A window is the rhombus of nodes that is kept
 !> in memory; a field over it is an array of shape (n_col, n_row).
 module hc_lattice
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   implicit none
   private
 
-  public :: lattice_t, new_lattice, equilateral_basis, edge_directions, neighbors
+  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, edge_directions, neighbors
 
   !> Steps in column and row to the six neighbours of a node, along the edges of the triangulation.
   integer, parameter :: neighbors(2, 6) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1], [2, 6])
+
+  !> Nodes of a window and size of an index that default integers can still work with.
+  integer, parameter :: most_nodes = 2**29 - 1, largest_index = most_nodes
 
   !> Basis, origin and index window of a lattice.
   type :: lattice_t
@@ -57,7 +61,7 @@ contains
     integer, intent(in) :: first(2)
     !> Number of columns and rows of the window, at least 1
     integer, intent(in) :: extent(2)
-    !> Allocated on failure: a degenerate basis, an empty window
+    !> Allocated on failure: a degenerate basis, an empty or too large window, numbers that are not finite
     type(error_t), allocatable, intent(out) :: error
     !> Position of node (0, 0), default (0, 0) [m]
     real(wp), intent(in), optional :: origin(2)
@@ -66,13 +70,29 @@ contains
     lattice%first = first
     lattice%extent = extent
     if (present(origin)) lattice%origin = origin
-    if (any(extent < 1)) then
+    call check_lattice(lattice, error)
+  end subroutine new_lattice
+
+  !> Refuse a lattice on which nothing can be computed.
+  pure subroutine check_lattice(lattice, error)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Allocated on failure: a degenerate basis, an empty or too large window, numbers that are not finite
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: long = selected_int_kind(18)
+
+    if (any(lattice%extent < 1)) then
       call raise(error, status%invalid_input, 'the lattice window is empty: at least one row and one column expected')
+    else if (product(int(lattice%extent, long)) > most_nodes .or. any(abs(int(lattice%first, long)) > largest_index)) then
+      call raise(error, status%invalid_input, 'the lattice window: at most 536870911 nodes and indices up to that expected')
+    else if (.not. (all(ieee_is_finite(lattice%basis)) .and. all(ieee_is_finite(lattice%origin)))) then
+      ! before any comparison, which NaN may trap
+      call raise(error, status%invalid_input, 'the lattice basis and origin: finite numbers expected')
     else if (.not. lattice%cell_area() > 1.0e-3_wp*lattice%spacing()**2) then
       call raise(error, status%invalid_input, &
                  'the lattice basis is degenerate: two vectors in counter-clockwise order expected')
     end if
-  end subroutine new_lattice
+  end subroutine check_lattice
 
   !> Basis of the equilateral lattice, eq. (5.1): sides of equal length at 60 degrees.
   pure function equilateral_basis(spacing) result(basis)

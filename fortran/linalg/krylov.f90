@@ -16,6 +16,7 @@
 !> For a matrix that is not symmetric, and constraints C^T x whose multipliers act
 !> along other vectors B, GMRES does the same with (C^T M B)^-1 C^T.
 module hc_krylov
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lapack, only: dgesv
@@ -24,7 +25,13 @@ module hc_krylov
   implicit none
   private
 
+  public :: solution_accurate, iterations_used_up, solution_broke_off
   public :: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil
+
+  !> Why a linear solver stopped: the residual is as small as it was to be; all iterations allowed were made; no
+  !> direction is left along which it falls, by rounding errors, a matrix that is not positive definite, or numbers that
+  !> are not finite. From best to worst.
+  integer, parameter :: solution_accurate = 1, iterations_used_up = 2, solution_broke_off = 3
 
   !> A symmetric positive definite operator with a preconditioner, on fields that
   !> are kept as vectors over all nodes.
@@ -142,7 +149,7 @@ contains
 
   !> Preconditioned conjugate gradients with projection on the constraints.
   subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, &
-                          multiplier, residual, iterations, error)
+                          multiplier, residual, iterations, outcome, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
@@ -165,6 +172,8 @@ contains
     real(wp), intent(out) :: residual
     !> Iterations taken
     integer, intent(out) :: iterations
+    !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer, intent(out) :: outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -192,6 +201,7 @@ contains
     call nodes%pack(rhs, rhs_active)
     call invert_gram(b, m_b, inverse, independent, n_threads)
     iterations = 0
+    outcome = iterations_used_up
     rz_old = 0.0_wp
     multiplier = 0.0_wp
     if (size(multiplier) > 0) then
@@ -236,7 +246,10 @@ contains
       call nodes%pack(onto, ad)
       curvature = dot(d, ad, n_threads)
       ! nothing is left to gain in working precision
-      if (.not. curvature > 0.0_wp) exit
+      if (.not. curvature > 0.0_wp) then
+        outcome = solution_broke_off
+        exit
+      end if
       step = rz/curvature
       !$omp parallel num_threads(n_threads)
       !$omp do schedule(static)
@@ -253,12 +266,15 @@ contains
       !$omp end parallel
       iterations = iterations + 1
     end do
+    if (residual <= tolerance) outcome = solution_accurate
+    ! the largest of several numbers hides one that is not a number
+    if (.not. ieee_is_finite(dot(r, r, n_threads))) outcome = solution_broke_off
     call nodes%unpack(x_active, x)
   end subroutine projected_cg
 
   !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
   subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
-                             multiplier, independent, iterations, error)
+                             multiplier, independent, residual, iterations, outcome, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
@@ -273,7 +289,7 @@ contains
     real(wp), intent(inout), contiguous :: x(:)
     !> Product A x (n), everywhere
     real(wp), intent(inout), contiguous :: ax(:)
-    !> The largest weighted residual that is allowed on an active node
+    !> Euclidean norm of the weighted residuals on the active nodes that is allowed
     real(wp), intent(in) :: tolerance
     !> Iterations allowed
     integer, intent(in) :: max_iterations
@@ -281,8 +297,12 @@ contains
     real(wp), intent(inout) :: multiplier(:)
     !> False where the constraints depend on each other: nothing was done
     logical, intent(out) :: independent
+    !> Euclidean norm of the weighted residuals that is left, but for rounding errors
+    real(wp), intent(out) :: residual
     !> Iterations taken
     integer, intent(out) :: iterations
+    !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer, intent(out) :: outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -303,6 +323,8 @@ contains
     integer :: i, k, n_threads
 
     iterations = 0
+    residual = huge(1.0_wp)
+    outcome = solution_broke_off
     n_threads = system%n_threads
     call new_packing(nodes, active, n_threads)
     call nodes%pack_columns(columns, b)
@@ -321,7 +343,10 @@ contains
     call add_columns(b, multiplier, basis(1)%v, n_threads)
     basis(1)%v = w*basis(1)%v
     length = sqrt(dot(basis(1)%v, basis(1)%v, n_threads))
+    residual = length
+    if (length <= 0.0_wp) outcome = solution_accurate
     if (.not. length > 0.0_wp) return
+    outcome = iterations_used_up
     basis(1)%v = basis(1)%v/length
     g = 0.0_wp
     g(1) = length
@@ -349,15 +374,20 @@ contains
         h(i, k) = rotated
       end do
       length = hypot(h(k, k), h(k + 1, k))
-      if (.not. length > 0.0_wp) exit
+      if (.not. length > 0.0_wp) then
+        outcome = solution_broke_off
+        exit
+      end if
       iterations = k
       c(k) = h(k, k)/length
       s(k) = h(k + 1, k)/length
       h(k, k) = length
       g(k + 1) = -s(k)*g(k)
       g(k) = c(k)*g(k)
-      if (abs(g(k + 1)) <= tolerance) exit
+      residual = abs(g(k + 1))
+      if (residual <= tolerance) exit
     end do
+    if (residual <= tolerance) outcome = solution_accurate
 
     do i = iterations, 1, -1
       y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)

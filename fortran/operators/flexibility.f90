@@ -12,13 +12,13 @@
 module hc_flexibility
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_lattice, only: lattice_t
-  use hc_elastic_pair, only: elastic_pair_t
+  use hc_lattice, only: lattice_t, check_lattice
+  use hc_elastic_pair, only: elastic_pair_t, check_pair
   use hc_pyramid_influence, only: k_1, k_xx, k_xy, k_x, k_y
   implicit none
   private
 
-  public :: flexibility_t, normal, along_x, along_y
+  public :: flexibility_t, check_operator, normal, along_x, along_y
   public :: n_block, first_odd_block, blocks, block_index
 
   !> Components of a traction and of a relative displacement.
@@ -29,6 +29,9 @@ module hc_flexibility
   integer, parameter :: n_block = 6, first_odd_block = 5
   !> Block that stands at (onto, from), negative where its sign is reversed.
   integer, parameter :: block_index(3, 3) = reshape([1, -5, -6, 5, 2, 3, 6, 3, 4], [3, 3])
+
+  !> Threads that may be asked for: more than any machine has, fewer than the system refuses to start.
+  integer, parameter :: most_threads = 1024
 
   !> A flexibility operator over the nodes of a window.
   type, abstract :: flexibility_t
@@ -66,6 +69,26 @@ module hc_flexibility
   end interface
 
 contains
+
+  !> Refuse a lattice, elastic constants and a number of threads that no operator can be made with.
+  pure subroutine check_operator(lattice, pair, error, n_threads)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads to use; 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+
+    call check_lattice(lattice, error)
+    if (allocated(error)) return
+    call check_pair(pair, error)
+    if (allocated(error) .or. .not. present(n_threads)) return
+    if (n_threads < 0 .or. n_threads > most_threads) then
+      call raise(error, status%invalid_input, 'the number of threads: 0 (as many as OpenMP would take) to 1024 expected')
+    end if
+  end subroutine check_operator
 
   !> The six blocks of the operator at one distance of nodes.
   pure function blocks(pair, kernel) result(block)

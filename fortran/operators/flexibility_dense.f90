@@ -8,7 +8,7 @@ module hc_flexibility_dense
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, normal, along_y, n_block, blocks, block_index
+  use hc_flexibility, only: flexibility_t, check_operator, normal, along_y, n_block, blocks, block_index
   implicit none
   private
 
@@ -39,13 +39,20 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
-    !> Allocated on failure: not enough memory
+    !> Allocated on failure: a lattice or constants of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
 
+    integer, parameter :: long = selected_int_kind(18)
     type(pyramid_t) :: pyramid
     real(wp) :: offset(2)
     integer :: n(2), col, row, stride, largest, stat
 
+    call check_operator(lattice, pair, error)
+    if (allocated(error)) return
+    if (product(2*int(lattice%extent, long) - 1) > huge(1)) then
+      call raise(error, status%resources, 'the window is too large for a matrix: use method "fft"')
+      return
+    end if
     operator%lattice = lattice
     operator%pair = pair
     n = lattice%extent

@@ -5,7 +5,7 @@ module hc_flexibility_fft
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, n_block, first_odd_block, blocks, block_index
+  use hc_flexibility, only: flexibility_t, check_operator, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t
   use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
@@ -45,7 +45,7 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
-    !> Allocated on failure: not enough memory
+    !> Allocated on failure: a lattice, constants or threads of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> Only the action of the pressure on the gap will be asked for
     logical, intent(in), optional :: normal_only
@@ -61,6 +61,8 @@ contains
     type(kernel_key_t) :: key
     logical :: only_normal, found
 
+    call check_operator(lattice, pair, error, n_threads)
+    if (allocated(error)) return
     only_normal = .false.
     if (present(normal_only)) only_normal = normal_only
     operator%lattice = lattice

@@ -2,19 +2,23 @@
 !>
 !> A load step that does not converge is cut in half, again and again up to a
 !> bound; a state is only taken over when it has converged. In an incremental
-!> path every part starts from the relative displacement that the last one left.
+!> path every part starts from the relative displacement that the last one left; the slip
+!> increment that is recorded is that of all parts, and the residual of the friction conditions is that of this
+!> record, so that it shows how far the parts are from one implicit step.
 !> A static load is applied at once: parts only serve as starts, and the relative
-!> displacement counts from the undeformed bodies.
+!> displacement counts from the undeformed bodies. So it is tried with a step that begins without contact, which no
+!> path precedes: it is the same problem as a static load.
 module hc_load_path
   use hc_precision, only: wp
-  use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, load_target_t, force_control
+  use hc_error, only: error_t, status, raise
+  use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached
+  use hc_contact_residuals, only: tangential_residual
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
   use hc_entry_state, only: solve_with_entry
   implicit none
   private
 
-  public :: advance, touches_rim
+  public :: advance
 
 contains
 
@@ -34,7 +38,8 @@ contains
     integer, intent(in) :: max_sweeps
     !> Times that a step may be halved
     integer, intent(in) :: max_cuts
-    !> The new state; not converged: the attempt that failed; in contact at the rim: nothing was gone on with
+    !> The new state; not converged: the attempt that failed, or a part of the step that reached the rim of the window,
+    !> where nothing was gone on with (stopped is rim_reached, and the residuals of the loads are those of the whole step)
     type(contact_state_t), intent(out) :: next
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
@@ -43,14 +48,24 @@ contains
 
     type(contact_state_t), target :: now
     type(contact_state_t), pointer :: from
-    real(wp), allocatable :: undeformed(:, :, :), slipped(:, :, :)
-    logical :: from_entry
+    real(wp), allocatable :: reference(:, :, :), slipped(:, :, :)
+    logical :: from_entry, at_once
     real(wp) :: done, part, work
     integer :: cuts, sweeps
 
+    call check_target(target%control, target%value, tolerance, max_sweeps, error)
+    if (allocated(error)) return
+    if (max_cuts < 0) then
+      call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
+      return
+    end if
+    call check_state(state, solver%problem%lattice, error)
+    if (allocated(error)) return
     from_entry = .false.
     if (present(interpolated)) from_entry = interpolated
-    if (static) allocate (undeformed, source=0.0_wp*state%relative_displacement)
+    at_once = static .or. .not. (from_entry .or. any(state%pressure > 0.0_wp))
+    if (at_once) allocate (reference, source=state%relative_displacement)
+    if (static) reference = 0.0_wp
     if (from_entry) then
       allocate (slipped, source=0.0_wp*state%relative_displacement)
     else
@@ -64,8 +79,8 @@ contains
     sweeps = 0
     do
       associate (goal => between(state, target, done + part))
-        if (static) then
-          call solver%solve_step(from, undeformed, goal, tolerance, max_sweeps, next, error)
+        if (at_once) then
+          call solver%solve_step(from, reference, goal, tolerance, max_sweeps, next, error)
         else if (from_entry) then
           call solve_with_entry(solver, from, goal, tolerance, max_sweeps, next, error)
         else
@@ -76,14 +91,28 @@ contains
       work = work + next%operator_applications
       sweeps = sweeps + next%sweeps
       if (next%converged) then
-        call add_slip(solver%problem, from, static, next)
+        if (at_once) then
+          call add_slip(solver%problem, state, static, next)
+        else
+          call add_slip(solver%problem, from, static, next)
+        end if
         if (from_entry) slipped = slipped + next%slip_increment
         done = done + part
-        if (done >= 1.0_wp .or. touches_rim(next)) exit
+        if (done >= 1.0_wp .or. next%clipped) exit
         now = next
         from => now
       else
-        if (cuts == max_cuts) exit
+        ! where an attempt that failed has pressure means nothing
+        next%clipped = .false.
+        if (cuts >= max_cuts) then
+          ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
+          if (static .or. .not. at_once .or. max_cuts == 0 .or. next%sliding) exit
+          at_once = .false.
+          from => state
+          done = 0.0_wp
+          part = 1.0_wp
+          cuts = 0
+        end if
         cuts = cuts + 1
         part = 0.5_wp*part
       end if
@@ -91,7 +120,7 @@ contains
     next%cuts = cuts
     next%sweeps = sweeps
     next%operator_applications = work
-    if (.not. static .and. cuts > 0 .and. next%converged) then
+    if (.not. at_once .and. cuts > 0 .and. next%converged) then
       ! the slip of the step is that of all its parts
       if (from_entry) then
         next%slip_increment = slipped
@@ -99,6 +128,15 @@ contains
         next%slip_increment = next%relative_displacement - state%relative_displacement
       end if
       where (spread(next%pressure <= 0.0_wp, 3, 2)) next%slip_increment = 0.0_wp
+      associate (problem => solver%problem)
+        next%residual_tangential = tangential_residual(next%traction, next%slip_increment, next%pressure, problem%friction, &
+                                                       problem%tangential_compliance, problem%n_threads)
+      end associate
+    end if
+    if (next%converged .and. done < 1.0_wp) then
+      next%converged = .false.
+      next%stopped = rim_reached
+      call solver%problem%judge_loads(target, next)
     end if
   end subroutine advance
 
@@ -143,16 +181,5 @@ contains
       end associate
     end if
   end function between
-
-  !> Is there contact at the rim of the window?
-  pure logical function touches_rim(state)
-    !> State
-    type(contact_state_t), intent(in) :: state
-
-    associate (p => state%pressure)
-      touches_rim = any(p(1, :) > 0.0_wp) .or. any(p(size(p, 1), :) > 0.0_wp) .or. &
-                    any(p(:, 1) > 0.0_wp) .or. any(p(:, size(p, 2)) > 0.0_wp)
-    end associate
-  end function touches_rim
 
 end module hc_load_path

@@ -6,7 +6,7 @@ module hc_f2py_api
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: along_x, along_y
@@ -189,6 +189,7 @@ contains
 
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error)
+    if (.not. allocated(error)) call check_size(slot, n_node, error)
     if (.not. allocated(error)) then
       if (method == direct) then
         allocate (slot%direct_contact)
@@ -206,8 +207,7 @@ contains
 
   !> Solve a frictionless contact problem for a load or an approach.
   subroutine solve_normal_contact(handle, control, target, tolerance, max_sweeps, n_node, pressure, gap, zone, &
-                                  normal_load, approach, residuals, sweeps, operator_applications, converged, &
-                                  code, message)
+                                  normal_load, approach, residuals, sweeps, operator_applications, flags, code, message)
     !f2py threadsafe
     !> Handle of the problem
     integer(c_int64_t), intent(in) :: handle
@@ -232,8 +232,8 @@ contains
     integer(c_int), intent(out) :: sweeps
     !> Work, in applications of the full operator
     real(c_double), intent(out) :: operator_applications
-    !> Not zero if the residuals are within the tolerance
-    integer(c_int), intent(out) :: converged
+    !> Not zero: converged; contact at the rim of the window; and why the solver stopped
+    integer(c_int), intent(out) :: flags(3)
     !> Status and its message
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
@@ -265,7 +265,7 @@ contains
     residuals = [state%residual_normal, state%residual_force]
     sweeps = state%sweeps
     operator_applications = state%operator_applications
-    converged = merge(1, 0, state%converged)
+    flags = [merge(1, 0, [state%converged, state%clipped]), state%stopped]
     call report(error, code, message)
   end subroutine solve_normal_contact
 

@@ -6,7 +6,7 @@ module hc_f2py_friction
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
   use hc_friction_law, only: coulomb_t
@@ -14,7 +14,7 @@ module hc_f2py_friction
   use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_flexibility_dense, only: dense_memory
-  use hc_load_path, only: advance, touches_rim
+  use hc_load_path, only: advance
   implicit none
   private
 
@@ -94,6 +94,7 @@ contains
     if (.not. friction%no_slip) friction%coefficient = coefficient
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
+    if (.not. allocated(error)) call check_size(slot, n_node, error)
     if (.not. allocated(error)) then
       call new_friction_problem(problem, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
                                 reshape(candidate /= 0, extent), friction, goodman /= 0, error)
@@ -146,8 +147,8 @@ contains
     integer(c_int), intent(out) :: sweeps, cuts
     !> Work, in applications of the full operator
     real(c_double), intent(out) :: operator_applications
-    !> Not zero: converged; gross sliding; contact at the rim of the window
-    integer(c_int), intent(out) :: flags(3)
+    !> Not zero: converged; gross sliding; contact at the rim of the window; and why the solver stopped
+    integer(c_int), intent(out) :: flags(4)
     !> Status and its message
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
@@ -171,7 +172,7 @@ contains
     if (.not. allocated(error)) then
       call pack_state(next, new_fields, new_numbers)
       zone = reshape(next%zone, [n_node])
-      flags = merge(1, 0, [next%converged, next%sliding, touches_rim(next)])
+      flags = [merge(1, 0, [next%converged, next%sliding, next%clipped]), next%stopped]
     else
       new_numbers = 0.0_c_double
       flags = 0

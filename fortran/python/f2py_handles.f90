@@ -17,7 +17,7 @@ module hc_f2py_handles
   implicit none
   private
 
-  public :: slot_t, kernel_cache, take_slot, enter, leave, free_slot, report, pair_of
+  public :: slot_t, kernel_cache, take_slot, check_size, enter, leave, free_slot, report, pair_of
 
   !> Objects that may exist at a time.
   integer, parameter :: n_slot = 4096
@@ -99,16 +99,25 @@ contains
       call raise(error, status%bad_handle, 'the handle is stale: its object has been freed')
       return
     end if
-    if (slot%lattice%size() /= n_node) then
-      call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
-      return
-    end if
+    call check_size(slot, n_node, error)
+    if (allocated(error)) return
     !$omp critical (hc_handles)
     busy = slot%busy
     slot%busy = .true.
     !$omp end critical (hc_handles)
     if (busy) call raise(error, status%bad_handle, 'the object is at work in another thread')
   end subroutine enter
+
+  !> Refuse arrays that do not fit the window of a slot.
+  pure subroutine check_size(slot, n_node, error)
+    type(slot_t), intent(in) :: slot
+    integer(c_int), intent(in) :: n_node
+    type(error_t), allocatable, intent(out) :: error
+
+    if (slot%lattice%size() /= n_node) then
+      call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
+    end if
+  end subroutine check_size
 
   !> Mark a handle as free for work.
   subroutine leave(slot)

@@ -22,6 +22,7 @@ from .errors import (
     DeckError,
     HexcontactError,
     KernelFolderWarning,
+    PathWarning,
     ResourceError,
     StopRun,
 )
@@ -75,6 +76,7 @@ __all__ = [
     "KernelFolderWarning",
     "Lattice",
     "NormalContact",
+    "PathWarning",
     "ResourceError",
     "Result",
     "Session",

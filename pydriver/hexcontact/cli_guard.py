@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
 import typer
 from typer.core import TyperGroup
 
-from .errors import LACKING, DeckError, HexcontactError, KernelFolderWarning, ResourceError
+from .errors import LACKING, DeckError, HexcontactError, KernelFolderWarning, PathWarning, ResourceError
 from .text import visible
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def warn_plainly() -> None:
     shown = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *more: Any, **options: Any) -> None:
-        if issubclass(category, KernelFolderWarning):
+        if issubclass(category, KernelFolderWarning | PathWarning):
             complain(f"warning: {message}")
         else:
             shown(message, category, *more, **options)

@@ -35,7 +35,7 @@ class Arrows(enum.StrEnum):
 @guarded
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Say what a result holds: origin, history, residuals, the last load step against Hertz."""
-    from . import json_output, summary
+    from . import json_output, remarks, summary
     from .text import rich_table
 
     result = _open(file)
@@ -50,6 +50,8 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
         console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if rows := summary.trial_rows(result):
         console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, rows))
+    for remark in remarks.remarks(histories, result.dataset.attrs):
+        console.print(f"note: {remark}", soft_wrap=True)
     return None
 
 

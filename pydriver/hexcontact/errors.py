@@ -69,6 +69,10 @@ class AccuracyWarning(UserWarning):
     exit_code = 3
 
 
+class PathWarning(UserWarning):
+    """A load step was solved in parts, along a path that the load history does not prescribe."""
+
+
 class ConvergenceError(HexcontactError, RuntimeError):
     """A load step did not meet its tolerance; the last good step is kept.
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ._version import __version__
 from .errors import ConvergenceError, DeckError, Fault, ResourceError
 from .progress import RESIDUALS
+from .remarks import remarks
 from .text import visible
 
 if TYPE_CHECKING:
@@ -148,13 +149,15 @@ def of_result(result: Result) -> dict[str, Any]:
     attributes["complete"] = result.complete
     sizes = result.dataset.sizes
     fields = [str(name) for name, v in result.dataset.data_vars.items() if v.dims == ("step", "row", "col")]
+    histories = histories_of(result)
     return {
         "file": result.path,
         **attributes,
         "rows": sizes["row"],
         "columns": sizes["col"],
         "fields": fields,
-        "steps": of_steps(histories_of(result)),
+        "warnings": remarks(histories, attributes),
+        "steps": of_steps(histories),
     }
 
 

@@ -77,6 +77,7 @@ def error(
         "iterations": solution.sweeps,
         "halvings": getattr(solution, "cuts", 0),
         "tolerance": case.solver.tolerance,
+        "stopped": solution.stopped,
         "residuals": residuals,
         "worst": worst._asdict(),
     }
@@ -95,6 +96,8 @@ def error(
     elif worst.what and worst.value > case.solver.tolerance:
         times = worst.value / case.solver.tolerance
         lines.append(f"worst is {worst.residual}, {_number(times)} times its bound: {worst.what}")
+    if solution.stopped:
+        lines.append(f"the last attempt ended since {solution.stopped}")
     if target.ramp is not None:
         lines.append(f"it is {LEAST:.1%} of its segment, the least of adaptive steps")
     lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful, target.ramp is not None))}")

@@ -236,6 +236,12 @@ def step_error_share(history: Mapping[str, Any]) -> float | None:
     return None if math.isnan(error) or not area else error / area
 
 
+def halved(history: Mapping[str, Any]) -> str:
+    """Say how often a step was halved until the solver converged; empty if it was not."""
+    cuts = int(history.get("cuts", 0))
+    return f"halved {cuts} time{'s' * (cuts > 1)}" if cuts else ""
+
+
 def residuals(history: Mapping[str, Any]) -> dict[str, float]:
     """Return the residuals that there are, by the symbol of the theory."""
     found = {sign: float(history.get(name, math.nan)) for sign, name in RESIDUALS.items()}
@@ -261,6 +267,7 @@ def describe(history: Mapping[str, Any], short: bool = False) -> str:
         if not short:
             parts.append(f"radius {quantity(fitted('contact_radius', history), 'm')}")
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
+    parts.append(halved(history))
     if not short:
         parts.append(quantity(history["seconds"], "s", 3))
     return "  ".join(part for part in parts if part)

@@ -18,6 +18,7 @@ from .cli_options import LogLevel, setting
 from .errors import AccuracyWarning, DeckError
 from .interruption import Interrupted, in_background
 from .progress import reporter
+from .remarks import remarks
 from .store import open_result
 from .text import rich_table, visible
 
@@ -115,7 +116,11 @@ class Listeners:
         if shortfall:
             complain(shortfall)
         if self.as_json:
-            told = [*warnings, *([shortfall] if shortfall else [])]
+            told = [
+                *warnings,
+                *remarks(histories, solve.parameters_of(case)),
+                *([shortfall] * bool(shortfall)),
+            ]
             written: dict[str, Any] = {"output": target, "picture": picture, "warnings": told}
             written["exit_code"] = AccuracyWarning.exit_code if shortfall else 0
             return written | json_output.of_run(case, case.title, histories)
@@ -179,7 +184,7 @@ def summarize(
         console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if refined is not None:
         console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
-    if remark := summary.limited_steps(histories, case.solver.step_tolerance):
+    for remark in remarks(histories, solve.parameters_of(case)):
         console.print(f"note: {remark}", soft_wrap=True)
     console.print(visible(f"written: {target}" + (f", {picture}" if picture else "")), soft_wrap=True)
 
@@ -189,7 +194,8 @@ def was_finished(file: Path, picture: Path | None, listeners: Listeners) -> dict
     if listeners.as_json:
         result = open_result(file)
         histories, case = json_output.histories_of(result), summary.case_of(result)
-        written: dict[str, Any] = {"output": file, "picture": picture, "warnings": []}
+        told = remarks(histories, result.dataset.attrs)
+        written: dict[str, Any] = {"output": file, "picture": picture, "warnings": told}
         return written | json_output.of_run(case, result.case_title, histories)
     if not listeners.quiet:
         drawn = f"; written: {picture}" if picture else ""

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import log, nonconvergence
-from .errors import AccuracyWarning, HexcontactError, StopRun
+from .errors import AccuracyWarning, HexcontactError, PathWarning, StopRun
 from .load_series import LOADS
 from .progress import Reporter, reporter
+from .remarks import unasked_path
 from .result import Metadata, Result, Step, assemble
 from .text import visible
 from .window import kind_of
@@ -100,6 +101,8 @@ def run(
     -----
     AccuracyWarning
         If the lattice could not be refined until the accuracy of the case was reached.
+    PathWarning
+        If a static load step, or one that begins without contact, had to be solved in parts.
 
     Raises
     ------
@@ -288,6 +291,7 @@ def _solved(
             segment, begun = target.segment, reached_by_now
         if adaptive and target.ramp is not None:
             for step, reached in adaptive.steps(state, target, begun):
+                _warn_of_path(case, step, state)
                 yield step
                 state, reached_by_now = reached, _standing(step.history)
             window = adaptive.window
@@ -305,8 +309,19 @@ def _solved(
         step = window.step(target, reached, state, started)
         if adaptive:
             adaptive.window, step = window, adaptive.given(step)
+        _warn_of_path(case, step, state)
         yield step
         state, reached_by_now = reached, _standing(step.history)
+
+
+def _warn_of_path(case: Problem, step: Step, before: Any) -> None:
+    """Warn of a load step that was halved where nothing prescribes the path of its parts."""
+    static = case.solver.algorithm == "static"
+    if step.history.get("cuts") and (static or before is None or not (before.pressure > 0).any()):
+        in_parts = float(step.history["residual_tangential"]) > case.solver.tolerance
+        words = unasked_path([step.number], in_parts)
+        log.logger.warning(log.words("halved", step=step.number, warning=words))
+        warnings.warn(words, PathWarning, stacklevel=2)
 
 
 def _adaptive(case: Problem, window: Any, before: Sequence[Step]) -> AdaptivePath | None:

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .errors import HexcontactError
-from .messages import listed
 from .progress import (
     LOADS_AND_MOTIONS,
     error_of,
     fitted,
+    halved,
     is_frictional,
     load_or_motion,
     residuals,
@@ -38,7 +38,6 @@ History = Mapping[str, Any]
 Row = tuple[str, ...]
 
 _MOST_ROWS = 24  # steps shown of a long history
-_MOST_NAMED = 8  # load steps named in a remark
 _FURTHER = {  # shown of a load step besides loads and motions
     "max_pressure": "Pa",
     "max_traction": "Pa",
@@ -192,24 +191,11 @@ def step_rows(history: History) -> list[Row]:
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
     if (error := step_error_share(history)) is not None:
-        halved = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
-        words = f"stick area within {100 * error:.1f} % of the contact area, {halved + 0.0:+.2f} % by halving"
+        change = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
+        words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"
         rows.append(("load steps", words))
     found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
     return [*rows, ("residuals", found), ("work", _work(history))]
-
-
-def limited_steps(histories: Sequence[History], tolerance: float) -> str:
-    """Say which adaptive load steps missed their tolerance; empty if none did."""
-    missed = [k for k, history in enumerate(histories, start=1) if history.get("step_limited") == 1]
-    if not missed:
-        return ""
-    named = listed([f"{k}" for k in missed[:_MOST_NAMED]] + ["..."] * (len(missed) > _MOST_NAMED), "and")
-    return (
-        f"{len(missed)} of {len(histories)} load steps change more by halving than solver.step_tolerance = "
-        f"{tolerance:g}, and smaller ones did not help: step{'s' * (len(missed) > 1)} {named}; their "
-        "stick_area_step_error holds"
-    )
 
 
 def _words(name: str) -> str:
@@ -227,10 +213,9 @@ def _stick(history: History) -> str:
 
 
 def _work(history: History) -> str:
-    cuts = history.get("cuts", 0)
-    halved = f"halved {cuts} time{'s' * (cuts > 1)}, " if cuts else ""
+    parts = f"{halved(history)}, " if halved(history) else ""
     return (
-        f"{history['sweeps']} iterations, {halved}{history['operator_applications']:.3g} operator "
+        f"{history['sweeps']} iterations, {parts}{history['operator_applications']:.3g} operator "
         f"applications, {quantity(history['seconds'], 's', 3)}"
     )
 

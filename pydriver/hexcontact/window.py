@@ -18,7 +18,6 @@ from . import memory
 from .edges import ContactEdges
 from .errors import DeckError
 from .estimators import area_radius, pressure_center
-from .grid import rim_sides
 from .load_history import MOTIONS
 from .load_series import LOADS
 from .messages import listed
@@ -188,8 +187,8 @@ class Window(ABC, Generic[S]):
         """Return what has one value by step beyond load, approach and contact area."""
 
     def outgrown(self, solution: S) -> bool:
-        """Tell whether the contact reaches the rim of the window."""
-        return any(rim_sides(solution.zone > 0))
+        """Tell whether the contact reached the rim of the window, be it in a part of the step only."""
+        return solution.touches_rim
 
     def grown(self, solution: S, target: LoadStep) -> Self:
         """Return a larger window for a contact that reached the rim; this one is of no use any more.

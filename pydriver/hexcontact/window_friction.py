@@ -66,13 +66,6 @@ class FrictionWindow(Window["ContactState"]):
             tolerance=self.case.solver.tolerance,
         )
 
-    def outgrown(self, solution: ContactState) -> bool:
-        """Tell whether the contact reached the rim, be it in a part of the step only.
-
-        Where an attempt that failed puts pressure means nothing.
-        """
-        return solution.converged and solution.touches_rim
-
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
         """Return a state on this window; what the new nodes have been through follows from it."""
         return None if state is None else self._contact.extended(state, lattice)

@@ -410,7 +410,7 @@ contains
     real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:), none(:, :)
     logical, allocatable :: active(:)
     real(wp) :: no_multiplier(0), residual
-    integer :: level, side, n, iterations
+    integer :: level, side, n, iterations, outcome
 
     pair = elastic_pair_t(1.0_wp, 0.0_wp, 0.5_wp)
     do level = 1, 2
@@ -433,7 +433,7 @@ contains
       image = 0.0_wp
       rhs = merge(1.0_wp, 0.0_wp, active)
       call projected_cg(system, active, none, none, rhs, unknown, image, 1.0e-6_wp, 100, no_multiplier, residual, &
-                        iterations, error)
+                        iterations, outcome, error)
       if (allocated(error)) return
       call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 10, 'iterations')
       if (allocated(error)) return

@@ -4,14 +4,15 @@ module test_load_path
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
-    normal, along_x, along_y, about_z
+  use hc_contact_residuals, only: tangential_residual
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, rim_reached, &
+    force_control, displacement_control, normal, along_x, along_y, about_z
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t, new_friction_problem
   use hc_frictional_contact, only: frictional_contact_t
   use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction
   use hc_entry_state, only: entry_displacement
-  use hc_load_path, only: advance, touches_rim
+  use hc_load_path, only: advance
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_true
   implicit none
@@ -23,6 +24,8 @@ module test_load_path
   type, extends(friction_solver_t) :: short_sighted_t
     !> How far load or motion may be from the start's
     real(wp) :: reach = huge(1.0_wp)
+    !> The relative displacement has to be counted from somewhere near, too
+    logical :: only_near = .false.
     !> Pressed harder than this, the rim is in contact
     real(wp) :: rim_load = huge(1.0_wp)
     !> Targets so far, and whether the relative displacement was counted from zero
@@ -66,6 +69,7 @@ contains
     tests = [ &
       new_test('whole', test_whole), &
       new_test('halved', test_halved), &
+      new_test('halved_at_first', test_halved_at_first), &
       new_test('bounded', test_bounded), &
       new_test('static', test_static), &
       new_test('motions', test_motions), &
@@ -107,6 +111,8 @@ contains
     state%operator_applications = 2.0_wp
     state%residual_normal = maxval(abs(target%value - merge(start%load, start%motion, target%control == f)))
     state%converged = state%residual_normal <= self%reach
+    if (self%only_near) state%converged = state%converged .and. maxval(abs(state%slip_increment)) <= self%reach
+    state%clipped = touches_rim(state)
     if (tolerance < 0.0_wp) allocate (error)
   end subroutine solve_step
 
@@ -175,6 +181,8 @@ contains
 
     call set_up(solver, state, error)
     if (allocated(error)) return
+    ! contact, without any load
+    state%pressure(2, 2) = tiny(1.0_wp)
     solver%reach = 2.5_wp
     call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
     if (allocated(error)) return
@@ -200,6 +208,38 @@ contains
     ! loads 1, 2, 3, 4 over 1 m each
     call check(error, [next%accumulated_slip(2, 2), next%dissipated_energy], [4.0_wp, 10.0_wp], 1.0e-14_wp, 'path and energy')
   end subroutine test_halved
+
+  !> A step that begins without contact is solved as one, its parts are starts; if that fails they are a path.
+  subroutine test_halved_at_first(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    state%relative_displacement(:, :, 1) = 1.0_wp
+    state%accumulated_slip = 0.5_wp
+    state%dissipated_energy = 2.0_wp
+    solver%reach = 2.5_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    call check(error, solver%value(2, :solver%calls), [4.0_wp, 2.0_wp, 1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp], 0.0_wp, 'starts')
+    if (allocated(error)) return
+    ! from 1 m to -4 m under the last load, and not a part of it under each of them
+    call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
+               [-5.0_wp, 5.5_wp, 22.0_wp], 1.0e-14_wp, 'slip, path and energy of one step')
+    if (allocated(error)) return
+    call check(error, next%cuts, 2, 'cuts')
+    if (allocated(error)) return
+    solver%calls = 0
+    solver%only_near = .true.
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 3, next, error)
+    if (allocated(error)) return
+    call check_true(error, next%converged .and. next%cuts == 2, 'a path')
+    if (allocated(error)) return
+    call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
+               [-5.0_wp, 5.5_wp, 13.0_wp], 1.0e-14_wp, 'slip, path and energy of the parts')
+  end subroutine test_halved_at_first
 
   !> As many cuts as are allowed, then a state that says so; the state handed in is as it was.
   subroutine test_bounded(error)
@@ -289,6 +329,16 @@ contains
     call check_true(error, touches_rim(next) .and. .not. touches_rim(state), 'contact at the rim')
     if (allocated(error)) return
     call check(error, next%load(normal), 4.0_wp, 0.0_wp, 'the first part that reaches the rim is the last')
+    if (allocated(error)) return
+    call check_true(error, next%clipped .and. .not. next%converged .and. next%stopped == rim_reached, 'a part is no solution')
+    if (allocated(error)) return
+    call check(error, next%residual_force, 0.5_wp, 1.0e-15_wp, 'half of the load of the step is missing')
+    if (allocated(error)) return
+    ! an attempt that failed may have pressure anywhere
+    solver%reach = 0.5_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 0, next, error)
+    if (allocated(error)) return
+    call check_true(error, touches_rim(next) .and. .not. (next%clipped .or. next%converged), 'not clipped, but not converged')
   end subroutine test_rim
 
   !> Too few sweeps for a whole step, but enough for its parts: the solution is that of explicit parts.
@@ -338,6 +388,15 @@ contains
     call check(error, reshape(cut%accumulated_slip, [441]), reshape(parts%accumulated_slip, [441]), 1.0e-8_wp, 'slip path')
     if (allocated(error)) return
     call check(error, cut%dissipated_energy, parts%dissipated_energy, 1.0e-8_wp*abs(parts%dissipated_energy), 'energy')
+    if (allocated(error)) return
+    ! each part fulfils the conditions; the record does not, as one step, and its residual says so
+    associate (problem => contact%problem)
+      call check(error, cut%residual_tangential, &
+                 tangential_residual(cut%traction, cut%slip_increment, cut%pressure, problem%friction, &
+                                     problem%tangential_compliance, 1), 0.0_wp, 'residual of what is recorded')
+    end associate
+    if (allocated(error)) return
+    call check_true(error, cut%converged .and. cut%residual_tangential > 1.0e-3_wp, 'a residual that is not hidden')
     if (allocated(error)) return
     ! and it is another solution than that of the whole step
     call advance(contact, pressed, target, .false., tolerance, 60, 0, next, error)

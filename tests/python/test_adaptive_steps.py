@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from hexcontact import Case, ConvergenceError, DeckError, adaptive_steps, estimates, summary
+from hexcontact import Case, ConvergenceError, DeckError, adaptive_steps, estimates, remarks, summary
 from hexcontact.progress import Lines, describe
 from hexcontact.restart import resume
 from hexcontact.result import Result, Step
@@ -268,11 +268,11 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
         case.run(on_step=on_step)
     last, number = histories[-1], len(histories)
     assert last["stick_area_step_error"] > 1e-4 * last["contact_area_fit"]
-    assert summary.limited_steps(histories, 1e-4) == (
+    assert remarks.limited_steps(histories, 1e-4) == (
         f"1 of {number} load steps change more by halving than solver.step_tolerance = 0.0001, and smaller "
         f"ones did not help: step {number}; their stick_area_step_error holds"
     )
-    assert summary.limited_steps(histories[:-1], 1e-4) == ""
+    assert remarks.limited_steps(histories[:-1], 1e-4) == ""
 
 
 def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:

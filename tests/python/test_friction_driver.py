@@ -1,5 +1,6 @@
 """Runs with friction: what a step holds, control and ramps, windows that grow, what stops a run."""
 
+import html
 import io
 import itertools
 import math
@@ -14,12 +15,23 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 from typer.testing import CliRunner
 
-from hexcontact import memory, native, native_friction, solve, summary
+from hexcontact import (
+    influence,
+    json_output,
+    memory,
+    native,
+    native_friction,
+    remarks,
+    report,
+    solve,
+    summary,
+)
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.cli import app
-from hexcontact.errors import ConvergenceError, DeckError, ResourceError
+from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
 from hexcontact.estimators import area_radius
+from hexcontact.lattice import Lattice
 from hexcontact.load_history import LoadStep, Target
 from hexcontact.native_friction import ContactState, FrictionalContact
 from hexcontact.progress import Lines, describe
@@ -509,6 +521,82 @@ def test_a_step_that_was_halved_is_one_step(monkeypatch: pytest.MonkeyPatch) -> 
     spent = halved.history["dissipated_energy"] - before.history["dissipated_energy"]
     assert halved.history["dissipated_energy_step"] == pytest.approx(spent, rel=1e-12)
     assert f"halved {halved.history['cuts']} time" in dict(summary.step_rows(halved.history))["work"]
+    # the residual is that of what is recorded: of one step with the slip of all parts
+    assert float(whole.history["residual_tangential"]) <= 1e-8 < 1e-3 < residual_of(halved, 0.1)
+    assert halved.history["residual_tangential"] == pytest.approx(residual_of(halved, 0.1), rel=1e-9)
+
+
+def residual_of(step: Step, mu: float) -> float:
+    """Return R_t from the fields of a step: max |q - P(q - ds/d_t)|/(mu p_max), P the cut to the cone."""
+    pair, field = sphere().pair, step.fields
+    kernels = influence.pyramid_kernels(0.0, 0.0)
+    compliance = (
+        pair.lambda_1 * float(kernels.K1) + pair.lambda_5 * float(kernels.Kxx)
+    ) * step.lattice.spacing
+    q = np.stack([field["traction_x"], field["traction_y"]])
+    trial = q - np.stack([field["slip_increment_x"], field["slip_increment_y"]]) / compliance
+    share = np.minimum(1.0, mu * field["pressure"] / np.maximum(np.hypot(*trial), 1e-300))
+    wrong = np.where(field["pressure"] > 0, np.hypot(*(q - share * trial)), 0.0)
+    return float(wrong.max() / (mu * field["pressure"].max()))
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "in_parts"), [("incremental", True), ("incremental", False), ("static", False)]
+)
+def test_a_first_step_in_parts_is_warned_of_and_named(
+    algorithm: str, in_parts: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = FrictionalContact.advance
+
+    def advance(self: FrictionalContact, state: ContactState, *arguments: Any, **keys: Any) -> ContactState:
+        reached = original(self, state, *arguments, **keys)
+        residual = 0.047 if in_parts else reached.residual_tangential
+        cold = not (state.pressure > 0).any()
+        return replace(reached, cuts=2, residual_tangential=residual) if cold else reached
+
+    monkeypatch.setattr(FrictionalContact, "advance", advance)
+    file = tmp_path / "out.nc"
+    case = sphere(algorithm=algorithm, loads=[{"normal_load": 31.5}, {"normal_load": 40.0}])
+    # one warning: the second load begins in contact, and converges as a whole
+    with pytest.warns(PathWarning) as warned:
+        result = case.run(file)
+    assert result.dataset["cuts"].values.tolist() == [2, 0]
+    [warning] = warned.list
+    expected = "contact and did not converge as a whole" if in_parts else "solutions for smaller loads"
+    assert str(warning.message).startswith("step 1 ") and expected in str(warning.message)
+    told = remarks.remarks(result.history.reset_index().to_dict("records"), result.dataset.attrs)
+    assert told[0] == str(warning.message)
+    assert told[1].startswith("1 of 2 load steps did not converge at once: step 1 (halved 2 times); ")
+    assert told[1].endswith("up to 4.7e-02" if in_parts else "fulfil the conditions all the same")
+    assert "halved 2 times" in describe(result.history.iloc[0].to_dict())
+    page = report.report(result)
+    assert all(html.escape(sentence) in page for sentence in told)
+    shown = CliRunner().invoke(app, ["info", str(file)]).output
+    assert all(f"note: {sentence}" in shown for sentence in told)
+    assert json_output.of_result(result)["warnings"] == told
+
+
+def test_a_first_step_does_not_depend_on_the_window() -> None:
+    """On the wide window it is found from smaller loads; taken as a path, these dissipated half as much."""
+    pair = native.ElasticPair.from_materials(None, None, 1e9, 0.1)
+    load = 4.0 / 3.0 * pair.effective_modulus
+    found = []
+    for side in (16, 54):
+        lattice = Lattice(1 / 12, -side, -side, 2 * side + 1, 2 * side + 1)
+        gap = 0.5 * (lattice.x**2 + lattice.y**2)
+        contact = FrictionalContact(lattice, pair, gap, friction_coefficient=1.0)
+        found.append(contact.advance(contact.virgin(), ["force"] * 4, [load, 0.0, 0.0, 0.0]))
+    small, large = found
+    assert small.converged and large.converged
+    assert max(state.residual_tangential for state in found) <= 1e-8
+    assert large.dissipated_energy == pytest.approx(small.dissipated_energy, rel=1e-7)
+    assert (small.zone == 1).sum() == (large.zone == 1).sum()
+
+
+def test_steps_that_were_not_halved_are_not_mentioned() -> None:
+    result = sphere().run()
+    assert remarks.remarks(result.history.to_dict("records"), result.dataset.attrs) == []
+    assert "halved" not in describe(result.history.iloc[0].to_dict())
 
 
 # --- what is shown --------------------------------------------------------------------------------

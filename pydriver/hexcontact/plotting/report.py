@@ -22,6 +22,7 @@ from .. import summary
 from .._version import __version__
 from ..errors import DeckError
 from ..progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
+from ..remarks import remarks
 from ..step_view import scaled
 from ..text import escaped, quantity
 from ..variables import VARIABLES
@@ -117,7 +118,7 @@ def report(result: Result) -> str:
     page = resources.files("hexcontact").joinpath("data/report.html").read_text(encoding="utf-8")
     parts = dict(
         title=escaped(title),
-        status=_status(result),
+        status=_status(result, histories),
         kept=_kept(len(numbers), len(histories)),
         inputs=_pairs(_inputs(result)),
         loads=_loads(histories),
@@ -134,16 +135,18 @@ def report(result: Result) -> str:
 # --- words ----------------------------------------------------------------------------------------
 
 
-def _status(result: Result) -> str:
-    if result.shortfall:
-        return f'<p class="warning" role="note">{escaped(result.shortfall)}</p>'
-    if result.complete:
-        return ""
+def _status(result: Result, histories: Sequence[History]) -> str:
+    notes = [_unfinished(result), *remarks(histories, result.dataset.attrs)]
+    return "".join(f'<p class="warning" role="note">{escaped(note)}</p>' for note in notes if note)
+
+
+def _unfinished(result: Result) -> str:
+    if result.shortfall or result.complete:
+        return result.shortfall
     planned = int(result.dataset.attrs.get("planned_steps", 0))
     reason = str(result.dataset.attrs.get("stopped", ""))
     of = f" of {planned}" if planned else ""
-    text = f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
-    return f'<p class="warning" role="note">{escaped(text)}</p>'
+    return f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
 
 
 def _kept(shown: int, steps: int) -> str:

@@ -28,9 +28,8 @@ module hc_krylov
   public :: solution_accurate, iterations_used_up, solution_broke_off
   public :: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil
 
-  !> Why a linear solver stopped: the residual is as small as it was to be; all iterations allowed were made; no
-  !> direction is left along which it falls, by rounding errors, a matrix that is not positive definite, or numbers that
-  !> are not finite. From best to worst.
+  !> Why a linear solver stopped, from best to worst: the residual is within its bound; all iterations allowed were made;
+  !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
   integer, parameter :: solution_accurate = 1, iterations_used_up = 2, solution_broke_off = 3
 
   !> A symmetric positive definite operator with a preconditioner, on fields that
@@ -103,13 +102,11 @@ contains
     logical, intent(out) :: independent
     !> Threads to use
     integer, intent(in) :: n_threads
-    real(wp) :: share(size(missing)), inverse(size(missing), size(missing))
+    real(wp) :: inverse(size(missing), size(missing))
     integer :: m
 
     call invert_gram(rows, mb, inverse, independent, n_threads)
-    if (.not. independent) return
-    share = [(dot_product(inverse(m, :), missing), m=1, size(share))]
-    call add_columns(mb, share, x, n_threads)
+    if (independent) call add_columns(mb, [(dot_product(inverse(m, :), missing), m=1, size(missing))], x, n_threads)
   end subroutine fulfil
 
   !> (C^T M B)^-1, zero if the constraints depend on each other.
@@ -170,10 +167,8 @@ contains
     real(wp), intent(out) :: multiplier(:)
     !> The largest residual on an active node
     real(wp), intent(out) :: residual
-    !> Iterations taken
-    integer, intent(out) :: iterations
-    !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
-    integer, intent(out) :: outcome
+    !> Iterations taken; why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer, intent(out) :: iterations, outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -299,10 +294,8 @@ contains
     logical, intent(out) :: independent
     !> Euclidean norm of the weighted residuals that is left, but for rounding errors
     real(wp), intent(out) :: residual
-    !> Iterations taken
-    integer, intent(out) :: iterations
-    !> Why it stopped: solution_accurate, iterations_used_up or solution_broke_off
-    integer, intent(out) :: outcome
+    !> Iterations taken; why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer, intent(out) :: iterations, outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -374,10 +367,8 @@ contains
         h(i, k) = rotated
       end do
       length = hypot(h(k, k), h(k + 1, k))
-      if (.not. length > 0.0_wp) then
-        outcome = solution_broke_off
-        exit
-      end if
+      if (.not. length > 0.0_wp) outcome = solution_broke_off
+      if (outcome == solution_broke_off) exit
       iterations = k
       c(k) = h(k, k)/length
       s(k) = h(k + 1, k)/length

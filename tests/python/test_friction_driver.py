@@ -15,17 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 from typer.testing import CliRunner
 
-from hexcontact import (
-    influence,
-    json_output,
-    memory,
-    native,
-    native_friction,
-    remarks,
-    report,
-    solve,
-    summary,
-)
+from hexcontact import influence, json_output, memory, native, native_friction, remarks, solve, summary
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.cli import app
@@ -34,6 +24,7 @@ from hexcontact.estimators import area_radius
 from hexcontact.lattice import Lattice
 from hexcontact.load_history import LoadStep, Target
 from hexcontact.native_friction import ContactState, FrictionalContact
+from hexcontact.plotting import report
 from hexcontact.progress import Lines, describe
 from hexcontact.result import Result, Step
 from hexcontact.store import Journal, journal_of, open_result

@@ -255,7 +255,7 @@ def test_netcdf_and_the_history_of_a_result(folder: Path) -> None:
     again = Case.from_toml(put("deck.toml", SERIES.replace('"history.csv"', columns)))
     np.testing.assert_allclose(targets(again), targets(case), rtol=1e-12)
     (first, *_) = complaint(put("deck.toml", SERIES.replace("history.csv", "result.nc")))
-    assert "result.nc: unknown column" in first or "expected normal_load or approach" in first
+    assert "XX" in first
 
 
 def test_arrays(folder: Path) -> None:

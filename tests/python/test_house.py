@@ -162,17 +162,6 @@ def test_readme_python_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -
     assert program.endswith(f"# {capsys.readouterr().out}")
 
 
-def test_readme_deck_gives_the_table_shown(tmp_path: Path) -> None:
-    readme = (ROOT / "README.md").read_text()
-    (tmp_path / "spheres.toml").write_text(block_of(readme, "toml"))
-    words = [sys.executable, "-m", "hexcontact", "run", "spheres.toml"]
-    wide = os.environ | {"COLUMNS": "80"}
-    done = subprocess.run(words, cwd=tmp_path, env=wide, capture_output=True, text=True, check=True)
-    rows = [line.rstrip() for line in done.stdout.partition("Against Hertz")[2].splitlines()]
-    assert len([row for row in rows if row]) > 4
-    assert [row for row in rows if row and row not in readme] == []
-
-
 @pytest.mark.parametrize(
     ("given", "seen"),
     [({}, "1000"), ({"GOMP_SPINCOUNT": "7"}, "7"), ({"OMP_WAIT_POLICY": "active"}, "None")],

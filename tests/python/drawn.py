@@ -176,12 +176,16 @@ def added_strokes(figure: Figure, kind: str) -> int:
     return found[0] - found[1]
 
 
-def alike(picture: np.ndarray, reference: np.ndarray) -> float:
-    """Return the largest difference of two pictures of one size, each averaged over 8 by 8 pixels, 0 to 255."""
+def apart(picture: np.ndarray, reference: np.ndarray) -> float:
+    """Return the share of two pictures of one size in which they differ, square by square of 8 by 8 pixels.
+
+    A square differs if the mean of a color is 10 of 255 off: less is what fewer colors and other fonts make.
+    """
     assert picture.shape == reference.shape
 
     def blurred(image: np.ndarray) -> np.ndarray:
         rows, cols = (length // 8 * 8 for length in image.shape[:2])
         return image[:rows, :cols].reshape(rows // 8, 8, cols // 8, 8, 3).mean(axis=(1, 3))
 
-    return float(np.abs(blurred(picture.astype(float)) - blurred(reference.astype(float))).max())
+    off = np.abs(blurred(picture.astype(float)) - blurred(reference.astype(float))).max(axis=2)
+    return float((off > 10.0).mean())

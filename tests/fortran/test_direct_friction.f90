@@ -215,7 +215,7 @@ contains
 
   !> gamma = 0: c/a = (1 - Q/muP)^(1/3), shift = (3 mu P S/16 a) [1 - (1 - Q/muP)^(2/3)], S = 4 for E* = 1.
   !>
-  !> At 12 spacings in the radius the shift is good to 0.2 %, and c/a to a node or two on the circumference.
+  !> At 12 spacings in the radius the shift is good to 2e-4, and c/a to a node or two on the circumference.
   subroutine test_cattaneo_mindlin(error)
     type(error_t), allocatable, intent(out) :: error
     type(friction_problem_t) :: problem
@@ -237,9 +237,9 @@ contains
     do i = 1, 2
       call step(solver, state, [f, f, f, d], [load, part(i)*mu*load, 0.0_wp, 0.0_wp], error)
       if (allocated(error)) return
-      call check(error, state%motion(along_x)/full, 1.0_wp - (1.0_wp - part(i))**(2.0_wp/3.0_wp), 2.0e-3_wp, 'shift')
+      call check(error, state%motion(along_x)/full, 1.0_wp - (1.0_wp - part(i))**(2.0_wp/3.0_wp), 1.8e-4_wp, 'shift')
       if (allocated(error)) return
-      call check(error, stick_ratio(state), (1.0_wp - part(i))**(1.0_wp/3.0_wp), 0.04_wp, 'stick radius')
+      call check(error, stick_ratio(state), (1.0_wp - part(i))**(1.0_wp/3.0_wp), 0.0216_wp, 'stick radius')
       if (allocated(error)) return
     end do
     ! at constant normal load one step leads to the same state as many
@@ -262,10 +262,10 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, f], [load, 0.0_wp, 0.0_wp, torque], error)
     if (allocated(error)) return
-    ! 0.2 % is the error of a mesh with 12 spacings in the radius
-    call check(error, state%motion(about_z)/twist, 1.0_wp, 2.0e-3_wp, 'twist')
+    ! 5e-4 is the error of a mesh with 12 spacings in the radius
+    call check(error, state%motion(about_z)/twist, 1.0_wp, 5.2e-4_wp, 'twist')
     if (allocated(error)) return
-    call check(error, stick_ratio(state), 0.8_wp, 0.04_wp, 'stick radius')
+    call check(error, stick_ratio(state), 0.8_wp, 0.0238_wp, 'stick radius')
     if (allocated(error)) return
     call step(solver, driven, [f, d, d, d], [load, 0.0_wp, 0.0_wp, state%motion(about_z)], error)
     if (allocated(error)) return
@@ -286,11 +286,11 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call check(error, maxval(state%pressure)*pi/2.0_wp, 1.0350_wp, 1.0e-3_wp, 'largest pressure')
+    call check(error, maxval(state%pressure)*pi/2.0_wp, 1.0350_wp, 4.6e-4_wp, 'largest pressure')
     if (allocated(error)) return
     call check(error, state%motion(normal), 0.9972_wp, 3.0e-4_wp, 'approach')
     if (allocated(error)) return
-    call check(error, stick_ratio(state), 0.2155_wp, 0.01_wp, 'stick radius')
+    call check(error, stick_ratio(state), 0.2155_wp, 0.003_wp, 'stick radius')
     if (allocated(error)) return
     call check_true(error, state%sweeps <= 25, 'a sensible number of linear solutions')
   end subroutine test_dissimilar
@@ -321,8 +321,8 @@ contains
     end do
     call check_true(error, all(rough%zone /= slip), 'no slip')
     if (allocated(error)) return
-    ! the ratio is off by 2e-3 with 10 spacings in the radius
-    call check(error, rough%load(normal)/smooth%load(normal), atanh(beta)/beta, 3.0e-3_wp, 'stiffness')
+    ! the ratio is off by 7e-4 with 10 spacings in the radius
+    call check(error, rough%load(normal)/smooth%load(normal), atanh(beta)/beta, 8.2e-4_wp, 'stiffness')
   end subroutine test_no_slip_punch
 
   !> mu = 0 is the frictionless method.
@@ -528,7 +528,7 @@ contains
     if (allocated(error)) return
     call step(solver, state, [d, d, d, f], [0.5_wp, 1.0_wp, -2.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call check(error, norm2(state%load(along_x:along_y))/(0.6_wp*state%load(normal)), 1.0_wp, 5.0e-3_wp, 'full slip')
+    call check(error, norm2(state%load(along_x:along_y))/(0.6_wp*state%load(normal)), 1.0_wp, 9.2e-5_wp, 'full slip')
     if (allocated(error)) return
     ! the same loads again: nothing slips any more
     call step(solver, state, [d, d, d, d], state%motion, error)
@@ -536,7 +536,7 @@ contains
     call check(error, largest(state%slip_increment), 0.0_wp, 1.0e-9_wp, 'no motion, no slip')
   end subroutine test_strong_coupling
 
-  !> A history through both methods: tractions to 1e-6 mu p_max, motions likewise.
+  !> A history through both methods, solved to 1e-10: tractions to 1e-9 mu p_max, motions likewise.
   subroutine test_methods_agree(error)
     type(error_t), allocatable, intent(out) :: error
     type(friction_problem_t) :: problem
@@ -563,9 +563,9 @@ contains
       if (allocated(error)) return
       call step(fft, other, [f, f, f, f], value(:, i), error)
       if (allocated(error)) return
-      call check(error, difference(one, other), 0.0_wp, 1.0e-6_wp*mu, 'tractions')
+      call check(error, difference(one, other), 0.0_wp, 1.0e-9_wp*mu, 'tractions')
       if (allocated(error)) return
-      call check(error, one%motion, other%motion, 1.0e-6_wp*mu, 'motions')
+      call check(error, one%motion, other%motion, 1.0e-9_wp*mu, 'motions')
       if (allocated(error)) return
     end do
   end subroutine test_methods_agree

@@ -91,9 +91,9 @@ contains
       if (allocated(error)) return
       call check_true(error, predicted, 'a prediction')
       if (allocated(error)) return
-      call check(error, largest(guess%pressure - state%pressure), 0.0_wp, 1.0e-6_wp*p_max, 'pressure')
+      call check(error, largest(guess%pressure - state%pressure), 0.0_wp, 1.0e-12_wp*p_max, 'pressure')
       if (allocated(error)) return
-      call check(error, largest(guess%traction - state%traction), 0.0_wp, 1.0e-6_wp*p_max, 'shear traction')
+      call check(error, largest(guess%traction - state%traction), 0.0_wp, 1.0e-12_wp*p_max, 'shear traction')
       if (allocated(error)) return
       call check(error, guess%motion, state%motion, 1.0e-7_wp, 'motions')
       if (allocated(error)) return

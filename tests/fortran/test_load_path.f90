@@ -380,13 +380,13 @@ contains
   end subroutine test_any_start
 
   !> A circular contact grows by 4 and by 12 spacings: near its edge s - s_e is linear in the distance d if the
-  !> edge slips, and goes with d^(3/2) if it sticks. Found to 2 and 1 % of the motion outside.
+  !> edge slips, and goes with d^(3/2) if it sticks. Found to 2 and 0.13 % of the motion outside.
   subroutine test_entry_ring(error)
     type(error_t), allocatable, intent(out) :: error
     type(recorder_t) :: solver
     type(contact_state_t) :: before, after
     real(wp), allocatable :: r(:, :), u(:, :, :), expected(:, :, :)
-    real(wp), parameter :: old = 0.4_wp, power(2) = [1.0_wp, 1.5_wp], allowed(2) = [0.025_wp, 0.015_wp]
+    real(wp), parameter :: old = 0.4_wp, power(2) = [1.0_wp, 1.5_wp], allowed(2) = [0.0201_wp, 0.00133_wp]
     real(wp) :: new, scale
     integer :: i, k
 
@@ -499,7 +499,7 @@ contains
     end do
     call check_true(error, abs(missing(1)) > 0.1_wp, 'slip from the beginning of the step')
     if (allocated(error)) return
-    call check(error, missing(2), 0.0_wp, 3.0e-3_wp, 'slip from the entry')
+    call check(error, missing(2), 0.0_wp, 4.7e-4_wp, 'slip from the entry')
     if (allocated(error)) return
     call check_true(error, state%dissipated_energy <= 1.0e-12_wp .and. all(state%zone /= 2), 'nothing slips')
   end subroutine test_entry_oblique

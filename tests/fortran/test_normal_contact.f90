@@ -371,7 +371,7 @@ contains
     if (allocated(error)) return
     call check_true(error, state%converged .and. 3.0_wp*state%operator_applications < 4.0_wp, 'little work')
     if (allocated(error)) return
-    call check(error, state%motion(normal), 1.0_wp, 2.0e-4_wp, 'approach of Hertz')
+    call check(error, state%motion(normal), 1.0_wp, 1.2e-4_wp, 'approach of Hertz')
     if (allocated(error)) return
     ! another load, which needs another part, and the first one again
     call solver%solve(force_control, 0.1_wp, 1.0e-8_wp, 60, small, error)

@@ -474,7 +474,7 @@ def test_the_time_is_estimated_to_its_order_of_magnitude(name: str, spacing: str
         from hexcontact import Case
         from hexcontact.estimates import seconds
         case = Case.from_toml({str(ROOT / f"cases/{name}.toml")!r}, {{"grid.spacing": {spacing!r}}})
-        next(case.start())  # imports
+        Case.from_toml({str(ROOT / "cases/hertz_spheres.toml")!r}).run()  # imports
         began = time.process_time()
         case.run()
         print(seconds(case) / (time.process_time() - began))

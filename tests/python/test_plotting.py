@@ -247,6 +247,12 @@ def test_section_shows_nodes_hertz_and_their_difference(make: str) -> None:
     is_section(axes[0], axes[-1], StepView.of(result, -1), HERTZ[make]())
 
 
+def test_difference_from_hertz_is_in_percent_of_his_pressure() -> None:
+    result = sphere()
+    result["pressure"] *= 1.03
+    is_section(*plotting.section(result).axes, StepView.of(result, -1), HERTZ["sphere"]())
+
+
 @results
 def test_overview_is_the_map_beside_the_section(make: str) -> None:
     result = RESULTS[make]()

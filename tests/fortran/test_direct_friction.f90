@@ -292,7 +292,7 @@ contains
     if (allocated(error)) return
     call check(error, stick_ratio(state), 0.2155_wp, 0.003_wp, 'stick radius')
     if (allocated(error)) return
-    call check_true(error, state%sweeps <= 25, 'a sensible number of linear solutions')
+    call check_true(error, state%sweeps <= 14, 'a sensible number of linear solutions')
   end subroutine test_dissimilar
 
   !> Flat punch without slip: P = kappa 2 E* a approach, kappa = atanh(beta)/beta; kappa is the ratio to no friction.

@@ -110,7 +110,9 @@ def test_run_writes_result_and_picture_and_compares_with_hertz(solved: Path) -> 
     result = open_result(solved / "sphere.nc")
     assert result.complete
     assert len(result) == 2
-    np.testing.assert_array_equal(drawn.pixels(solved / "sphere.png"), drawn.pixels(plotting.overview(result)))
+    np.testing.assert_array_equal(
+        drawn.pixels(solved / "sphere.png"), drawn.pixels(plotting.overview(result))
+    )
     out = (solved / "stdout").read_text()
     assert "Against Hertz" in out
     row = re.search(r"max pressure +([\d.]+) MPa +([\d.]+) MPa +([+-][\d.]+) %", out)

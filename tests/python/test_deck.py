@@ -483,7 +483,10 @@ def test_every_key_of_a_deck_has_its_place(path: Path) -> None:
         there = lines[line - 1][column - 1 :]
         if there.startswith("["):  # the head of a table, or an entry of an array
             table = [part for part in name if not part.isdigit() or part in there]
-            assert name[-1].isdigit() or re.match(rf"\[+{re.escape('.'.join(table))}[].]", there), (name, there)
+            assert name[-1].isdigit() or re.match(rf"\[+{re.escape('.'.join(table))}[].]", there), (
+                name,
+                there,
+            )
         elif not name[-1].isdigit():
             assert there.lstrip('"').startswith(name[-1]), (name, there)
 

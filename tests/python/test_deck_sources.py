@@ -458,7 +458,9 @@ def test_the_work_is_estimated_to_a_factor_of_two(name: str) -> None:
     spent = case.run().history["operator_applications"].sum()
     assert 0.5 < expected / spent < 2
     (work,) = (text for key, text in case_rows(case) if key == "work")
-    count, duration = re.fullmatch(r"about ([\d,]+) operator applications, about (.*) on one core", work).groups()
+    count, duration = re.fullmatch(
+        r"about ([\d,]+) operator applications, about (.*) on one core", work
+    ).groups()
     assert int(count.replace(",", "")) == pytest.approx(expected, rel=0.05, abs=0.5)  # two digits
     time = seconds(case)
     assert duration == ("a second or less" if time < 1 else f"{time:.0f} s")
@@ -468,7 +470,7 @@ def test_the_work_is_estimated_to_a_factor_of_two(name: str) -> None:
     ("name", "spacing"), [("dissimilar_fretting", "3.5 um"), ("hertz_spheres", "0.004 mm")]
 )
 def test_the_time_is_estimated_to_its_order_of_magnitude(name: str, spacing: str) -> None:
-    """Processor time of one thread, which a busy machine does not change much; machines differ by less than 5."""
+    """Processor time of one thread, which a busy machine changes little; machines differ by less than 5."""
     program = f"""
         import time
         from hexcontact import Case

@@ -75,7 +75,9 @@ def test_scripts_of_the_cases_run(name: str, tmp_path: Path, monkeypatch: pytest
         assert count == 1, key
     saved: list[Figure] = []
     original = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (saved.append(self), original(self, *a, **k))[1])
+    monkeypatch.setattr(
+        Figure, "savefig", lambda self, *a, **k: (saved.append(self), original(self, *a, **k))[1]
+    )
     monkeypatch.chdir(tmp_path)
     with matplotlib.rc_context():
         output = printed(program, name, {})

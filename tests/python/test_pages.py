@@ -48,7 +48,9 @@ def test_pictures_of_the_pages_are_those_that_the_program_draws(name: str) -> No
 
 
 def test_every_picture_of_the_pages_is_drawn_by_a_test() -> None:
-    played_ones = {target for page in DOCS.glob("*.md") for target, _ in played.PICTURE.findall(page.read_text())}
+    played_ones = {
+        target for page in DOCS.glob("*.md") for target, _ in played.PICTURE.findall(page.read_text())
+    }
     there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "images").rglob("*.png")}
     assert there == played_ones | {f"images/{name}.png" for name in IMAGES}
 

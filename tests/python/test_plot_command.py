@@ -78,7 +78,9 @@ def test_the_picture_is_the_one_that_the_options_choose(
 
 
 @pytest.mark.parametrize("kind", ["pdf", "svg"])
-def test_pictures_for_a_paper(folder: Path, tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_for_a_paper(
+    folder: Path, tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")  # no time in the file
     picture, expected = tmp_path / f"loop.{kind}", io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "names"}):

@@ -549,7 +549,11 @@ def test_zone_map_shows_the_closed_stick_area() -> None:
     assert arrows.N > 10
     assert np.all(arrows.U == -1e-3)  # against Q: the traction on body 1 opposes its slip
     assert np.all(arrows.V == 0.0)
-    [arrows] = [c for c in plotting.zones(cattaneo(), 3, arrows="traction").axes[0].get_children() if isinstance(c, Quiver)]
+    [arrows] = [
+        c
+        for c in plotting.zones(cattaneo(), 3, arrows="traction").axes[0].get_children()
+        if isinstance(c, Quiver)
+    ]
     radius = np.hypot(*(np.asarray(at) * factor for at in (arrows.X, arrows.Y)))
     np.testing.assert_allclose(arrows.U, MINDLIN.traction(radius, 0.5 * SLIDING), rtol=1e-9)
 
@@ -590,7 +594,9 @@ def test_boundary_tells_sticking_nodes_apart() -> None:
         x, y = si(figure.axes[0], lines[label])
         nodes = one["zone"].values == zone
         assert len(x) == nodes.sum() > 5
-        np.testing.assert_allclose(np.stack([x, y]), [one["x"].values[nodes], one["y"].values[nodes]], atol=1e-12)
+        np.testing.assert_allclose(
+            np.stack([x, y]), [one["x"].values[nodes], one["y"].values[nodes]], atol=1e-12
+        )
         assert lines[label].get_markerfacecolor() == color
     [name] = [label for label in lines if label.startswith("stick: ellipse")]
     x, y = si(figure.axes[0], lines[name])
@@ -826,12 +832,14 @@ def test_overview_shows_maps_zones_section_and_history() -> None:
         for name in names:
             x, y = by_label(axes)[name].get_data()
             np.testing.assert_array_equal(x, [1, 2, 3, 4])
-            np.testing.assert_allclose(np.asarray(y) * units(axes.get_ylabel()), result[name].values, rtol=1e-12)
+            np.testing.assert_allclose(
+                np.asarray(y) * units(axes.get_ylabel()), result[name].values, rtol=1e-12
+            )
         assert [line.get_xdata()[0] for line in axes.lines if line.get_linewidth() == 3.0] == [3]  # the step
     single = plotting.overview(made([sheared(0.5 * SLIDING)]), 1)
     assert not any(axes.get_xlabel() == "load step" for axes in single.axes)
     without = cattaneo().drop_vars(["traction_x", "traction_y"])  # not kept: what there is without them
-    first, upper, lower = drawn.visible(plotting.overview(without, 3))
+    first, upper, _ = drawn.visible(plotting.overview(without, 3))
     drawn.is_field(first, view, view.pressure, "pressure $p$")
     assert {"computed", "Hertz"} == set(by_label(upper))
 

@@ -90,8 +90,9 @@ def data_of(page: str) -> dict[str, Any]:
 
 
 FACTOR = {  # from the units of the page to SI
-    "": 1.0, "N": 1.0, "GPa": 1e9, "MPa": 1e6, "µm": 1e-6, "nm": 1e-9, "mJ": 1e-3, "µJ": 1e-6, "mm²": 1e-6, "µm²": 1e-12,
-}  # fmt: skip
+    **{"": 1.0, "N": 1.0, "GPa": 1e9, "MPa": 1e6, "µm": 1e-6, "nm": 1e-9},
+    **{"mJ": 1e-3, "µJ": 1e-6, "mm²": 1e-6, "µm²": 1e-12},
+}
 MAPPED = (
     ("pressure",),
     ("traction_x", "traction_y"),
@@ -193,7 +194,11 @@ def test_inputs_loads_and_residuals_are_in_tables(folder: Path) -> None:
         ["1", "press", "1 to 2"],
         ["2", "shear &lt;/script&gt;", "3 to 6"],
     ]
-    for sign, name, unit in (("P", "normal_load", "N"), ("approach", "approach", "m"), ("Qx", "tangential_load_x", "N")):
+    for sign, name, unit in (
+        ("P", "normal_load", "N"),
+        ("approach", "approach", "m"),
+        ("Qx", "tangential_load_x", "N"),
+    ):
         column = rows[0].index(sign)
         shown = [quantity(value if abs(value) > 1e-6 else 0.0, unit) for value in ends[name]]
         assert [row[column] for row in rows[1:]] == shown
@@ -225,7 +230,9 @@ def test_maps_are_the_fields(folder: Path) -> None:
                 inside &= view.at(*plane.points, view.contact.astype(float)) > 1.0 - 1e-9
             assert inside.sum() > 1000
             read = (gray - 1.0) / 254.0 * largest
-            np.testing.assert_allclose(read[inside], expected[inside] if largest else 0.0, atol=largest * 0.505 / 254)
+            np.testing.assert_allclose(
+                read[inside], expected[inside] if largest else 0.0, atol=largest * 0.505 / 254
+            )
 
 
 def test_pictures_begin_at_the_upper_left() -> None:
@@ -336,7 +343,9 @@ def test_curves_are_the_history(folder: Path) -> None:
     for title, curves in expected.items():
         chart = charts[title]
         assert list(chart["curves"]) == list(curves)
-        over, factor = ("shift_x", FACTOR[chart["xlabel"].partition("[")[2][:-1]]) if "over" in title else (None, 1.0)
+        over, factor = (
+            ("shift_x", FACTOR[chart["xlabel"].partition("[")[2][:-1]]) if "over" in title else (None, 1.0)
+        )
         xs = history[over] if over else history.index
         np.testing.assert_allclose(factor * np.array(chart["x"]), xs, rtol=1e-4, atol=1e-14, err_msg=title)
         for sign, name in curves.items():

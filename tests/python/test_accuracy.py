@@ -52,7 +52,7 @@ def test_true_errors_lie_within_the_estimate(problem: str) -> None:
     for name, ratios in found.items():
         assert len(ratios) >= 100
         assert np.mean(ratios >= 1.0) >= 0.95, name
-        assert 2.0 < np.median(ratios) < 30.0, name
+        assert 2.0 < np.median(ratios) < 25.5, name
 
 
 def test_true_errors_lie_within_the_estimate_on_the_way_to_a_target() -> None:
@@ -81,13 +81,13 @@ def test_orders_beyond_the_bounds_are_not_believed() -> None:
     values = np.array([1.0, 1.04, 1.44, 1.44, 1.44, 1.44, 1.44])[:, None]
     assert accuracy.limits_of_error(SPACINGS, values)[0] > 0.44 / 3.0
     values = (3.0 + 0.1 * SPACINGS**0.5)[:, None]  # order 1/2 would promise 0.1
-    assert accuracy.limits_of_error(SPACINGS, values)[0] < 0.1
+    assert accuracy.limits_of_error(SPACINGS, values)[0] < 0.059
 
 
 def test_scatter_alone_gives_a_floor() -> None:
     """Where the lattices agree by chance, the shifted copies tell that it was chance."""
     values = np.array([1.0, 1.0, 1.0, 1.02, 0.98, 1.01, 0.99])[:, None]
-    assert 0.005 < accuracy.limits_of_error(SPACINGS, values)[0] < 0.05
+    assert 0.005 < accuracy.limits_of_error(SPACINGS, values)[0] < 0.0332
     assert accuracy.limits_of_error(SPACINGS, np.ones((7, 1)))[0] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -223,7 +223,7 @@ def test_windows_of_finer_and_shifted_lattices_hold_the_contact(grid: dict[str, 
         if trial == refinement.Trial(0):
             assert lattice == first
         ratio = lattice.size * lattice.cell_area / (first.size * first.cell_area)
-        assert 0.4 < ratio < 1.3
+        assert 0.4 < ratio < 1.1
         step = next(iter(other.run().dataset.pressure.values))
         assert step.max() > 0.0
         assert not any(step[edge].any() for edge in ((0,), (-1,), (slice(None), 0), (slice(None), -1)))

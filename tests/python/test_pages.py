@@ -2,14 +2,17 @@
 
 import re
 import runpy
+import shlex
 import sys
 import tomllib
 from pathlib import Path
 
 import drawn
 import pytest
+from typer.testing import CliRunner
 
 import hexcontact
+from hexcontact.cli import app
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -35,7 +38,9 @@ def test_page_prints_and_draws_what_it_shows(
     pictures = played.PICTURE.findall(page)
     assert len(pictures) == {"tutorial": 6, "surfaces": 2}.get(name, 0)
     for target, picture in pictures:
-        assert drawn.apart(drawn.pixels(tmp_path / picture), drawn.pixels(DOCS / target)) < SAME, target
+        played.keep_picture(tmp_path / picture, tmp_path / f"kept_{picture}")
+        found = drawn.pixels(tmp_path / f"kept_{picture}")
+        assert drawn.apart(found, drawn.pixels(DOCS / target)) < SAME, target
 
 
 IMAGES = runpy.run_path(str(DOCS / "images/make.py"))["FIGURES"]
@@ -88,6 +93,33 @@ def test_excerpt_of_the_tutorial_is_the_starter_deck(tmp_path: Path) -> None:
     list(played.differences(f"```console\n$ hexcontact new fretting -o {tmp_path}/new.toml\n```\n", tmp_path))
     deck = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
     assert {key: deck[key] for key in ("friction", "load")} == tomllib.loads(excerpt)
+
+
+def test_log_of_a_page_is_that_of_its_case(tmp_path: Path) -> None:
+    def words(line: str) -> dict[str, str]:
+        found = dict(word.partition("=")[::2] for word in shlex.split(line) if "=" in word)
+        for name in found.keys() & {"machine", "seconds", "file"}:  # of the day
+            del found[name]
+        for name in (name for name in found if name.startswith("R_")):
+            assert float(found[name]) <= 1e-8
+            found[name] = "small"
+        return found
+
+    [shown] = re.findall(
+        r"^```\n(\d{4}-.*?)^```$", (DOCS / "running.md").read_text(), re.MULTILINE | re.DOTALL
+    )
+    deck = ROOT / "cases/dissimilar_fretting.toml"
+    options = ["--set", "grid.spacing=4 um", "--quiet", "-o", str(tmp_path / "out.nc")]
+    done = CliRunner().invoke(app, ["run", str(deck), *options, "--log-file", str(tmp_path / "log")])
+    assert done.exit_code == 0, done.output
+    found = (tmp_path / "log").read_text().splitlines()
+    begun, first, dots, *end = shown.splitlines()
+    assert dots == "..."
+    assert len(end) == 2
+    for line, other in zip([begun, first, *end], [*found[:2], *found[-2:]], strict=True):
+        assert words(line) == words(other)
+        level_and_event, expected = ([w for w in one.split()[1:3] if "=" not in w] for one in (other, line))
+        assert level_and_event == expected
 
 
 def test_every_page_is_in_the_contents() -> None:

@@ -73,7 +73,7 @@ def _total(parts: Iterable[float | None]) -> float | None:
 
 def _rounded(number: float) -> int:
     """Round to two digits; more would pretend to be exact."""
-    return int(float(f"{number:.2g}"))
+    return round(float(f"{number:.2g}"))
 
 
 def _duration(time: float) -> str:

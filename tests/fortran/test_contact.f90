@@ -87,8 +87,8 @@ contains
     if (allocated(error)) return
     call check(error, [sum(x), x(3), x(5)], [6.0_wp, 0.0_wp, 0.0_wp], 1.0e-12_wp, 'constraint and fixed nodes')
     if (allocated(error)) return
-    call check_true(error, iterations <= 3 .and. residual <= 1.0e-12_wp .and. outcome == solution_accurate, &
-                    'as many iterations as unknowns at most')
+    call check_true(error, iterations <= 2 .and. residual <= 1.0e-12_wp .and. outcome == solution_accurate, &
+                    'three unknowns, one constraint')
   end subroutine test_projected_cg
 
   !> Conjugate gradients say why they stopped: solved, out of iterations, a matrix that is not positive definite.
@@ -277,9 +277,9 @@ contains
     if (allocated(error)) return
     call check_true(error, state%converged .and. state%residual_normal <= 1.0e-9_wp, 'converged')
     if (allocated(error)) return
-    call check(error, maxval(state%pressure), 2.0_wp/pi, 1.0e-4_wp, 'largest pressure')
+    call check(error, maxval(state%pressure), 2.0_wp/pi, 8.6e-5_wp, 'largest pressure')
     if (allocated(error)) return
-    call check(error, state%motion(normal), 1.0_wp, 2.0e-4_wp, 'approach')
+    call check(error, state%motion(normal), 1.0_wp, 8.6e-5_wp, 'approach')
     if (allocated(error)) return
     ! control of the approach leads to the same solution
     call contact%solve(displacement_control, state%motion(normal), 1.0e-9_wp, 50, again, error)
@@ -309,7 +309,7 @@ contains
       if (allocated(error)) return
       call check_true(error, state%converged .and. state%load(normal) > load, 'converged, and the load rises')
       if (allocated(error)) return
-      call check_true(error, state%operator_applications < 30.0_wp, 'no work wasted')
+      call check_true(error, state%operator_applications < 6.0_wp, 'no work wasted')
       if (allocated(error)) return
       load = state%load(normal)
     end do
@@ -335,7 +335,7 @@ contains
     radius = sqrt(lattice%cell_area()*count(candidate)/pi)
     call check_true(error, state%converged, 'converged')
     if (allocated(error)) return
-    call check(error, 2.0_wp*radius*state%motion(normal), 1.0_wp, 5.0e-3_wp, 'approach')
+    call check(error, 2.0_wp*radius*state%motion(normal), 1.0_wp, 2.4e-3_wp, 'approach')
     if (allocated(error)) return
     call check_true(error, all((state%pressure > 0.0_wp) .eqv. candidate), 'contact on the punch and nowhere else')
   end subroutine test_flat_punch
@@ -447,7 +447,7 @@ contains
     end do
   end subroutine test_nothing_touches
 
-  !> One and three threads end at the same solution, within 100 tolerances.
+  !> One and three threads end at the same bits.
   subroutine test_threads(error)
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
@@ -466,8 +466,13 @@ contains
       call contact%solve(force_control, 1.0_wp, 1.0e-8_wp, 50, state(i), error)
       if (allocated(error)) return
     end do
-    call check(error, reshape(state(2)%pressure, [3721]), reshape(state(1)%pressure, [3721]), &
-               1.0e-6_wp*maxval(state(1)%pressure), 'pressure')
+    call check_true(error, maxval(state(1)%pressure) > 0.0_wp, 'a pressure')
+    if (allocated(error)) return
+    call check(error, reshape(state(2)%pressure, [3721]), reshape(state(1)%pressure, [3721]), 0.0_wp, 'pressure')
+    if (allocated(error)) return
+    call check(error, reshape(state(2)%gap, [3721]), reshape(state(1)%gap, [3721]), 0.0_wp, 'gap')
+    if (allocated(error)) return
+    call check(error, state(2)%motion, state(1)%motion, 0.0_wp, 'approach')
   end subroutine test_threads
 
   !> A solver that is stopped too early says so.

@@ -14,7 +14,7 @@ module test_load_path
   use hc_entry_state, only: entry_displacement
   use hc_load_path, only: advance
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_true
+  use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
 
@@ -401,7 +401,7 @@ contains
     ! and it is another solution than that of the whole step
     call advance(contact, pressed, target, .false., tolerance, 60, 0, next, error)
     if (allocated(error)) return
-    call check_true(error, maxval(abs(next%traction - parts%traction)) > 1.0e-4_wp*mu, 'the size of a step matters')
+    call check_true(error, largest(next%traction - parts%traction) > 1.0e-4_wp*mu, 'the size of a step matters')
   end subroutine test_half_steps
 
   !> The real method, noting what it has reached.
@@ -451,17 +451,17 @@ contains
     call check(error, reshape(state(2)%slip_increment, [882]), reshape(state(1)%slip_increment, [882]), 1.0e-8_wp, &
                'same slip')
     if (allocated(error)) return
-    call check_true(error, maxval(abs(next%traction - state(1)%traction)) > 0.05_wp*mu, 'another history, another traction')
+    call check_true(error, largest(next%traction - state(1)%traction) > 0.05_wp*mu, 'another history, another traction')
   end subroutine test_any_start
 
   !> A circular contact grows by 4 and by 12 spacings: near its edge s - s_e is linear in the distance d if the
-  !> edge slips, and goes with d^(3/2) if it sticks. Found to 2 and 1 % of the motion outside.
+  !> edge slips, and goes with d^(3/2) if it sticks. Found to 2 and 0.13 % of the motion outside.
   subroutine test_entry_ring(error)
     type(error_t), allocatable, intent(out) :: error
     type(recorder_t) :: solver
     type(contact_state_t) :: before, after
     real(wp), allocatable :: r(:, :), u(:, :, :), expected(:, :, :)
-    real(wp), parameter :: old = 0.4_wp, power(2) = [1.0_wp, 1.5_wp], allowed(2) = [0.025_wp, 0.015_wp]
+    real(wp), parameter :: old = 0.4_wp, power(2) = [1.0_wp, 1.5_wp], allowed(2) = [0.0201_wp, 0.00133_wp]
     real(wp) :: new, scale
     integer :: i, k
 
@@ -539,13 +539,13 @@ contains
     call check_true(error, count(after%pressure > 0.0_wp) > 100, 'many nodes enter')
     if (allocated(error)) return
     do i = 1, 2
-      call check(error, maxval(abs(u(:, :, i) - merge(shift(i)*gap/closing, 0.0_wp, after%pressure > 0.0_wp))), 0.0_wp, &
+      call check(error, largest(u(:, :, i) - merge(shift(i)*gap/closing, 0.0_wp, after%pressure > 0.0_wp)), 0.0_wp, &
                  1.0e-12_wp, 'share of the shift')
       if (allocated(error)) return
     end do
     ! nothing enters: nothing is displaced
     u = entry_displacement(solver%problem, after, after)
-    call check(error, maxval(abs(u)), 0.0_wp, 0.0_wp, 'nothing enters')
+    call check(error, largest(u), 0.0_wp, 0.0_wp, 'nothing enters')
   end subroutine test_entry_patch
 
   !> Oblique load that makes nothing slip, shift 3SQ/16a (exact for nu = 0): after three steps within the mesh error,
@@ -574,7 +574,7 @@ contains
     end do
     call check_true(error, abs(missing(1)) > 0.1_wp, 'slip from the beginning of the step')
     if (allocated(error)) return
-    call check(error, missing(2), 0.0_wp, 3.0e-3_wp, 'slip from the entry')
+    call check(error, missing(2), 0.0_wp, 4.7e-4_wp, 'slip from the entry')
     if (allocated(error)) return
     call check_true(error, state%dissipated_energy <= 1.0e-12_wp .and. all(state%zone /= 2), 'nothing slips')
   end subroutine test_entry_oblique
@@ -609,14 +609,14 @@ contains
       call check_true(error, state%converged .and. expected%converged, 'both converge')
       if (allocated(error)) return
       scale = maxval(expected%pressure)
-      call check(error, maxval(abs(state%pressure - expected%pressure)), 0.0_wp, 1.0e-7_wp*scale, 'pressure')
+      call check(error, largest(state%pressure - expected%pressure), 0.0_wp, 1.0e-7_wp*scale, 'pressure')
       if (allocated(error)) return
-      call check(error, maxval(abs(state%traction - expected%traction)), 0.0_wp, 1.0e-7_wp*scale, 'shear traction')
+      call check(error, largest(state%traction - expected%traction), 0.0_wp, 1.0e-7_wp*scale, 'shear traction')
       if (allocated(error)) return
-      call check(error, maxval(abs(state%relative_displacement - expected%relative_displacement)), 0.0_wp, &
+      call check(error, largest(state%relative_displacement - expected%relative_displacement), 0.0_wp, &
                  1.0e-7_wp*expected%motion(normal), 'relative displacement, outside the part too')
       if (allocated(error)) return
-      if (i == 2) call check_true(error, 2.0_wp*state%operator_applications < expected%operator_applications, 'less work')
+      if (i == 2) call check_true(error, 4.4_wp*state%operator_applications < expected%operator_applications, 'less work')
       if (allocated(error)) return
     end do
   end subroutine test_part_of_window

@@ -6,6 +6,11 @@ import signal
 from collections.abc import Generator
 
 import pytest
+from hypothesis import settings
+
+# Examples are drawn from the test itself: the same ones at every run, and nothing is remembered on the disk.
+settings.register_profile("seeded", derandomize=True, database=None)
+settings.load_profile("seeded")
 
 # A shell that runs tests in the background has them ignore Ctrl-C, and so what they start; some send it.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:

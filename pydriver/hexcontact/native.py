@@ -20,6 +20,7 @@ from .lattice import Lattice
 _api = _core.hc_f2py_api
 
 Method = Literal["direct", "fft"]
+MOST_IN_CONTACT = 10**8  # nodes of which memory is asked; the square of more would overflow, and fits nowhere
 _METHODS = {"direct": 0, "fft": 1}
 _ERRORS: dict[int, type[HexcontactError]] = {
     1: DeckError,
@@ -369,5 +370,5 @@ def memory_needed(
         Threads that will be used.
     """
     code = ("problem", "operator", "set-up of the operator").index(part)
-    nodes = n_row * n_col if contact is None else contact
+    nodes = min(n_row * n_col if contact is None else contact, MOST_IN_CONTACT)
     return int(_api.memory_needed(method_code(method), [n_col, n_row], nodes, code, threads))

@@ -19,6 +19,7 @@ from .arguments import number, reals
 from .errors import DeckError
 from .lattice import Lattice
 from .native import (
+    MOST_IN_CONTACT,
     ElasticPair,
     Method,
     checked_field,
@@ -361,7 +362,7 @@ def memory_needed(
     threads
         Threads that will be used.
     """
-    nodes = n_row * n_col if contact is None else contact
+    nodes = min(n_row * n_col if contact is None else contact, MOST_IN_CONTACT)
     return int(
         _api.friction_memory_needed(method_code(method), [n_col, n_row], nodes, loads, coupled, threads)
     )

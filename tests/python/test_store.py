@@ -526,9 +526,9 @@ def test_the_lock_of_another_host_holds(out: Path) -> None:
         pass
 
 
-def test_a_lock_of_rubbish_is_taken_over(out: Path) -> None:
+def test_a_lock_that_was_cut_short_is_taken_over(out: Path) -> None:
     journal_of(out).mkdir()
-    (journal_of(out) / "lock").write_text("[1, 2")
+    (journal_of(out) / "lock").write_text('{"process": 1, "ho')
     with Store(out, Metadata()):
         pass
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import DeckError
+from .lock import LONGEST, holder_of
 from .netcdf import reading
 from .record import SUFFIX, begins_like_record, fault_of_sequence, read_record
 from .result import Metadata, Result, Step, assemble
@@ -111,10 +111,8 @@ class Journal:
 
 def names_a_run(lock: Path) -> bool:
     """Tell whether a run has written this lock, or made it: it is blank for a moment."""
-    with contextlib.suppress(OSError, ValueError):
-        text = lock.read_bytes()[:1000].strip(b"\0")
-        holder = json.loads(text or b"null")
-        return not text or (isinstance(holder, dict) and {"process", "host"} <= holder.keys())
+    with contextlib.suppress(OSError), lock.open("rb") as file:
+        return holder_of(file.read(LONGEST + 1)) is not None
     return False
 
 

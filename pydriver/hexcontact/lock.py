@@ -17,7 +17,7 @@ from typing import Any
 from .errors import DeckError
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
-_LONGEST = 1000  # bytes of a lock
+LONGEST = 1000  # bytes of a lock
 
 
 class Lock:
@@ -83,20 +83,23 @@ class Lock:
 
     def _holder(self) -> dict[str, Any] | None:
         """Return who has written the lock, nobody if it is blank; None if it is no lock."""
-        text = os.pread(self._descriptor, _LONGEST + 1, 0)
-        if not text.strip(b"\0"):  # nothing yet; zeros after a power failure
-            return {}
-        with contextlib.suppress(ValueError, RecursionError):
-            holder = json.loads(text)
-            if isinstance(holder, dict) and holder.keys() >= {"process", "host"}:
-                return holder
-        return None
+        return holder_of(os.pread(self._descriptor, LONGEST + 1, 0))
 
     def release(self) -> None:
         """Let go of the lock; a file that came in its place stays."""
         if _same_file(self.path, self._descriptor):
             self.path.unlink(missing_ok=True)
         os.close(self._descriptor)
+
+
+def holder_of(text: bytes) -> dict[str, Any] | None:
+    """Return who has written the text of a lock, nobody if it is blank or cut short; None if it is no lock."""
+    if not text.strip(b"\0"):  # nothing yet; zeros after a power failure
+        return {}
+    with contextlib.suppress(ValueError, RecursionError):
+        holder = json.loads(text)
+        return holder if isinstance(holder, dict) and holder.keys() >= {"process", "host"} else None
+    return {} if text.startswith(b'{"process": ') and len(text) <= LONGEST else None
 
 
 def _opened(path: Path) -> int:

@@ -20,6 +20,7 @@ from .lattice import Lattice
 _api = _core.hc_f2py_api
 
 Method = Literal["direct", "fft"]
+MOST_IN_CONTACT = 10**8  # nodes of which memory is asked; the square of more would overflow, and fits nowhere
 _METHODS = {"direct": 0, "fft": 1}
 _STOPPED = (  # in the order of fortran/contact_state.f90
     "nothing was solved",
@@ -414,5 +415,5 @@ def memory_needed(
     """
     code = ("problem", "operator", "set-up of the operator").index(part)
     extent = [integer(n_col, "n_col"), integer(n_row, "n_row")]
-    nodes = extent[0] * extent[1] if contact is None else contact
+    nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
     return int(_api.memory_needed(method_code(method), extent, nodes, code, thread_count(threads)))

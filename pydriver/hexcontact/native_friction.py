@@ -19,6 +19,7 @@ from .arguments import integer, number, reals, word
 from .errors import DeckError
 from .lattice import Lattice
 from .native import (
+    MOST_IN_CONTACT,
     ElasticPair,
     Method,
     checked_field,
@@ -368,6 +369,6 @@ def memory_needed(
         Threads that will be used.
     """
     extent = [integer(n_col, "n_col"), integer(n_row, "n_row")]
-    nodes = extent[0] * extent[1] if contact is None else contact
+    nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
     count = thread_count(threads)
     return int(_api.friction_memory_needed(method_code(method), extent, nodes, loads, coupled, count))

@@ -580,6 +580,13 @@ def test_a_file_in_the_place_of_the_lock_stays_as_it_is(out: Path) -> None:
     assert (journal_of(out) / "lock").read_text() == "[1, 2"
 
 
+def test_a_lock_that_was_cut_short_is_taken_over(out: Path) -> None:
+    journal_of(out).mkdir()
+    (journal_of(out) / "lock").write_text('{"process": 1, "ho')
+    with Store(out, Metadata()):
+        pass
+
+
 def test_without_locks_in_the_file_system_the_process_number_decides(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

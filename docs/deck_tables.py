@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hexcontact import deck, load_series, study_deck, surfaces
-from hexcontact.messages import shown
+from hexcontact.text import shown
 from hexcontact.validation import (
     Flag,
     Kind,

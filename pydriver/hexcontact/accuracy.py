@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .load_series import LOADS
+from .trial_folder import Solution
 from .variables import ESTIMATED
 
 if TYPE_CHECKING:
@@ -44,34 +44,6 @@ SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794)
 
 JUDGED = ("max_pressure", "contact_area_fit", "stick_area_fit", "approach")
 """Quantities that are to reach the target."""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What the solution on one lattice came to.
-
-    Parameters
-    ----------
-    level : int
-        How often the lattice was refined.
-    copy : int
-        0: the lattice itself, else the number of its shifted copy.
-    spacing : float
-        Spacing, m.
-    origin : tuple of float
-        Position of a node, m.
-    nodes : int
-        Nodes of the largest window that it was solved on.
-    histories : sequence of mapping
-        History of each load step.
-    """
-
-    level: int
-    copy: int
-    spacing: float
-    origin: tuple[float, float]
-    nodes: int
-    histories: Sequence[History]
 
 
 def finest(solutions: Sequence[Solution]) -> Solution:

@@ -13,9 +13,9 @@ from .case_arguments import body_keys, gap_given, given, middle_of, segments
 from .case_settings import Body, OutputSettings, SolverSettings
 from .deck_assembly import assemble
 from .errors import DeckError
+from .faults import Source
 from .lattice import Lattice
 from .load_history import LoadStep, Target
-from .messages import Source
 from .problem import Problem
 
 if TYPE_CHECKING:
@@ -213,7 +213,7 @@ class Case(Problem):
         return Session(self, output, overwrite)
 
     def _repr_html_(self) -> str:
-        from .summary import case_rows
+        from .overview import case_rows
         from .text import html_table
 
         return html_table(self.title or "Case", ("", ""), case_rows(self))

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from . import native
 from .arguments import reals
 from .errors import DeckError
-from .messages import listed
 from .surfaces import Surface
+from .text import listed
 from .units import LENGTH, UnitError, to_si
 
 if TYPE_CHECKING:

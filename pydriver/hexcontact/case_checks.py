@@ -7,8 +7,8 @@ from typing import Any
 
 from .deck import Deck, Friction, Output, Solver
 from .errors import DeckError
+from .faults import MISSING, Mistake
 from .load_history import load_steps
-from .messages import MISSING, Problem
 from .surfaces import Separation, principal_curvatures
 from .variables import FIELDS
 
@@ -21,15 +21,15 @@ FRICTIONLESS_FIELDS = (
 
 
 def checked_deck(
-    data: Mapping[str, Any], problems: Sequence[Problem], gap_given: bool
-) -> tuple[Deck | None, list[Problem]]:
+    data: Mapping[str, Any], problems: Sequence[Mistake], gap_given: bool
+) -> tuple[Deck | None, list[Mistake]]:
     """Check a deck, table by table and as a whole.
 
     Parameters
     ----------
     data : mapping
         The deck as dictionaries, without files to include.
-    problems : sequence of Problem
+    problems : sequence of Mistake
         What is known to be wrong with it.
     gap_given : bool
         Whether the gap is given instead of the surfaces.
@@ -38,7 +38,7 @@ def checked_deck(
     -------
     deck : Deck or None
         The deck; None if a table is wrong.
-    problems : list of Problem
+    problems : list of Mistake
         Everything that is wrong. Checks that need several tables are made wherever these are right.
     """
     found = list(problems)
@@ -63,42 +63,42 @@ def checked_deck(
             found += touching_problems(Separation(one, two))
         elif one.shape != "flat" or two.shape != "flat":
             sentence = "expected either a gap or surfaces of the bodies, not both"
-            found.append(Problem(("gap",), MISSING, sentence))
+            found.append(Mistake(("gap",), MISSING, sentence))
     return (Deck.model_construct(**tables) if not found else None), found
 
 
-def algorithm_of(friction: Friction | None, solver: Solver) -> tuple[str, list[Problem]]:
+def algorithm_of(friction: Friction | None, solver: Solver) -> tuple[str, list[Mistake]]:
     """Return the algorithm that a deck asks for, and what stands against it."""
     mu = friction.coefficient if friction else None
     algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
     problems = []
     if algorithm == "frictionless" and mu:
         sentence = 'expected 0, since solver.algorithm = "frictionless"'
-        problems.append(Problem(("friction", "coefficient"), mu, sentence))
+        problems.append(Mistake(("friction", "coefficient"), mu, sentence))
     if algorithm != "frictionless" and mu is None:
         sentence = (
             f'missing; expected a number of at least 0 (or inf), since solver.algorithm = "{algorithm}"'
         )
-        problems.append(Problem(("friction", "coefficient"), MISSING, sentence))
+        problems.append(Mistake(("friction", "coefficient"), MISSING, sentence))
     return algorithm, problems
 
 
-def field_problems(output: Output, algorithm: str) -> list[Problem]:
+def field_problems(output: Output, algorithm: str) -> list[Mistake]:
     """Complain about fields that a frictionless run does not yield."""
     known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else FIELDS
     missing = [name for name in output.fields or () if name not in known]
     if not missing:
         return []
     sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
-    return [Problem(("output", "fields"), output.fields, sentence)]
+    return [Mistake(("output", "fields"), output.fields, sentence)]
 
 
-def touching_problems(gap: Separation) -> list[Problem]:
+def touching_problems(gap: Separation) -> list[Mistake]:
     """Complain about surfaces that never touch, or that touch along a line or all over, without end."""
     try:
         gap.first_touch  # noqa: B018 (worked out here, kept for later)
     except DeckError as error:
-        return [Problem(("body", "2", "surface"), MISSING, str(error))]
+        return [Mistake(("body", "2", "surface"), MISSING, str(error))]
     one, two = gap.surface_1.curvature, gap.surface_2.curvature
     if one is None or two is None:
         return []
@@ -107,4 +107,4 @@ def touching_problems(gap: Separation) -> list[Problem]:
         return []
     where = "everywhere" if larger == 0 else "along a line"
     sentence = f"the two surfaces touch {where}, so the contact has no end; expected a shape that bounds it"
-    return [Problem(("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), MISSING, sentence)]
+    return [Mistake(("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), MISSING, sentence)]

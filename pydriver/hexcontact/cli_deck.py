@@ -18,13 +18,14 @@ from .text import visible
 def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Read a deck, report everything that is wrong with it, and say what would be run."""
     from . import json_output, run_command, summary
+    from .overview import case_rows
     from .refinement import least_and_most
     from .window import require_memory
 
     case = run_command.case_of(deck, settings)
     if not as_json:
         console = summary.console()
-        console.print(summary.pairs(case.title or deck.stem, summary.case_rows(case)))
+        console.print(summary.pairs(case.title or deck.stem, case_rows(case)))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first that may be the result
     require_memory(first, first.lattice)
     target = run_command.target_of(case, deck)
@@ -74,7 +75,7 @@ def new(
             raise DeckError("NAME is missing; expected one of the names above")
         return
     if name not in names:
-        from .messages import did_you_mean, listed
+        from .text import did_you_mean, listed
 
         raise DeckError(f"NAME = {name}: expected {listed(names, 'or')}{did_you_mean(name, names)}")
     if str(output) == "-":

@@ -36,6 +36,7 @@ class Arrows(enum.StrEnum):
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Say what a result holds: origin, history, residuals, the last load step against Hertz."""
     from . import json_output, remarks, summary
+    from .history import step_rows
     from .text import rich_table
 
     result = _open(file)
@@ -45,7 +46,7 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
     histories = result.history.to_dict("records")
     console.print(summary.pairs(result.case_title, summary.file_rows(result)))
     console.print(summary.history_table(histories, console))
-    console.print(summary.pairs("Last load step", summary.step_rows(histories[-1])))
+    console.print(summary.pairs("Last load step", step_rows(histories[-1])))
     if case is not None and (rows := summary.hertz_rows(case, histories[-1])):
         console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if rows := summary.trial_rows(result):

@@ -18,9 +18,9 @@ from typing import Annotated, Any, cast
 from pydantic import Field, TypeAdapter, ValidationError
 
 from .errors import DeckError, Fault
+from .faults import Mistake
 from .files import text_of
 from .load_series import LOADS, MOST_STEPS, QUANTITIES, Series
-from .messages import Problem
 from .surfaces import Flat, Point, Surface, SurfaceKind
 from .units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE
 from .validation import Flag, Quantity, Several, Table, Text, Whole, Word, WordOr, problems_of, refuse
@@ -330,14 +330,14 @@ class Deck(Table):
     output: Output = Field(default_factory=Output)
 
     @classmethod
-    def checked(cls, data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
+    def checked(cls, data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Mistake]]:
         """Check a deck and return what is right with it, table by table, and what is wrong.
 
         Returns
         -------
         tables : dict
             The attributes of a deck that were read; those with mistakes, or required and absent, are missing.
-        problems : list of Problem
+        problems : list of Mistake
             Everything that is wrong with the tables one by one.
         """
         try:

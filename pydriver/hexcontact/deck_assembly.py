@@ -14,10 +14,10 @@ from typing import Any
 
 from .deck import read_toml, refuse_deep, with_overrides
 from .errors import DeckError
+from .faults import MISSING, Mistake, Source
 from .files import LARGEST_TEXT
 from .load_series import Columns, read_series
-from .messages import MISSING, Problem, Source, listed
-from .text import visible
+from .text import listed, visible
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time
 MOST_SERIES = 1000  # files of series
@@ -35,14 +35,14 @@ class Assembled:
         The text that stands for all of it, or None if no single text does.
     source : Source
         Where the keys are written.
-    problems : list of Problem
+    problems : list of Mistake
         Series that could not be read; they are left as they were.
     """
 
     data: dict[str, Any]
     text: str | None
     source: Source
-    problems: list[Problem]
+    problems: list[Mistake]
 
     @property
     def remark(self) -> str:
@@ -155,7 +155,7 @@ def _series_with_files(data: Mapping[str, Any]) -> Iterator[Any]:
             yield series
 
 
-def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Problem]:
+def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
     """Put the rows in the place of the names of files, and yield what is wrong with them."""
     known = {"file", "columns"}
     if sum(1 for _ in _series_with_files(data)) > MOST_SERIES:
@@ -175,7 +175,7 @@ def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Problem]:
         except DeckError as error:
             key = ("load", number, "series", "file")
             for sentence in str(error).splitlines():
-                yield Problem(key, MISSING, sentence)
+                yield Mistake(key, MISSING, sentence)
 
 
 def _are_columns(columns: Any) -> bool:

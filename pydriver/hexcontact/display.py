@@ -37,7 +37,7 @@ def result_header(result: Result) -> str:
 
 def result_rows(result: Result) -> list[Row]:
     """Return what the last step of a result came to."""
-    from .summary import step_rows
+    from .history import step_rows
 
     last = result.dataset.isel(step=-1)
     names = [name for name, values in result.dataset.data_vars.items() if values.dims == ("step",)]
@@ -62,7 +62,7 @@ def result_html(result: Result) -> str:
 
 def _pictures(result: Result) -> Iterable[str]:
     """Yield maps of the last step: pressure, and where there is friction the zones."""
-    from .plotting.report_fields import Plane
+    from .raster import Plane
     from .step_view import StepView
 
     try:
@@ -95,7 +95,7 @@ def _rgb(color: str) -> list[int]:
 
 def _figure(colors: NDArray[np.float64], caption: str) -> str:
     """Return a picture with its caption (HTML)."""
-    from .plotting.report_fields import png_of
+    from .raster import png_of
 
     picture = png_of(np.round(colors).astype("u1"))
     rows, cols = colors.shape[:2]

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from .arguments import reals
 from .deck import Grid
+from .faults import MISSING, Mistake
 from .lattice import Lattice
-from .messages import MISSING, Problem
 from .native import ElasticPair, NormalContact
 from .units import readable
 
@@ -323,18 +323,18 @@ def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
     )
 
 
-def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Problem]:
+def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
     """Return what is wrong with a window: too coarse or too small for the contact, or beyond all bounds."""
     problems = []
     given = "spacing" if grid.spacing else "nodes_across" if grid.nodes_across else "nodes_in_radius"
     size = "window" if grid.window is not None else "extent" if grid.extent != "auto" else given
     if max(lattice.shape) > MOST_NODES_PER_SIDE:
         sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(lattice.shape)}"
-        problems.append(Problem(("grid", given), getattr(grid, given), sentence))
+        problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
     if lattice.spacing > estimate.half_width:
         sentence = f"the spacing of {readable(lattice.spacing)} is larger than the contact: "
         sentence += f"expected a spacing well below its half-width of about {readable(estimate.half_width)}"
-        problems.append(Problem(("grid", given), getattr(grid, given), sentence))
+        problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
     if is_fixed(grid) and _outside(lattice, estimate.lower, estimate.upper):
         if size == "extent":
             length_x, length_y = (readable(1.1 * float(length)) for length in estimate.size)
@@ -345,5 +345,5 @@ def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Problem]:
         sentence = (
             f"the window is smaller than the contact, or beside it: expected at least {needed} about it"
         )
-        problems.append(Problem(("grid", size), getattr(grid, size, MISSING), sentence))
+        problems.append(Mistake(("grid", size), getattr(grid, size, MISSING), sentence))
     return problems

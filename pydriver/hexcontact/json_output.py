@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._version import __version__
 from .errors import ConvergenceError, DeckError, Fault, ResourceError
-from .progress import RESIDUALS
+from .history import RESIDUALS
 from .remarks import remarks
 from .text import visible
 

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
+import logging
 import os
 import platform
 import re
@@ -25,7 +27,7 @@ import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from . import _core, log
+from . import _core
 from .errors import DeckError, KernelFolderWarning
 
 _cache: Any = _core.hc_f2py_cache
@@ -38,6 +40,7 @@ _UNITS = {"": 1, "B": 1} | {
     for unit, base in (("B", 1000), ("iB", 1024))
 }
 _DAY = 86400.0
+_LOGGER = logging.getLogger("hexcontact")
 
 
 class Statistics(NamedTuple):
@@ -167,7 +170,7 @@ def told() -> None:
 
 
 def _warn(message: str) -> None:
-    log.logger.warning(log.words("kernels", warning=message))
+    _LOGGER.warning("kernels warning=%s", json.dumps(message, ensure_ascii=False))
     warnings.warn(message, KernelFolderWarning, stacklevel=4)
 
 

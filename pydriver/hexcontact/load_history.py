@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from .deck import Load, Segment
+from .faults import MISSING, Mistake
 from .load_series import LOADS, MOST_STEPS
-from .messages import MISSING, Problem
 from .validation import SMALLEST
 
 Control = Literal["force", "displacement"]
@@ -156,7 +156,7 @@ START: dict[Motion, Target] = {
 
 def load_steps(
     loads: Sequence[Load], friction_coefficient: float | None
-) -> tuple[tuple[LoadStep, ...], list[Problem]]:
+) -> tuple[tuple[LoadStep, ...], list[Mistake]]:
     """Unroll the [[load]] segments.
 
     Parameters
@@ -170,17 +170,17 @@ def load_steps(
     -------
     steps : tuple of LoadStep
         The history; empty if it would be longer than `MOST_STEPS`.
-    problems : list of Problem
+    problems : list of Mistake
         What is wrong with the history as a whole: loads that never press, that no friction carries, or a ramp
         whose start is not known.
     """
     count = sum(_count_of(load) for load in loads)
     if count > MOST_STEPS:
         sentence = f"expected at most {MOST_STEPS} load steps in all, not {count}"
-        return (), [Problem(("load",), MISSING, sentence)]
+        return (), [Mistake(("load",), MISSING, sentence)]
 
     steps: list[LoadStep] = []
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     now = dict(START)
     number = -1
     for key, segment, label, carries_on in _in_turn(loads):
@@ -188,7 +188,7 @@ def load_steps(
         number += not carries_on
         if segment.ramp == "cubic" and start["z"].control != "force":
             sentence = "expected linear, since the segment before was driven by approach"
-            problems.append(Problem((*key, "ramp"), "cubic", sentence))
+            problems.append(Mistake((*key, "ramp"), "cubic", sentence))
         ramp = Ramp(segment, start, virgin) if segment.steps == AUTO else None
         for fraction in _fractions(segment):
             now = {motion: _ramp(segment, motion, start[motion], fraction, virgin) for motion in MOTIONS}
@@ -200,7 +200,7 @@ def load_steps(
         first = loads[0].normal_load
         key, value = (("load", 0, "normal_load"), first) if first is not None else (("load",), MISSING)
         sentence = "expected a normal load or an approach above zero somewhere in the history"
-        problems.append(Problem(key, value, sentence))
+        problems.append(Mistake(key, value, sentence))
     # The first complaint about a key is enough: its segment has many steps, and may be repeated.
     return tuple(steps), list({problem.key: problem for problem in reversed(problems)}.values())[::-1]
 
@@ -281,7 +281,7 @@ def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virg
 
 def _overload(
     key: tuple[str | int, ...], segment: Segment, step: LoadStep, mu: float | None
-) -> Iterator[Problem]:
+) -> Iterator[Mistake]:
     """Yield the tangential loads of a step that friction cannot carry, as far as the deck alone tells."""
     tangential: tuple[tuple[Motion, Target], ...] = ("x", step.x), ("y", step.y), ("twist", step.twist)
     if not mu:
@@ -292,7 +292,7 @@ def _overload(
             # without friction, but solved for all the same, the surfaces may be moved over each other
             if target.value != 0 and given is not None and (by_force or mu is None):
                 known = "or a [friction] table" if mu is None else "since friction.coefficient = 0"
-                yield Problem((*key, name), given, f"expected 0, {known}")
+                yield Mistake((*key, name), given, f"expected 0, {known}")
         return
     if step.z.control != "force" or any(target.from_start for _, target in (("z", step.z), *tangential)):
         return
@@ -307,4 +307,4 @@ def _overload(
             f"gross sliding: the tangential load of {force:g} N in load step {step.index + 1} is more than "
             f"friction.coefficient x normal_load = {bound:g} N"
         )
-        yield Problem((*key, name), MISSING if given is None else given, sentence)
+        yield Mistake((*key, name), MISSING if given is None else given, sentence)

@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 
 from .errors import DeckError
 from .files import require_ordinary, text_of
-from .messages import did_you_mean, listed, shown
+from .text import did_you_mean, listed, shown
 from .units import ANGLE, FORCE, LENGTH, TORQUE
 from .validation import Kind, Quantity, Several, Table, Text, refuse
 

@@ -93,7 +93,7 @@ class Lock:
 
 
 def holder_of(text: bytes) -> dict[str, Any] | None:
-    """Return who has written the text of a lock, nobody if it is blank or cut short; None if it is no lock."""
+    """Return who has written the text of a lock, nobody if it is blank or cut short; None if it is none."""
     if not text.strip(b"\0"):  # nothing yet; zeros after a power failure
         return {}
     with contextlib.suppress(ValueError, RecursionError):

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from .errors import DeckError, HexcontactError
-from .progress import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
+from .history import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
 from .text import visible
 
 if TYPE_CHECKING:

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ConvergenceError
+from .history import RESIDUALS
 from .load_history import LEAST
-from .messages import listed
-from .progress import RESIDUALS
-from .text import quantity
+from .text import listed, quantity
 
 if TYPE_CHECKING:
     from .lattice import Lattice

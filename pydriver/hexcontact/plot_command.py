@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import DeckError
-from .messages import did_you_mean, listed
+from .text import did_you_mean, listed
 from .units import ANGLE, LENGTH, UnitError, to_si
 
 if TYPE_CHECKING:

@@ -21,13 +21,13 @@ from .case_settings import AccuracySettings, Body, OutputSettings, SolverSetting
 from .deck import Deck
 from .deck_assembly import Assembled, assemble
 from .errors import DeckError
+from .faults import MISSING, Mistake, Source, deck_error
 from .grid import Estimate, NoContactFound
 from .lattice import Lattice
 from .load_history import LoadStep, load_steps
-from .messages import MISSING, Source, deck_error, listed
-from .messages import Problem as Mistake
 from .native import ElasticPair, Method
 from .surfaces import Separation
+from .text import listed
 from .validation import SMALLEST
 from .variables import LARGEST
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import DeckError
-from .messages import did_you_mean
 from .pressure_field import linear
+from .text import did_you_mean
 from .variables import NOT_KEPT, VARIABLES
 
 if TYPE_CHECKING:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from typing import IO, TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import IO, TYPE_CHECKING
 
-from .text import percent, quantity, visible
+from .history import describe
+from .text import visible
 
 if TYPE_CHECKING:
     from .step import Step
@@ -154,120 +154,3 @@ def reporter(quiet: bool = False, stream: IO[str] | None = None) -> Reporter:
     if quiet:
         return Reporter()
     return Bar() if stream is sys.stderr and stream.isatty() else Lines(stream)
-
-
-# --- what is said about a step --------------------------------------------------------------------
-
-LOADS_AND_MOTIONS = {  # with friction: what it is called, unit
-    "normal_load": ("P", "N"),
-    "tangential_load_x": ("Qx", "N"),
-    "tangential_load_y": ("Qy", "N"),
-    "torque": ("Mz", "N m"),
-    "approach": ("approach", "m"),
-    "shift_x": ("shift x", "m"),
-    "shift_y": ("shift y", "m"),
-    "twist": ("twist", "rad"),
-}
-RESIDUALS = {  # by the symbol of the theory
-    "R_n": "residual_normal",
-    "R_t": "residual_tangential",
-    "R_P": "residual_force",
-    "R_Q": "residual_shear_force",
-    "R_M": "residual_torque",
-}
-_NOTICED = 1e-6  # share of the normal load or approach from which something tangential is worth showing
-_NOISE = 1e-9  # ... below which it is written as zero
-
-
-def _scale(name: str, history: Mapping[str, Any]) -> float:
-    """Return what a load or motion of a step is to be compared with to tell whether it is noise."""
-    load, approach = abs(history["normal_load"]), abs(history["approach"])
-    length = history["contact_radius"]
-    if name in ("normal_load", "approach"):
-        return 0.0
-    if name == "torque":
-        return float(load * length)
-    if name == "twist":
-        return float(approach / length) if length else math.inf
-    return float(load if name.startswith("tangential") else approach)
-
-
-def worth_showing(histories: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return those of `LOADS_AND_MOTIONS` to show: the normal ones, and others that are more than noise."""
-    shown = {"normal_load", "approach"}
-    for history in histories:
-        shown |= {
-            name
-            for name in LOADS_AND_MOTIONS.keys() - shown
-            if abs(history.get(name, 0.0)) > _NOTICED * _scale(name, history)
-        }
-    return [name for name in LOADS_AND_MOTIONS if name in shown]
-
-
-def load_or_motion(name: str, history: Mapping[str, Any]) -> str:
-    """Write one of `LOADS_AND_MOTIONS`, noise as zero."""
-    value = float(history[name])
-    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, LOADS_AND_MOTIONS[name][1])
-
-
-def fitted(name: str, history: Mapping[str, Any]) -> float:
-    """Return an area or radius to the edge between the nodes; as its nodes have it where no fit was kept."""
-    value = float(history.get(f"{name}_fit", math.nan))
-    return float(history[name]) if math.isnan(value) else value
-
-
-def error_of(name: str, history: Mapping[str, Any]) -> str:
-    """Write the estimated error of what `fitted` or `load_or_motion` give, as " ± 0.05 %"; empty if none."""
-    own = name if math.isnan(float(history.get(f"{name}_fit", math.nan))) else f"{name}_fit"
-    value, error = abs(float(history[own])), float(history.get(f"{own}_error", 0.0))
-    least = _NOISE * _scale(name, history) if name in LOADS_AND_MOTIONS else 0.0
-    return f" ± {percent(error / value)}" if value > least and error > 0.0 else ""
-
-
-def stick_share(history: Mapping[str, Any]) -> str:
-    """Write how much of the contact area sticks."""
-    area = fitted("contact_area", history)
-    return f"{100 * fitted('stick_area', history) / area:.1f} %" if area else "-"
-
-
-def step_error_share(history: Mapping[str, Any]) -> float | None:
-    """Return the bound on the error of the stick area by load steps, as a share of the contact area."""
-    error, area = float(history.get("stick_area_step_error", math.nan)), fitted("contact_area", history)
-    return None if math.isnan(error) or not area else error / area
-
-
-def halved(history: Mapping[str, Any]) -> str:
-    """Say how often a step was halved until the solver converged; empty if it was not."""
-    cuts = int(history.get("cuts", 0))
-    return f"halved {cuts} time{'s' * (cuts > 1)}" if cuts else ""
-
-
-def residuals(history: Mapping[str, Any]) -> dict[str, float]:
-    """Return the residuals that there are, by the symbol of the theory."""
-    found = {sign: float(history.get(name, math.nan)) for sign, name in RESIDUALS.items()}
-    return {sign: value for sign, value in found.items() if not math.isnan(value)}
-
-
-def is_frictional(history: Mapping[str, Any]) -> bool:
-    """Tell whether a step was solved with friction."""
-    return "stick_area" in history
-
-
-def describe(history: Mapping[str, Any], short: bool = False) -> str:
-    """Return a line of text about a step from its history."""
-    parts = [str(history.get("label", ""))]
-    for name in worth_showing([history]):
-        parts.append(f"{LOADS_AND_MOTIONS[name][0]} {load_or_motion(name, history)}")
-    if is_frictional(history):
-        error = step_error_share(history)
-        around = "" if error is None or short else f" ± {100 * error:.1f} %"
-        parts += [f"stick {stick_share(history)}{around}", f"R {max(residuals(history).values()):.1e}"]
-    else:
-        parts.append(f"p_max {quantity(history['max_pressure'], 'Pa')}")
-        if not short:
-            parts.append(f"radius {quantity(fitted('contact_radius', history), 'm')}")
-            parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
-    parts.append(halved(history))
-    if not short:
-        parts.append(quantity(history["seconds"], "s", 3))
-    return "  ".join(part for part in parts if part)

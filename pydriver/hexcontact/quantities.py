@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from .messages import did_you_mean
-from .text import html_table, text_table
+from .text import did_you_mean, html_table, text_table
 from .variables import VARIABLES, Variable
 
 _HEADERS = ("quantity", "unit", "given", "meaning")

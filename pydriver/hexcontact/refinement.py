@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from . import accuracy, log
-from .accuracy import LEAST_LEVELS, RATIO, SHIFTS, Solution
+from .accuracy import LEAST_LEVELS, RATIO, SHIFTS
 from .errors import ResourceError, StopRun
 from .progress import Reporter
 from .result import Metadata, Result, Step, assemble
 from .text import quantity
+from .trial_folder import Solution
 from .variables import ESTIMATED
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .messages import listed
-from .progress import halved
+from .history import halved
+from .text import listed
 
 History = Mapping[str, Any]
 

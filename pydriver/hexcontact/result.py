@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .messages import did_you_mean
 from .result_tools import ResultTools
 from .step import Step
+from .text import did_you_mean
 from .variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ from . import json_output, log, solve, summary
 from .cli_guard import complain, say
 from .cli_options import LogLevel, setting
 from .errors import AccuracyWarning, DeckError
+from .history import step_rows
 from .interruption import Interrupted, in_background
 from .progress import reporter
 from .remarks import remarks
@@ -179,7 +180,7 @@ def summarize(
     if len(histories) > 1:
         console.print(summary.history_table(histories, console))
     console.print(summary.pairs(f"Last load step of {case.title!r}" if case.title else "Last load step",
-                                summary.step_rows(last)))  # fmt: skip
+                                step_rows(last)))  # fmt: skip
     if rows := summary.hertz_rows(case, last):
         console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if refined is not None:

@@ -18,8 +18,8 @@ from . import log, solve
 from .case_arguments import given, middle_of, with_radians
 from .deck import Load
 from .errors import DeckError
+from .faults import Source, deck_error
 from .load_history import LoadStep, load_steps
-from .messages import Source, deck_error
 from .result import Result, Step, assemble
 from .validation import problems_of
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .messages import did_you_mean
 from .profiles import Line, Point, chosen_fields, interpolate, profile, section_line
+from .text import did_you_mean
 
 if TYPE_CHECKING:
     import xarray
@@ -121,7 +121,7 @@ class Step:
     @property
     def residuals(self) -> dict[str, float]:
         """Residuals of the contact conditions and loads by their symbols: R_n, R_t, R_P, R_Q, R_M."""
-        from .progress import residuals
+        from .history import residuals
 
         return residuals(self.history)
 
@@ -159,7 +159,7 @@ class Step:
 
     def __repr__(self) -> str:
         """Say in a line where the step stands."""
-        from .progress import describe
+        from .history import describe
 
         try:
             about = describe(self.history)
@@ -168,7 +168,7 @@ class Step:
         return f"Step {self.number}: {about}"
 
     def _repr_html_(self) -> str:
-        from .summary import step_rows
+        from .history import step_rows
         from .text import html_table
 
         return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history))

@@ -21,7 +21,7 @@ from . import log, study_plan
 from .deck import read_toml
 from .deck_assembly import assemble
 from .errors import DeckError
-from .messages import Source, deck_error
+from .faults import Source, deck_error
 from .study_deck import Dask, StudyFile
 from .study_plan import Plan, PlannedCase
 from .study_store import Outcome, StudyFolder

@@ -15,8 +15,9 @@ from .case import Case
 from .case_arguments import as_toml
 from .deck import Deck, with_overrides
 from .errors import DeckError
-from .messages import Source, shown
+from .faults import Source
 from .study_deck import MOST_CASES, Parameter, StudyFile
+from .text import shown
 from .units import ANGLE
 from .validation import Kind, Quantity, Table, Whole, WordOr
 

@@ -9,15 +9,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .errors import HexcontactError
-from .progress import (
+from .history import (
     LOADS_AND_MOTIONS,
     error_of,
     fitted,
-    halved,
     is_frictional,
     load_or_motion,
     residuals,
-    step_error_share,
+    spelled,
     stick_share,
     worth_showing,
 )
@@ -29,23 +28,13 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from .case import Case
-    from .case_settings import Body
     from .problem import Problem
     from .result import Result
-    from .surfaces import Surface
 
 History = Mapping[str, Any]
 Row = tuple[str, ...]
 
 _MOST_ROWS = 24  # steps shown of a long history
-_FURTHER = {  # shown of a load step besides loads and motions
-    "max_pressure": "Pa",
-    "max_traction": "Pa",
-    "contact_radius": "m",
-    "stick_radius": "m",
-    "elastic_energy": "J",
-    "dissipated_energy": "J",
-}
 
 
 def console() -> Console:
@@ -61,163 +50,7 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
     return rich_table(title, ("", ""), rows)
 
 
-# --- before the run -------------------------------------------------------------------------------
-
-
-def case_rows(case: Problem) -> list[Row]:
-    """Return what would be run."""
-    from .estimates import work
-
-    lattice = case.lattice
-    span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)  # the window may be too large to fill
-    return [
-        *((f"body {number}", _body(body)) for number, body in ((1, case.body_1), (2, case.body_2))),
-        (
-            "pair",
-            f"E* = {quantity(case.pair.effective_modulus, 'Pa')}, beta = {case.pair.beta:.4g}, "
-            f"gamma = {case.pair.gamma:.4g}",
-        ),
-        ("friction", _friction(case)),
-        ("spacing", quantity(lattice.spacing, "m")),
-        (
-            "window",
-            f"{lattice.n_row} x {lattice.n_col} nodes ({lattice.size:,}), {quantity(span[0], 'm')} x "
-            f"{quantity(span[1], 'm')}, {'fixed' if case.window_fixed else 'grows with the contact'}",
-        ),
-        *([("accuracy", _accuracy(case))] if case.accuracy else []),
-        ("load steps", _history(case)),
-        ("largest load", _largest(case)),
-        ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
-        ("memory", _memory(case)),
-        ("work", work(case)),
-    ]  # fmt: skip
-
-
-def _memory(case: Problem) -> str:
-    from .refinement import least_and_most
-    from .window import peak_memory
-
-    last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
-    return " to ".join(quantity(peak_memory(one, one.lattice), "B", 3) for one in last)
-
-
-def _accuracy(case: Problem) -> str:
-    """Say what is to be reached, and between which lattices the refinement will end."""
-    from .refinement import least_and_most
-
-    assert case.accuracy is not None
-    last = [cases[-1].lattice for cases in least_and_most(case)]
-    spacings = [quantity(lattice.spacing, "m") for lattice in last]
-    return (
-        f"target {percent(case.accuracy.target)}: spacing and window are of the first lattice, the last "
-        f"has {' to '.join(spacings)} ({' to '.join(f'{lattice.size:,}' for lattice in last)} nodes)"
-    )
-
-
-def _friction(case: Problem) -> str:
-    if not case.frictional:
-        return "none"
-    mu = case.friction_coefficient
-    law = "no slip (coefficient inf)" if math.isinf(mu) else f"coefficient {mu:g}"
-    goodman = ", shear does not move the pressure" * (case.solver.coupling == "goodman")
-    interpolated = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
-    entry = ", entry interpolated" * interpolated
-    return f"{law}, {case.solver.algorithm}{entry}{goodman}"
-
-
-def _history(case: Problem) -> str:
-    segments = case.load_steps[-1].segment + 1
-    if case.adaptive:
-        chosen = sum(step.ramp is not None for step in case.load_steps)
-        given = len(case.load_steps) - chosen
-        where = f"{chosen} segment{'s' * (chosen > 1)}"
-        fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
-        return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}"
-    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "")
-
-
-def _largest(case: Problem) -> str:
-    """Return the largest load along each direction, as far as the deck tells."""
-    largest = {}
-    for direction in ("z", "x", "y"):
-        targets = [getattr(step, direction) for step in case.load_steps]
-        largest[direction] = max((abs(t.value) for t in targets if t.control == "force"), default=0.0)
-    normal = quantity(largest["z"], "N") if largest["z"] else "follows from the approach"
-    along = [f"{quantity(largest[axis], 'N')} along {axis}" for axis in ("x", "y") if largest[axis]]
-    return ", ".join([normal, *along])
-
-
-def _body(body: Body) -> str:
-    stiffness = "rigid"
-    if not body.rigid:
-        stiffness = f"E = {quantity(body.young_modulus or math.nan, 'Pa')}, nu = {body.poisson_ratio:g}"
-    return f"{stiffness}; {_surface(body.surface)}"
-
-
-def _surface(surface: Surface | None) -> str:
-    from .validation import Quantity
-
-    if surface is None:
-        return "flat"
-    given = [surface.shape]
-    for name, field in type(surface).model_fields.items():
-        value = getattr(surface, name)
-        if name == "shape" or value == field.default:
-            continue
-        unit = next((kind.dimension.unit for kind in field.metadata if isinstance(kind, Quantity)), "")
-        if name == "offset":
-            given.append(f"{name} ({', '.join(quantity(part, 'm') for part in value)})")
-        elif unit == "rad":
-            given.append(f"{name} {math.degrees(value):.6g} deg")
-        else:
-            given.append(f"{name} {quantity(value, unit) if isinstance(value, float) else value}")
-    return ", ".join(given)
-
-
 # --- after the run --------------------------------------------------------------------------------
-
-
-def step_rows(history: History) -> list[Row]:
-    """Return what a load step came to, with its estimated errors and residuals."""
-    rows = [
-        (_words(name), load_or_motion(name, history) + error_of(name, history))
-        for name in worth_showing([history])
-    ]
-    rows += [
-        (_words(name), quantity(fitted(name, history), unit) + error_of(name, history))
-        for name, unit in _FURTHER.items()
-        if name in history
-    ]
-    if is_frictional(history):
-        rows.append(("stick", _stick(history)))
-    if (error := step_error_share(history)) is not None:
-        change = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
-        words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"
-        rows.append(("load steps", words))
-    found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
-    return [*rows, ("residuals", found), ("work", _work(history))]
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _stick(history: History) -> str:
-    """Return size and place of the stick zone in words."""
-    if not history["stick_area"]:
-        return "nowhere"
-    center = [float(history[f"stick_center_{axis}"]) for axis in "xy"]
-    near = 1e-6 * history["contact_radius"]  # as good as zero
-    place = ", ".join(quantity(0.0 if abs(value) < near else value, "m") for value in center)
-    return f"{stick_share(history)} of the contact area, about ({place})"
-
-
-def _work(history: History) -> str:
-    parts = f"{halved(history)}, " if halved(history) else ""
-    return (
-        f"{history['sweeps']} iterations, {parts}{history['operator_applications']:.3g} operator "
-        f"applications, {quantity(history['seconds'], 's', 3)}"
-    )
 
 
 def history_table(histories: Sequence[History], console: Console) -> Table:
@@ -328,7 +161,7 @@ def hertz_rows(case: Problem, history: History) -> list[Row]:
         off, error = f"{100 * (value / exact - 1):+.3f} %", float(history.get(f"{name}_error", math.nan))
         if not math.isnan(error):
             off += f" (± {percent(error / value)} estimated)"
-        rows.append((named.get(name, _words(name)), quantity(exact, unit, 6), quantity(value, unit, 6), off))
+        rows.append((named.get(name, spelled(name)), quantity(exact, unit, 6), quantity(value, unit, 6), off))
     return rows
 
 
@@ -381,7 +214,7 @@ def trial_rows(result: Result) -> list[Row]:
     for name in names:
         values = own[f"trial_{name}"].isel(step=-1)
         told = (_value(float(values[k]), VARIABLES[name].units) for k in shown)
-        rows.append((_words(name.removesuffix("_fit")), *told, percent(relative[name])))
+        rows.append((spelled(name.removesuffix("_fit")), *told, percent(relative[name])))
     return [*rows, ("target", "", "", "", percent(float(data.attrs["accuracy_target"])))]
 
 

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from .errors import DeckError
-from .messages import MISSING, Source, deck_error, did_you_mean
+from .faults import MISSING, Source, deck_error
+from .text import did_you_mean
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 from .validation import Flag, Kind, Quantity, Several, Table, Word, problems_of, refuse, refuse_key
 

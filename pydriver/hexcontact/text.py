@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import html
+import json
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -34,6 +36,43 @@ def visible(text: str) -> str:
 def escaped(text: str) -> str:
     """Write text of a user for HTML and XML."""
     return html.escape(visible(text))
+
+
+def dotted(key: Sequence[str | int]) -> str:
+    """Write the path of a key as users know it: "load.2.steps" is the second entry of [[load]]."""
+    return ".".join(str(part + 1) if isinstance(part, int) else part for part in key)
+
+
+def shown(value: object, width: int = 60, depth: int = 5) -> str:
+    """Write a value the way a deck would, shortened if it is long or deep."""
+    if isinstance(value, str | bool):
+        text = json.dumps(value, ensure_ascii=False)
+    elif isinstance(value, Mapping | list | tuple) and depth == 0:
+        text = "..."
+    elif isinstance(value, Mapping):
+        text = (
+            "{" + ", ".join(f"{key} = {shown(entry, width, depth - 1)}" for key, entry in value.items()) + "}"
+        )
+    elif isinstance(value, list | tuple):
+        text = "[" + ", ".join(shown(entry, width, depth - 1) for entry in value[:width]) + "]"
+    elif isinstance(value, int):
+        text = hex(value) if value.bit_length() > 200 else str(value)
+    elif hasattr(value, "__float__") and not getattr(value, "shape", ()):
+        text = repr(float(value))
+    else:
+        text = str(value)
+    return text if len(text) <= width else text[: width - 3] + "..."
+
+
+def listed(entries: Sequence[str], conjunction: str) -> str:
+    """Join entries as a sentence would: "a, b or c"."""
+    return entries[0] if len(entries) == 1 else f"{', '.join(entries[:-1])} {conjunction} {entries[-1]}"
+
+
+def did_you_mean(word: object, known: Iterable[str]) -> str:
+    """Return "; did you mean ...?" with the nearest known word, or nothing."""
+    near = difflib.get_close_matches(str(word)[:100], list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}

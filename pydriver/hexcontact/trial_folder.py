@@ -13,13 +13,13 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .accuracy import Solution
 from .errors import DeckError
 from .netcdf import flush, reading
 from .result import Metadata, Result
@@ -30,6 +30,34 @@ if TYPE_CHECKING:
 VERSION = 2  # 1 had no checksum
 _JOURNAL = re.compile(r"\d+_\d+\.nc\.d")
 FOLDER = "lattices"  # in the journal
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What the solution on one lattice came to.
+
+    Parameters
+    ----------
+    level : int
+        How often the lattice was refined.
+    copy : int
+        0: the lattice itself, else the number of its shifted copy.
+    spacing : float
+        Spacing, m.
+    origin : tuple of float
+        Position of a node, m.
+    nodes : int
+        Nodes of the largest window that it was solved on.
+    histories : sequence of mapping
+        History of each load step.
+    """
+
+    level: int
+    copy: int
+    spacing: float
+    origin: tuple[float, float]
+    nodes: int
+    histories: Sequence[Mapping[str, Any]]
 
 
 class TrialFolder:

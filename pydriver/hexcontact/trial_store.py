@@ -14,10 +14,10 @@ from .result import Step
 from .trial_folder import TrialFolder
 
 if TYPE_CHECKING:
-    from .accuracy import Solution
     from .journal import Journal
     from .problem import Problem
     from .store import Store
+    from .trial_folder import Solution
 
 _SAME = 1e-12  # relative difference of spacings that are the same
 

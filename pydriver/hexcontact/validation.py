@@ -1,7 +1,7 @@
 """What every table of a deck shares: kinds of values, strict keys, a sentence for each thing wrong.
 
 A kind of value knows what it expects, in words, and how to read it. A `Table` is a pydantic model that
-forbids unknown keys and turns whatever pydantic finds into `Problem` sentences; all of them reach the user at
+forbids unknown keys and turns whatever pydantic finds into `Mistake` sentences; all of them reach the user at
 once, as one `DeckError`.
 """
 
@@ -17,7 +17,8 @@ from typing import Any, NoReturn, Self, TypeGuard
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
-from .messages import MISSING, Problem, Source, deck_error, did_you_mean, listed, shown
+from .faults import MISSING, Mistake, Source, deck_error
+from .text import did_you_mean, listed, shown
 from .units import NUMBER, Dimension, UnitError, to_si
 from .variables import LARGEST
 
@@ -29,7 +30,7 @@ def refuse(sentence: str) -> NoReturn:
 
 def refuse_key(key: str, value: object, sentence: str) -> NoReturn:
     """Reject one key of a table that is being validated as a single value."""
-    raise ValidationError.from_exception_data("", [_details(Problem((key,), value, sentence))])
+    raise ValidationError.from_exception_data("", [_details(Mistake((key,), value, sentence))])
 
 
 SMALLEST = 1.0 / LARGEST
@@ -262,7 +263,7 @@ class Table(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _collect(cls, data: Any, handler: Any) -> Any:
-        found: list[Problem] = []
+        found: list[Mistake] = []
         table = None
         try:
             table = handler(data)
@@ -270,32 +271,32 @@ class Table(BaseModel):
             found += [cls._problem(details) for details in error.errors(include_url=False)]
         if isinstance(data, Mapping):
             for key, sentence in cls.conflicts(data):
-                found.append(Problem((key,) if key else (), data.get(key, MISSING), sentence))
+                found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
         if found:
             raise ValidationError.from_exception_data(cls.__name__, [_details(problem) for problem in found])
         return table
 
     @classmethod
-    def _problem(cls, details: Any) -> Problem:
+    def _problem(cls, details: Any) -> Mistake:
         key, value, kind = details["loc"], details["input"], details["type"]
         if kind == "deck":
             # The problem may come from a table below, which has marked a missing value already.
-            return Problem(
+            return Mistake(
                 key, MISSING if details["ctx"].get("missing") else value, details["ctx"]["sentence"]
             )
         known = cls.known_keys()
         if kind == "missing":
-            return Problem(key, MISSING, f"missing; expected {expectation(known[key[0]])}")
+            return Mistake(key, MISSING, f"missing; expected {expectation(known[key[0]])}")
         if kind == "extra_forbidden":
             hint = did_you_mean(key[0], known) or f"; known here: {listed(sorted(known), 'and')}"
-            return Problem(key, MISSING, f"unknown key{hint}")
+            return Mistake(key, MISSING, f"unknown key{hint}")
         if kind == "list_type":
-            return Problem(key, MISSING, f"expected an array of tables: write [[{key[-1]}]]")
+            return Mistake(key, MISSING, f"expected an array of tables: write [[{key[-1]}]]")
         if kind == "too_short":
-            return Problem(key, MISSING, "expected at least one entry")
+            return Mistake(key, MISSING, "expected at least one entry")
         if kind in ("model_type", "model_attributes_type", "dict_type"):
-            return Problem(key, value, "expected a table of keys")
-        return Problem(key, value, details["msg"])
+            return Mistake(key, value, "expected a table of keys")
+        return Mistake(key, value, details["msg"])
 
 
 def kind_of(info: Any) -> Kind | None:
@@ -314,7 +315,7 @@ def expectation(info: Any) -> str:
     return "an array of tables of keys" if "list[" in str(info.annotation) else "a table of keys"
 
 
-def _details(problem: Problem) -> InitErrorDetails:
+def _details(problem: Mistake) -> InitErrorDetails:
     context = {"sentence": problem.sentence, "missing": problem.value is MISSING}
     value = None if problem.value is MISSING else problem.value
     return InitErrorDetails(
@@ -322,6 +323,6 @@ def _details(problem: Problem) -> InitErrorDetails:
     )
 
 
-def problems_of(error: ValidationError) -> list[Problem]:
+def problems_of(error: ValidationError) -> list[Mistake]:
     """Return the problems that a `Table` found while it was validated."""
     return [Table._problem(details) for details in error.errors(include_url=False)]

@@ -20,8 +20,8 @@ from .errors import DeckError
 from .estimators import area_radius, pressure_center
 from .load_history import MOTIONS
 from .load_series import LOADS
-from .messages import listed
 from .result import Step
+from .text import listed
 from .variables import FIELDS
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from .edges import ContactEdges, Edge
 from .errors import DeckError
 from .estimators import area_radius
+from .history import RESIDUALS
 from .load_history import LoadStep
-from .progress import RESIDUALS
 from .result import Step
 from .window import Array, Window
 

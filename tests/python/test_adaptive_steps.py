@@ -9,8 +9,19 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from hexcontact import Case, ConvergenceError, DeckError, adaptive_steps, estimates, remarks, summary
-from hexcontact.progress import Lines, describe
+from hexcontact import (
+    Case,
+    ConvergenceError,
+    DeckError,
+    adaptive_steps,
+    estimates,
+    history,
+    overview,
+    remarks,
+    summary,
+)
+from hexcontact.history import describe
+from hexcontact.progress import Lines
 from hexcontact.restart import resume
 from hexcontact.result import Result, Step
 from hexcontact.schema import deck_schema
@@ -312,10 +323,10 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     assert lines[0].startswith("step   1 (") and "(100%)" in lines[-1]
     assert " ± " in lines[-1]
     assert " ± " not in describe(result.history.iloc[-1].to_dict(), short=True)
-    rows = dict(summary.step_rows(result.history.iloc[-1].to_dict()))
+    rows = dict(history.step_rows(result.history.iloc[-1].to_dict()))
     assert rows["load steps"].startswith("stick area within ")
     console = Console(file=io.StringIO(), width=150)
-    console.print(summary.pairs("", summary.case_rows(case)))
+    console.print(summary.pairs("", overview.case_rows(case)))
     text = console.file.getvalue()  # type: ignore[attr-defined]
     assert "chosen on the way in 2 segments (step_tolerance 0.1)" in text
     assert "a third or three times as much" in estimates.work(case)

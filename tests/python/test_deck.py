@@ -13,9 +13,10 @@ from hexcontact import deck as decks
 from hexcontact.deck import Deck, Load, Segment, read_toml, with_overrides
 from hexcontact.deck_location import places
 from hexcontact.errors import DeckError
+from hexcontact.faults import Source
 from hexcontact.load_history import LoadStep, Target, load_steps
-from hexcontact.messages import Source, shown
 from hexcontact.surfaces import SHAPES, Flat, Sphere, Surface
+from hexcontact.text import shown
 from hexcontact.validation import Table, kind_of
 
 ROOT = Path(__file__).parents[2]

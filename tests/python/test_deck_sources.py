@@ -21,9 +21,9 @@ from hexcontact.deck import Deck
 from hexcontact.deck_text import written
 from hexcontact.errors import DeckError
 from hexcontact.estimates import operator_applications, seconds
+from hexcontact.faults import Source
 from hexcontact.load_series import read_series
-from hexcontact.messages import Source
-from hexcontact.summary import case_rows
+from hexcontact.overview import case_rows
 
 ROOT = Path(__file__).parents[2]
 

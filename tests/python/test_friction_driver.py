@@ -15,17 +15,29 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 from typer.testing import CliRunner
 
-from hexcontact import influence, json_output, memory, native, native_friction, remarks, solve, summary
+from hexcontact import (
+    history,
+    influence,
+    json_output,
+    memory,
+    native,
+    native_friction,
+    overview,
+    remarks,
+    solve,
+    summary,
+)
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.cli import app
 from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
 from hexcontact.estimators import area_radius
+from hexcontact.history import describe
 from hexcontact.lattice import Lattice
 from hexcontact.load_history import LoadStep, Target
 from hexcontact.native_friction import ContactState, FrictionalContact
 from hexcontact.plotting import report
-from hexcontact.progress import Lines, describe
+from hexcontact.progress import Lines
 from hexcontact.result import Result, Step
 from hexcontact.store import Journal, journal_of, open_result
 from hexcontact.surfaces import Punch, Sphere
@@ -514,7 +526,7 @@ def test_a_step_that_was_halved_is_one_step(monkeypatch: pytest.MonkeyPatch) -> 
         assert_allclose(halved.fields[f"slip_increment_{axis}"][inside], moved[inside], rtol=0, atol=1e-20)
     spent = halved.history["dissipated_energy"] - before.history["dissipated_energy"]
     assert halved.history["dissipated_energy_step"] == pytest.approx(spent, rel=1e-12)
-    assert f"halved {halved.history['cuts']} time" in dict(summary.step_rows(halved.history))["work"]
+    assert f"halved {halved.history['cuts']} time" in dict(history.step_rows(halved.history))["work"]
     # the residual is that of what is recorded: of one step with the slip of all parts
     assert float(whole.history["residual_tangential"]) <= 1e-8 < 1e-3 < residual_of(halved, 0.1)
     assert halved.history["residual_tangential"] == pytest.approx(residual_of(halved, 0.1), rel=1e-9)
@@ -640,7 +652,7 @@ def test_the_table_fits_the_terminal(sheared: Result, width: int, dropped: set[s
 
 
 def test_the_last_step_in_words(sheared: Result) -> None:
-    rows = dict(summary.step_rows(sheared.history.to_dict("records")[-1]))
+    rows = dict(history.step_rows(sheared.history.to_dict("records")[-1]))
     assert rows["tangential load x"] == "2.000 N"
     assert "shift y" not in rows
     assert rows["stick"].endswith("µm, 0 m)")
@@ -649,9 +661,9 @@ def test_the_last_step_in_words(sheared: Result) -> None:
 
 
 def test_a_case_in_words() -> None:
-    rows = dict(summary.case_rows(sphere(friction_coefficient=math.inf, coupling="goodman")))
+    rows = dict(overview.case_rows(sphere(friction_coefficient=math.inf, coupling="goodman")))
     assert rows["friction"] == "no slip (coefficient inf), incremental, shear does not move the pressure"
-    rows = dict(summary.case_rows(sphere(algorithm="static")))
+    rows = dict(overview.case_rows(sphere(algorithm="static")))
     assert rows["friction"] == "coefficient 0.1, static"
     assert rows["pair"].endswith("beta = -0.1891, gamma = 0.4706")
     assert rows["load steps"] == "5 in 2 segments"

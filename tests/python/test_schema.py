@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from hexcontact import starters
 from hexcontact.cli import app
 from hexcontact.deck import Deck
-from hexcontact.messages import Source
+from hexcontact.faults import Source
 from hexcontact.schema import deck_schema
 
 ROOT = Path(__file__).parents[2]

@@ -21,7 +21,8 @@ import numpy as np
 from .. import summary
 from .._version import __version__
 from ..errors import DeckError
-from ..progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
+from ..history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, step_rows, worth_showing
+from ..overview import case_rows
 from ..remarks import remarks
 from ..step_view import scaled
 from ..text import escaped, quantity
@@ -110,7 +111,7 @@ def report(result: Result) -> str:
         "palette": np.round(255 * palette).astype(int).ravel().tolist(),
         "numbers": [history["step"] for history in histories],
         "labels": [str(history.get("label", "")) for history in histories],
-        "states": [summary.step_rows(history) for history in histories],
+        "states": [step_rows(history) for history in histories],
         "charts": charts_of(histories),
         "fields": maps_of(result, numbers) if numbers else None,
     }
@@ -168,7 +169,7 @@ def _inputs(result: Result) -> list[tuple[str, ...]]:
         left_out |= {"spacing", "accuracy", "work"}  # those of the first lattice, and guesses
         rows = [("spacing", quantity(float(attributes["lattice_spacing"]), "m"))]
     if case is not None:
-        rows = [row for row in summary.case_rows(case) if row[0] not in left_out] + rows
+        rows = [row for row in case_rows(case) if row[0] not in left_out] + rows
     elif "effective_modulus" in attributes:
         rows = [
             (

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import difflib
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
 from .deck_location import Place, place_of, places
 from .errors import DeckError, Fault
+from .text import dotted, shown
 
 MISSING: Any = object()
 """The value of a problem with a key that is not there, or not worth repeating."""
 
 
-class Problem(NamedTuple):
+class Mistake(NamedTuple):
     """One thing that is wrong with a deck.
 
     Attributes
@@ -90,7 +89,7 @@ class Source:
         return [(name, places(text)) for name, text in ((self.name, self.text), *self.included)]
 
 
-def deck_error(problems: Iterable[Problem], source: Source) -> DeckError:
+def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
     """Put all problems into one exception, a line for each."""
     faults = []
     for problem in sorted(problems, key=lambda problem: source.order(dotted(problem.key))):
@@ -101,40 +100,3 @@ def deck_error(problems: Iterable[Problem], source: Source) -> DeckError:
         faults.append(Fault(message, key, value, file, *(place or (None, None))))
     faults = list(dict.fromkeys(faults))
     return DeckError("\n".join(dict.fromkeys(fault.message for fault in faults)), faults)
-
-
-def dotted(key: Sequence[str | int]) -> str:
-    """Write the path of a key as users know it: "load.2.steps" is the second entry of [[load]]."""
-    return ".".join(str(part + 1) if isinstance(part, int) else part for part in key)
-
-
-def shown(value: object, width: int = 60, depth: int = 5) -> str:
-    """Write a value the way a deck would, shortened if it is long or deep."""
-    if isinstance(value, str | bool):
-        text = json.dumps(value, ensure_ascii=False)
-    elif isinstance(value, Mapping | list | tuple) and depth == 0:
-        text = "..."
-    elif isinstance(value, Mapping):
-        text = (
-            "{" + ", ".join(f"{key} = {shown(entry, width, depth - 1)}" for key, entry in value.items()) + "}"
-        )
-    elif isinstance(value, list | tuple):
-        text = "[" + ", ".join(shown(entry, width, depth - 1) for entry in value[:width]) + "]"
-    elif isinstance(value, int):
-        text = hex(value) if value.bit_length() > 200 else str(value)
-    elif hasattr(value, "__float__") and not getattr(value, "shape", ()):
-        text = repr(float(value))
-    else:
-        text = str(value)
-    return text if len(text) <= width else text[: width - 3] + "..."
-
-
-def listed(entries: Sequence[str], conjunction: str) -> str:
-    """Join entries as a sentence would: "a, b or c"."""
-    return entries[0] if len(entries) == 1 else f"{', '.join(entries[:-1])} {conjunction} {entries[-1]}"
-
-
-def did_you_mean(word: object, known: Iterable[str]) -> str:
-    """Return "; did you mean ...?" with the nearest known word, or nothing."""
-    near = difflib.get_close_matches(str(word)[:100], list(known), n=1)
-    return f"; did you mean {near[0]}?" if near else ""

@@ -7,6 +7,7 @@
 module hc_f2py_handles
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_error, only: error_t, status, raise
+  use hc_lock, only: lock, unlock, handle_table
   use hc_lattice, only: lattice_t
   use hc_flexibility, only: flexibility_t
   use hc_normal_contact, only: normal_contact_t
@@ -46,17 +47,24 @@ contains
   subroutine free_slot(handle)
     !> Handle of an operator or a problem
     integer(c_int64_t), intent(in) :: handle
-    integer :: i
+    logical :: mine
 
-    i = int(modulo(handle, int(n_slot, c_int64_t))) + 1
-    if (handle < 0 .or. slots(i)%generation /= handle/n_slot) return
-    associate (slot => slots(i))
+    if (handle < 0) return
+    associate (slot => slots(int(modulo(handle, int(n_slot, c_int64_t))) + 1))
+      call lock(handle_table)
+      ! one that is at work, or being freed, in another thread stays that thread's
+      mine = slot%generation == handle/n_slot .and. .not. slot%busy
+      if (mine) slot%busy = .true.
+      call unlock(handle_table)
+      if (.not. mine) return
       if (associated(slot%operator)) deallocate (slot%operator)
       if (associated(slot%normal_contact)) deallocate (slot%normal_contact)
       if (associated(slot%direct_contact)) deallocate (slot%direct_contact)
       if (associated(slot%friction)) deallocate (slot%friction)
+      call lock(handle_table)
       slot%generation = slot%generation + 1
       slot%busy = .false.
+      call unlock(handle_table)
     end associate
   end subroutine free_slot
 
@@ -69,7 +77,7 @@ contains
 
     handle = -1
     free = 0
-    !$omp critical (hc_handles)
+    call lock(handle_table)
     do i = 1, n_slot
       if (modulo(slots(i)%generation, 2_c_int64_t) == 0) then
         free = i
@@ -77,7 +85,7 @@ contains
         exit
       end if
     end do
-    !$omp end critical (hc_handles)
+    call unlock(handle_table)
     slot => slots(max(free, 1))
     if (free == 0) then
       call raise(error, status%resources, 'too many contact problems exist at once: delete some')
@@ -92,30 +100,36 @@ contains
     integer(c_int), intent(in) :: n_node
     type(slot_t), pointer, intent(out) :: slot
     type(error_t), allocatable, intent(out) :: error
-    logical :: busy
+    logical :: stale, busy
 
     slot => slots(int(modulo(handle, int(n_slot, c_int64_t))) + 1)
-    if (handle < 0 .or. slot%generation /= handle/n_slot) then
+    busy = .true.
+    call lock(handle_table)
+    stale = handle < 0 .or. slot%generation /= handle/n_slot
+    if (.not. stale) then
+      busy = slot%busy
+      slot%busy = .true.
+    end if
+    call unlock(handle_table)
+    if (stale) then
       call raise(error, status%bad_handle, 'the handle is stale: its object has been freed')
       return
     end if
-    if (slot%lattice%size() /= n_node) then
+    if (busy) then
+      call raise(error, status%bad_handle, 'the object is at work in another thread')
+    else if (slot%lattice%size() /= n_node) then
+      call leave(slot)
       call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
-      return
     end if
-    !$omp critical (hc_handles)
-    busy = slot%busy
-    slot%busy = .true.
-    !$omp end critical (hc_handles)
-    if (busy) call raise(error, status%bad_handle, 'the object is at work in another thread')
   end subroutine enter
 
   !> Mark a handle as free for work.
   subroutine leave(slot)
     type(slot_t), pointer, intent(in) :: slot
-    !$omp critical (hc_handles)
+
+    call lock(handle_table)
     slot%busy = .false.
-    !$omp end critical (hc_handles)
+    call unlock(handle_table)
   end subroutine leave
 
   !> Elastic constants from a vector.

@@ -6,7 +6,7 @@ module hc_f2py_friction
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, secure, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
   use hc_friction_law, only: coulomb_t
@@ -83,11 +83,17 @@ contains
     type(coulomb_t) :: friction
     type(windowed_friction_t), pointer :: fft
     type(direct_friction_t), pointer :: dense
+    integer(c_int64_t) :: bytes
 
     friction%no_slip = coefficient > 0.5_wp*huge(1.0_wp)
     if (.not. friction%no_slip) friction%coefficient = coefficient
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
+    if (.not. allocated(error)) then
+      bytes = 0
+      if (method /= direct) call friction_memory_needed(method, extent, max(n_threads, 1_c_int), bytes)
+      call secure(slot, bytes, n_threads, error)
+    end if
     if (.not. allocated(error)) then
       call new_friction_problem(problem, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
                                 reshape(candidate /= 0, extent), friction, goodman /= 0, error)

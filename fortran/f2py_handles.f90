@@ -8,8 +8,10 @@ module hc_f2py_handles
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_error, only: error_t, status, raise
   use hc_lock, only: lock, unlock, handle_table
+  use hc_memory, only: require_memory
   use hc_lattice, only: lattice_t
   use hc_flexibility, only: flexibility_t
+  use hc_convolution, only: threads_for
   use hc_normal_contact, only: normal_contact_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_direct_contact, only: direct_contact_t
@@ -18,7 +20,7 @@ module hc_f2py_handles
   implicit none
   private
 
-  public :: slot_t, kernel_cache, take_slot, enter, leave, free_slot, report, pair_of
+  public :: slot_t, kernel_cache, take_slot, secure, enter, leave, free_slot, report, pair_of
 
   !> Objects that may exist at a time.
   integer, parameter :: n_slot = 4096
@@ -29,6 +31,9 @@ module hc_f2py_handles
     integer(c_int64_t) :: generation = 0
     !> At work in some thread
     logical :: busy = .false.
+    !> Bytes that work on it may take, and threads
+    integer(c_int64_t) :: working = 0
+    integer(c_int) :: n_threads = 1
     type(lattice_t) :: lattice
     class(flexibility_t), pointer :: operator => null()
     type(normal_contact_t), pointer :: normal_contact => null()
@@ -94,6 +99,21 @@ contains
     handle = slot%generation*n_slot + free - 1
   end subroutine take_slot
 
+  !> Refuse a problem for which there is no memory; say what solving it may take.
+  subroutine secure(slot, bytes, n_threads, error)
+    type(slot_t), intent(inout) :: slot
+    !> Memory of the problem, that of solving it included; 0: what asks for its memory as it needs it
+    integer(c_int64_t), intent(in) :: bytes
+    !> Threads to use; 0: as many as OpenMP would take
+    integer(c_int), intent(in) :: n_threads
+    type(error_t), allocatable, intent(out) :: error
+
+    slot%n_threads = threads_for(slot%lattice%extent, n_threads)
+    ! a fifth at least, mostly a quarter, are operators and fields that are there from the beginning on
+    slot%working = 4*bytes/5
+    call require_memory(bytes, error, slot%n_threads)
+  end subroutine secure
+
   !> Look a handle up and mark it as at work.
   subroutine enter(handle, n_node, slot, error)
     integer(c_int64_t), intent(in) :: handle
@@ -120,6 +140,9 @@ contains
     else if (slot%lattice%size() /= n_node) then
       call leave(slot)
       call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
+    else
+      call require_memory(slot%working, error, slot%n_threads)
+      if (allocated(error)) call leave(slot)
     end if
   end subroutine enter
 

@@ -18,7 +18,7 @@
 module hc_krylov
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_lapack, only: dgesv
+  use hc_lapack, only: eliminate
   use hc_packing, only: packing_t, new_packing
   use hc_vectors, only: fill, dot, dots, add_columns, sum_block
   implicit none
@@ -116,7 +116,7 @@ contains
     !> Threads to use
     integer, intent(in) :: n_threads
     real(wp) :: gram(size(mb, 2), size(mb, 2)), scale(size(mb, 2))
-    integer :: m, k, info, pivot(size(mb, 2))
+    integer :: m, k
 
     independent = .true.
     inverse = 0.0_wp
@@ -134,8 +134,8 @@ contains
       gram(:, m) = gram(:, m)/(scale*scale(m))
       inverse(m, m) = 1.0_wp/scale(m)
     end do
-    call dgesv(size(mb, 2), size(mb, 2), gram, size(mb, 2), pivot, inverse, size(mb, 2), info)
-    independent = info == 0 .and. all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
+    call eliminate(gram, inverse)
+    independent = all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
     inverse = inverse/spread(scale, 2, size(mb, 2))
     if (.not. independent) inverse = 0.0_wp
   end subroutine invert_gram

@@ -1,9 +1,11 @@
-/* What Fortran has no words for: locks between threads of any kind, and who may have written a file. */
+/* What Fortran has no words for: locks between threads of any kind, memory before it is taken, and who may have
+   written a file. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -13,6 +15,28 @@ static pthread_mutex_t mutex[] = {PTHREAD_MUTEX_INITIALIZER, PTHREAD_MUTEX_INITI
 
 void hexcontact_lock(int which) { pthread_mutex_lock(&mutex[which]); }
 void hexcontact_unlock(int which) { pthread_mutex_unlock(&mutex[which]); }
+
+/* Whether so many bytes can be had at once. */
+int hexcontact_can_map(size_t size)
+{
+  void *start = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+
+  if (start == MAP_FAILED) return 0;
+  munmap(start, size);
+  return 1;
+}
+
+/* Bytes of the stack that a new thread gets. */
+size_t hexcontact_stack_size(void)
+{
+  pthread_attr_t attributes;
+  size_t size = 0;
+
+  if (pthread_attr_init(&attributes) != 0) return 0;
+  pthread_attr_getstacksize(&attributes, &size);
+  pthread_attr_destroy(&attributes);
+  return size;
+}
 
 /* Open a file for reading: a regular one that, unless it is shared, nobody but this user and root may have written.
    Returns NULL with a status of kernel_file.f90 if it cannot be had. */

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import mesh
+from . import memory, mesh
 from .errors import DeckError, HexcontactError
 from .result import Layout, Metadata, Result, Step
 from .result_check import fault_of_dimensions, fault_of_result
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import netCDF4
 
 _CHUNK = 512  # nodes of a chunk along row and col
+_CACHE = 16 * 2**20  # bytes of a variable that the netCDF library holds at most
 _netcdf = threading.Lock()  # the netCDF library must not be entered by two threads
 
 
@@ -57,7 +58,8 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
     OSError
         If the file cannot be written.
     """
-    with _new_file(path) as file:
+    field = 8 * layout.sizes["row"] * layout.sizes["col"] * layout.sizes["step"]
+    with _new_file(path, len(layout.fields) * min(field, _CACHE)) as file:
         with _alone():
             file.setncatts(layout.attributes(complete))
             for name, size in layout.sizes.items():
@@ -83,10 +85,11 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
 
 
 @contextlib.contextmanager
-def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Create a file; in the end close it and flush it to disk."""
+def _new_file(path: Path, cached: int) -> Iterator[netCDF4.Dataset]:
+    """Create a file, with so many bytes of fields in memory; in the end close it and flush it to disk."""
     import netCDF4
 
+    memory.claim(cached + memory.WRITING)  # it crashes without
     try:
         with _alone():
             file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")

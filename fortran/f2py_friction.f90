@@ -26,6 +26,8 @@ module hc_f2py_friction
   integer, parameter :: n_field = 9
   !> Numbers of a state: loads, motions, dissipated energy
   integer, parameter :: n_number = 2*n_motion + 1
+  !> Fields in which it is found where nodes stood when their gap closed
+  integer, parameter :: entry_fields = 45
 
 contains
 
@@ -157,7 +159,7 @@ contains
 
     new_fields = 0.0_c_double
     zone = 0
-    call enter(handle, n_node, slot, error)
+    call enter(handle, n_node, slot, error, merge(entry_fields*8_c_int64_t*n_node, 0_c_int64_t, interpolated /= 0))
     if (.not. allocated(error)) then
       if (associated(slot%friction)) then
         call unpack_state(slot%lattice, fields, numbers, state)

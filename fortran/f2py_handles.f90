@@ -115,11 +115,14 @@ contains
   end subroutine secure
 
   !> Look a handle up and mark it as at work.
-  subroutine enter(handle, n_node, slot, error)
+  subroutine enter(handle, n_node, slot, error, more)
     integer(c_int64_t), intent(in) :: handle
     integer(c_int), intent(in) :: n_node
     type(slot_t), pointer, intent(out) :: slot
     type(error_t), allocatable, intent(out) :: error
+    !> Bytes that the work takes beyond what solving does
+    integer(c_int64_t), intent(in), optional :: more
+    integer(c_int64_t) :: bytes
     logical :: stale, busy
 
     slot => slots(int(modulo(handle, int(n_slot, c_int64_t))) + 1)
@@ -141,7 +144,9 @@ contains
       call leave(slot)
       call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
     else
-      call require_memory(slot%working, error, slot%n_threads)
+      bytes = slot%working
+      if (present(more)) bytes = bytes + more
+      call require_memory(bytes, error, slot%n_threads)
       if (allocated(error)) call leave(slot)
     end if
   end subroutine enter

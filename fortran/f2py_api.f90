@@ -25,6 +25,8 @@ module hc_f2py_api
 
   !> The method of explicit matrices and LAPACK; any other number means FFT.
   integer, parameter :: direct = 0
+  !> Bytes of its fields over the nodes; matrices are asked for where they are made
+  integer(c_int64_t), parameter :: dense_fields = 500
 
 contains
 
@@ -107,7 +109,7 @@ contains
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, [0, 0], extent, error)
     if (.not. allocated(error)) then
-      bytes = 0
+      bytes = dense_fields*product(int(extent, c_int64_t))
       if (method /= direct) call memory_needed(method, extent, 1_c_int, max(n_threads, 1_c_int), bytes)
       call secure(slot, bytes, n_threads, error)
     end if
@@ -193,7 +195,7 @@ contains
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error)
     if (.not. allocated(error)) then
-      bytes = 0
+      bytes = dense_fields*product(int(extent, c_int64_t))
       if (method /= direct) call memory_needed(method, extent, 0_c_int, max(n_threads, 1_c_int), bytes)
       call secure(slot, bytes, n_threads, error)
     end if

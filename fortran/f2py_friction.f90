@@ -22,6 +22,8 @@ module hc_f2py_friction
 
   !> The method of explicit matrices and LAPACK; any other number means FFT.
   integer, parameter :: direct = 0
+  !> Bytes of its fields over the nodes; matrices are asked for where they are made
+  integer(c_int64_t), parameter :: dense_fields = 500
   !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path
   integer, parameter :: n_field = 9
   !> Numbers of a state: loads, motions, dissipated energy
@@ -92,7 +94,7 @@ contains
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
     if (.not. allocated(error)) then
-      bytes = 0
+      bytes = dense_fields*product(int(extent, c_int64_t))
       if (method /= direct) call friction_memory_needed(method, extent, max(n_threads, 1_c_int), bytes)
       call secure(slot, bytes, n_threads, error)
     end if

@@ -102,7 +102,7 @@ contains
   !> Refuse a problem for which there is no memory; say what solving it may take.
   subroutine secure(slot, bytes, n_threads, error)
     type(slot_t), intent(inout) :: slot
-    !> Memory of the problem, that of solving it included; 0: what asks for its memory as it needs it
+    !> Memory of the problem, that of solving it included
     integer(c_int64_t), intent(in) :: bytes
     !> Threads to use; 0: as many as OpenMP would take
     integer(c_int), intent(in) :: n_threads

@@ -17,7 +17,7 @@
 !> along other vectors B, GMRES does the same with (C^T M B)^-1 C^T.
 module hc_krylov
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_lapack, only: eliminate
   use hc_packing, only: packing_t, new_packing
   use hc_vectors, only: fill, dot, dots, add_columns, sum_block
@@ -300,7 +300,7 @@ contains
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
-    integer :: i, k, n_threads
+    integer :: i, k, n_threads, stat
 
     iterations = 0
     n_threads = system%n_threads
@@ -330,7 +330,11 @@ contains
     do k = 1, max_iterations
       call expand(basis(k)%v, error)
       if (allocated(error)) return
-      allocate (basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active))
+      allocate (basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
+      if (stat /= 0) then
+        call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
+        return
+      end if
       call nodes%unpack(z, from)
       call system%product(from, basis(k)%image, error)
       if (allocated(error)) return

@@ -65,7 +65,7 @@ def assert_same(one: Result, other: Result) -> None:
 
 
 def test_locks_hold_in_a_build_without_openmp() -> None:
-    sources = sorted((Path(__file__).parents[2] / "fortran").glob("*.f90"))
+    sources = sorted((Path(__file__).parents[2] / "fortran").rglob("*.f90"))
     assert len(sources) > 50
     for path in sources:
         assert not re.search(r"(?i)!\$omp\s+(critical|atomic)", path.read_text(encoding="utf-8")), path

@@ -13,6 +13,7 @@ module hc_convolution
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
+  use hc_lock, only: lock, unlock, fftw_planner
   use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, release
   use hc_kernel_cache, only: kernel_cache_t
   use hc_row_pairs, only: split_rows, join_rows
@@ -254,14 +255,14 @@ contains
     n1 = self%padded(1)
     width = self%width
     ! FFTW_ESTIMATE: the same plan, and the same result, in every run
-    !$omp critical (hc_fftw_planner)
+    call lock(fftw_planner)
     length = n1
     self%row_plan = fftw_plan_many_dft(1_c_int, length, 1_c_int, self%row_buffer(:, 1, 1), length, 1_c_int, n1, &
                                        self%row_buffer(:, 2, 1), length, 1_c_int, n1, fftw_forward, fftw_estimate)
     length = self%padded(2)
     self%column_plan = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer(:, 1, 1, 1), length, 1_c_int, length(1), &
                                           self%block_buffer(:, 1, 2, 1), length, 1_c_int, length(1), fftw_forward, fftw_estimate)
-    !$omp end critical (hc_fftw_planner)
+    call unlock(fftw_planner)
     if (.not. (c_associated(self%row_plan) .and. c_associated(self%column_plan))) then
       call raise(error, status%resources, 'FFTW could not plan the transforms of this window')
     end if
@@ -492,10 +493,10 @@ contains
   impure elemental subroutine free(self)
     type(convolution_t), intent(inout) :: self
 
-    !$omp critical (hc_fftw_planner)
+    call lock(fftw_planner)
     if (c_associated(self%row_plan)) call fftw_destroy_plan(self%row_plan)
     if (c_associated(self%column_plan)) call fftw_destroy_plan(self%column_plan)
-    !$omp end critical (hc_fftw_planner)
+    call unlock(fftw_planner)
     self%row_plan = c_null_ptr
     self%column_plan = c_null_ptr
     self%spectrum => null()

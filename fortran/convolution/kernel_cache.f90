@@ -5,6 +5,7 @@
 !> Several threads may use one cache.
 module hc_kernel_cache
   use, intrinsic :: iso_fortran_env, only: int64
+  use hc_lock, only: lock, unlock, kernel_table
   use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, release
   use hc_kernel_file, only: read_kernels, write_kernels, file_name
   implicit none
@@ -35,6 +36,8 @@ module hc_kernel_cache
     type(entry_t), private :: entry(n_entry)
     !> The folder; what made the spectra; a word for names that nobody else gives
     character(len=:), allocatable, private :: folder, maker, word
+    !> Files of other users are taken, too
+    logical, private :: shared = .false.
     !> What is wrong with the folder, since it was last asked for
     character(len=:), allocatable, private :: complaint
   contains
@@ -59,14 +62,14 @@ contains
     !> Bytes; 0: nothing is kept
     integer(int64), intent(in) :: bound
 
-    !$omp critical (hc_kernel_cache)
+    call lock(kernel_table)
     self%bound = max(bound, 0_int64)
     call make_room(self, 0_int64)
-    !$omp end critical (hc_kernel_cache)
+    call unlock(kernel_table)
   end subroutine limit
 
   !> Keep spectra in a folder, too.
-  subroutine use_folder(self, folder, maker, word, room)
+  subroutine use_folder(self, folder, maker, word, room, shared)
     class(kernel_cache_t), intent(inout) :: self
     !> The folder, which is there, with a slash at the end, so that its name may end with a blank; empty: none
     character(len=*), intent(in) :: folder
@@ -76,14 +79,17 @@ contains
     character(len=*), intent(in) :: word
     !> Bytes that may be written
     integer(int64), intent(in) :: room
+    !> Take files that other users may have written
+    logical, intent(in) :: shared
 
-    !$omp critical (hc_kernel_cache)
+    call lock(kernel_table)
     if (allocated(self%folder)) deallocate (self%folder)
     if (len_trim(folder) > 0) self%folder = trim(folder)
     self%maker = trim(maker)
     self%word = trim(word)
     self%room = room
-    !$omp end critical (hc_kernel_cache)
+    self%shared = shared
+    call unlock(kernel_table)
   end subroutine use_folder
 
   subroutine find(self, key, spectrum)
@@ -93,10 +99,11 @@ contains
     !> The spectra, to be released by the caller; not associated: they have to be made
     type(kernel_spectrum_t), pointer, intent(out) :: spectrum
     character(len=:), allocatable :: path, maker, complaint
+    logical :: shared
     integer :: i
 
     spectrum => null()
-    !$omp critical (hc_kernel_cache)
+    call lock(kernel_table)
     i = place_of(self, key)
     if (i > 0) then
       spectrum => self%entry(i)%spectrum
@@ -105,12 +112,13 @@ contains
       self%found = self%found + 1
     else if (allocated(self%folder)) then
       maker = self%maker
+      shared = self%shared
       path = self%folder//file_name(key, maker)
     end if
-    !$omp end critical (hc_kernel_cache)
+    call unlock(kernel_table)
     if (associated(spectrum)) return
-    if (allocated(path)) call read_kernels(path, key, maker, spectrum, complaint)
-    !$omp critical (hc_kernel_cache)
+    if (allocated(path)) call read_kernels(path, key, maker, shared, spectrum, complaint)
+    call lock(kernel_table)
     if (allocated(complaint)) call complain(self, complaint//': the kernels are worked out anew')
     if (associated(spectrum)) then
       self%read = self%read + 1
@@ -118,7 +126,7 @@ contains
     else
       self%missed = self%missed + 1
     end if
-    !$omp end critical (hc_kernel_cache)
+    call unlock(kernel_table)
   end subroutine find
 
   subroutine keep(self, key, spectrum)
@@ -131,7 +139,7 @@ contains
     character(len=20) :: number
     integer(int64) :: bytes
 
-    !$omp critical (hc_kernel_cache)
+    call lock(kernel_table)
     call insert(self, key, spectrum)
     if (allocated(self%folder) .and. spectrum%bytes() <= self%room) then
       maker = self%maker
@@ -140,17 +148,17 @@ contains
       write (number, '(i0)') self%written
       word = self%word//'-'//trim(number)
     end if
-    !$omp end critical (hc_kernel_cache)
+    call unlock(kernel_table)
     if (.not. allocated(path)) return
     call write_kernels(path, key, maker, spectrum, word, bytes, complaint)
-    !$omp critical (hc_kernel_cache)
+    call lock(kernel_table)
     self%room = self%room - bytes
     if (allocated(complaint)) then
       ! one complaint is enough
       if (self%room > 0) call complain(self, complaint//': no more kernels are kept in the folder')
       self%room = 0
     end if
-    !$omp end critical (hc_kernel_cache)
+    call unlock(kernel_table)
   end subroutine keep
 
   !> What was wrong since this was last asked; empty: nothing.
@@ -160,11 +168,11 @@ contains
     character(len=:), allocatable, intent(out) :: complaint
 
     complaint = ''
-    !$omp critical (hc_kernel_cache)
+    call lock(kernel_table)
     if (allocated(self%complaint)) then
       call move_alloc(self%complaint, complaint)
     end if
-    !$omp end critical (hc_kernel_cache)
+    call unlock(kernel_table)
   end subroutine take_complaint
 
   !> Spectra that a problem uses stay until it is gone.

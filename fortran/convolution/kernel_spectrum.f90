@@ -2,6 +2,7 @@
 module hc_kernel_spectrum
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
+  use hc_lock, only: lock, unlock, spectrum_users
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   implicit none
@@ -72,8 +73,10 @@ contains
 
   subroutine hold(self)
     class(kernel_spectrum_t), intent(inout) :: self
-    !$omp atomic update
+
+    call lock(spectrum_users)
     self%users = self%users + 1
+    call unlock(spectrum_users)
   end subroutine hold
 
   !> One user less; the last one frees the memory.
@@ -83,10 +86,10 @@ contains
     integer :: left
 
     if (.not. associated(spectrum)) return
-    !$omp atomic capture
+    call lock(spectrum_users)
     spectrum%users = spectrum%users - 1
     left = spectrum%users
-    !$omp end atomic
+    call unlock(spectrum_users)
     if (left == 0) deallocate (spectrum)
     spectrum => null()
   end subroutine release

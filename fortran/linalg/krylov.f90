@@ -18,8 +18,8 @@
 module hc_krylov
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
-  use hc_error, only: error_t
-  use hc_lapack, only: dgesv
+  use hc_error, only: error_t, status, raise
+  use hc_lapack, only: eliminate
   use hc_packing, only: packing_t, new_packing
   use hc_vectors, only: fill, dot, dots, add_columns, sum_block
   implicit none
@@ -120,7 +120,7 @@ contains
     !> Threads to use
     integer, intent(in) :: n_threads
     real(wp) :: gram(size(mb, 2), size(mb, 2)), scale(size(mb, 2))
-    integer :: m, k, info, pivot(size(mb, 2))
+    integer :: m, k
 
     independent = .true.
     inverse = 0.0_wp
@@ -138,8 +138,8 @@ contains
       gram(:, m) = gram(:, m)/(scale*scale(m))
       inverse(m, m) = 1.0_wp/scale(m)
     end do
-    call dgesv(size(mb, 2), size(mb, 2), gram, size(mb, 2), pivot, inverse, size(mb, 2), info)
-    independent = info == 0 .and. all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
+    call eliminate(gram, inverse)
+    independent = all([(abs(gram(m, m)), m=1, size(mb, 2))] > dependence)
     inverse = inverse/spread(scale, 2, size(mb, 2))
     if (.not. independent) inverse = 0.0_wp
   end subroutine invert_gram
@@ -313,7 +313,7 @@ contains
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
-    integer :: i, k, n_threads
+    integer :: i, k, n_threads, stat
 
     iterations = 0
     residual = huge(1.0_wp)
@@ -348,7 +348,11 @@ contains
     do k = 1, max_iterations
       call expand(basis(k)%v, error)
       if (allocated(error)) return
-      allocate (basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active))
+      allocate (basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
+      if (stat /= 0) then
+        call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
+        return
+      end if
       call nodes%unpack(z, from)
       call system%product(from, basis(k)%image, error)
       if (allocated(error)) return

@@ -1,11 +1,17 @@
 !> The procedures of BLAS and LAPACK that the library calls.
 module hc_lapack
-  use, intrinsic :: iso_fortran_env, only: real32
+  use, intrinsic :: iso_fortran_env, only: real32, int64
   use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_memory, only: require_memory
   implicit none
   private
 
-  public :: ddot, dgemm, dposv, dgesv, dsgesv, dgelss, spotrf, spotrs
+  public :: ddot, dgemm, dposv, dsgesv, dgelss, spotrf, spotrs
+  public :: prepare_lapack, eliminate
+
+  !> Bytes of address space that OpenBLAS takes for a buffer when it is first called, and a reserve.
+  integer(int64), parameter :: buffer_space = 160000000
 
   interface
     !> Scalar product
@@ -57,15 +63,6 @@ module hc_lapack
       integer, intent(out) :: info
     end subroutine dposv
 
-    !> Solve A X = B (LU with partial pivoting)
-    subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
-      import :: wp
-      implicit none
-      integer, intent(in) :: n, nrhs, lda, ldb
-      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
-      integer, intent(out) :: ipiv(*), info
-    end subroutine dgesv
-
     !> Solve A X = B (LU with partial pivoting in single precision, refined to full precision; should that
     !> fail, LU in full precision)
     subroutine dsgesv(n, nrhs, a, lda, ipiv, b, ldb, x, ldx, work, swork, iter, info)
@@ -90,5 +87,45 @@ module hc_lapack
       integer, intent(out) :: rank, info
     end subroutine dgelss
   end interface
+
+contains
+
+  !> Have LAPACK take its buffers now: OpenBLAS waits for ever for those that it cannot have.
+  subroutine prepare_lapack(error)
+    !> Allocated if there is no memory for them
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: matrix(1, 1), rhs(1, 1)
+    integer :: info
+
+    call require_memory(buffer_space, error)
+    if (allocated(error)) return
+    matrix = 1.0_wp
+    rhs = 1.0_wp
+    call dposv('U', 1, 1, matrix, 1, rhs, 1, info)
+  end subroutine prepare_lapack
+
+  !> Solve A X = B for a handful of unknowns, by elimination with partial pivoting; no buffers of LAPACK are needed.
+  pure subroutine eliminate(a, b)
+    !> Matrix (n, n); on return its upper triangle is that of the LU factors
+    real(wp), intent(inout) :: a(:, :)
+    !> Right-hand sides (n, number); on return the solutions, of no use if a pivot vanishes
+    real(wp), intent(inout) :: b(:, :)
+    integer :: i, k, n, pivot
+
+    n = size(a, 1)
+    do k = 1, n
+      pivot = k - 1 + maxloc(abs(a(k:, k)), dim=1)
+      a([k, pivot], :) = a([pivot, k], :)
+      b([k, pivot], :) = b([pivot, k], :)
+      if (abs(a(k, k)) <= 0.0_wp) return
+      do i = k + 1, n
+        b(i, :) = b(i, :) - a(i, k)/a(k, k)*b(k, :)
+        a(i, k:) = a(i, k:) - a(i, k)/a(k, k)*a(k, k:)
+      end do
+    end do
+    do k = n, 1, -1
+      b(k, :) = (b(k, :) - matmul(a(k, k + 1:), b(k + 1:, :)))/a(k, k)
+    end do
+  end subroutine eliminate
 
 end module hc_lapack

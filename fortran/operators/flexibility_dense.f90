@@ -5,6 +5,7 @@
 module hc_flexibility_dense
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_lapack, only: prepare_lapack
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
@@ -53,6 +54,8 @@ contains
       call raise(error, status%resources, 'the window is too large for a matrix: use method "fft"')
       return
     end if
+    call prepare_lapack(error)
+    if (allocated(error)) return
     operator%lattice = lattice
     operator%pair = pair
     n = lattice%extent

@@ -6,7 +6,7 @@ module hc_f2py_api
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, check_size, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: along_x, along_y
@@ -25,6 +25,8 @@ module hc_f2py_api
 
   !> The method of explicit matrices and LAPACK; any other number means FFT.
   integer, parameter :: direct = 0
+  !> Bytes of its fields over the nodes; matrices are asked for where they are made
+  integer(c_int64_t), parameter :: dense_fields = 500
 
 contains
 
@@ -106,9 +108,15 @@ contains
     type(error_t), allocatable :: error
     type(dense_flexibility_t), pointer :: dense
     type(fft_flexibility_t), pointer :: fft
+    integer(c_int64_t) :: bytes
 
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, [0, 0], extent, error)
+    if (.not. allocated(error)) then
+      bytes = dense_fields*product(int(extent, c_int64_t))
+      if (method /= direct) bytes = fft_memory(extent, .false., max(n_threads, 1)) + fft_setup_memory(extent)
+      call secure(slot, bytes, n_threads, error)
+    end if
     if (.not. allocated(error)) then
       if (method == direct) then
         allocate (dense)
@@ -186,10 +194,16 @@ contains
     character(len=512), intent(out) :: message
     type(slot_t), pointer :: slot
     type(error_t), allocatable :: error
+    integer(c_int64_t) :: bytes
 
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error)
     if (.not. allocated(error)) call check_size(slot, n_node, error)
+    if (.not. allocated(error)) then
+      bytes = dense_fields*product(int(extent, c_int64_t))
+      if (method /= direct) bytes = normal_contact_memory(extent, max(n_threads, 1))
+      call secure(slot, bytes, n_threads, error)
+    end if
     if (.not. allocated(error)) then
       if (method == direct) then
         allocate (slot%direct_contact)

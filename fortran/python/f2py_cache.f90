@@ -19,7 +19,7 @@ contains
   end subroutine limit_kernels
 
   !> Keep spectra in a folder, too.
-  subroutine use_kernel_folder(folder, maker, word, room)
+  subroutine use_kernel_folder(folder, maker, word, room, shared)
     !> The folder, which is there; empty: none
     character(len=*), intent(in) :: folder
     !> Program and machine
@@ -28,9 +28,11 @@ contains
     character(len=*), intent(in) :: word
     !> Bytes that may be written
     integer(c_int64_t), intent(in) :: room
+    !> Not zero: take files that other users may have written
+    integer(c_int), intent(in) :: shared
 
     if (.not. associated(kernel_cache)) allocate (kernel_cache)
-    call kernel_cache%use_folder(folder, maker, word, room)
+    call kernel_cache%use_folder(folder, maker, word, room, shared /= 0)
   end subroutine use_kernel_folder
 
   !> What is kept.

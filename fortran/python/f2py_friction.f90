@@ -6,7 +6,7 @@ module hc_f2py_friction
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, check_size, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
   use hc_friction_law, only: coulomb_t
@@ -22,10 +22,14 @@ module hc_f2py_friction
 
   !> The method of explicit matrices and LAPACK; any other number means FFT.
   integer, parameter :: direct = 0
+  !> Bytes of its fields over the nodes; matrices are asked for where they are made
+  integer(c_int64_t), parameter :: dense_fields = 500
   !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path
   integer, parameter :: n_field = 9
   !> Numbers of a state: loads, motions, dissipated energy
   integer, parameter :: n_number = 2*n_motion + 1
+  !> Fields in which it is found where nodes stood when their gap closed
+  integer, parameter :: entry_fields = 45
 
 contains
 
@@ -89,12 +93,19 @@ contains
     type(coulomb_t) :: friction
     type(windowed_friction_t), pointer :: fft
     type(direct_friction_t), pointer :: dense
+    integer(c_int64_t) :: bytes
 
     friction%no_slip = coefficient > 0.5_wp*huge(1.0_wp)
     if (.not. friction%no_slip) friction%coefficient = coefficient
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
     if (.not. allocated(error)) call check_size(slot, n_node, error)
+    if (.not. allocated(error)) then
+      bytes = dense_fields*product(int(extent, c_int64_t))
+      ! of the largest contact there can be, with all loads prescribed
+      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_motion, goodman == 0, max(n_threads, 1))
+      call secure(slot, bytes, n_threads, error)
+    end if
     if (.not. allocated(error)) then
       call new_friction_problem(problem, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
                                 reshape(candidate /= 0, extent), friction, goodman /= 0, error)
@@ -158,7 +169,7 @@ contains
 
     new_fields = 0.0_c_double
     zone = 0
-    call enter(handle, n_node, slot, error)
+    call enter(handle, n_node, slot, error, merge(entry_fields*8_c_int64_t*n_node, 0_c_int64_t, interpolated /= 0))
     if (.not. allocated(error)) then
       if (associated(slot%friction)) then
         call unpack_state(slot%lattice, fields, numbers, state)

@@ -7,8 +7,11 @@
 module hc_f2py_handles
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_error, only: error_t, status, raise
+  use hc_lock, only: lock, unlock, handle_table
+  use hc_memory, only: require_memory
   use hc_lattice, only: lattice_t
   use hc_flexibility, only: flexibility_t
+  use hc_convolution, only: threads_for
   use hc_normal_contact, only: normal_contact_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_direct_contact, only: direct_contact_t
@@ -17,7 +20,7 @@ module hc_f2py_handles
   implicit none
   private
 
-  public :: slot_t, kernel_cache, take_slot, check_size, enter, leave, free_slot, report, pair_of
+  public :: slot_t, kernel_cache, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of
 
   !> Objects that may exist at a time.
   integer, parameter :: n_slot = 4096
@@ -28,6 +31,9 @@ module hc_f2py_handles
     integer(c_int64_t) :: generation = 0
     !> At work in some thread
     logical :: busy = .false.
+    !> Bytes that work on it may take, and threads
+    integer(c_int64_t) :: working = 0
+    integer(c_int) :: n_threads = 1
     type(lattice_t) :: lattice
     class(flexibility_t), pointer :: operator => null()
     type(normal_contact_t), pointer :: normal_contact => null()
@@ -46,17 +52,24 @@ contains
   subroutine free_slot(handle)
     !> Handle of an operator or a problem
     integer(c_int64_t), intent(in) :: handle
-    integer :: i
+    logical :: mine
 
-    i = int(modulo(handle, int(n_slot, c_int64_t))) + 1
-    if (handle < 0 .or. slots(i)%generation /= handle/n_slot) return
-    associate (slot => slots(i))
+    if (handle < 0) return
+    associate (slot => slots(int(modulo(handle, int(n_slot, c_int64_t))) + 1))
+      call lock(handle_table)
+      ! one that is at work, or being freed, in another thread stays that thread's
+      mine = slot%generation == handle/n_slot .and. .not. slot%busy
+      if (mine) slot%busy = .true.
+      call unlock(handle_table)
+      if (.not. mine) return
       if (associated(slot%operator)) deallocate (slot%operator)
       if (associated(slot%normal_contact)) deallocate (slot%normal_contact)
       if (associated(slot%direct_contact)) deallocate (slot%direct_contact)
       if (associated(slot%friction)) deallocate (slot%friction)
+      call lock(handle_table)
       slot%generation = slot%generation + 1
       slot%busy = .false.
+      call unlock(handle_table)
     end associate
   end subroutine free_slot
 
@@ -69,7 +82,7 @@ contains
 
     handle = -1
     free = 0
-    !$omp critical (hc_handles)
+    call lock(handle_table)
     do i = 1, n_slot
       if (modulo(slots(i)%generation, 2_c_int64_t) == 0) then
         free = i
@@ -77,7 +90,7 @@ contains
         exit
       end if
     end do
-    !$omp end critical (hc_handles)
+    call unlock(handle_table)
     slot => slots(max(free, 1))
     if (free == 0) then
       call raise(error, status%resources, 'too many contact problems exist at once: delete some')
@@ -86,26 +99,56 @@ contains
     handle = slot%generation*n_slot + free - 1
   end subroutine take_slot
 
+  !> Refuse a problem for which there is no memory; say what solving it may take.
+  subroutine secure(slot, bytes, n_threads, error)
+    type(slot_t), intent(inout) :: slot
+    !> Memory of the problem, that of solving it included
+    integer(c_int64_t), intent(in) :: bytes
+    !> Threads to use; 0: as many as OpenMP would take
+    integer(c_int), intent(in) :: n_threads
+    type(error_t), allocatable, intent(out) :: error
+
+    slot%n_threads = threads_for(slot%lattice%extent, n_threads)
+    ! a fifth at least, mostly a quarter, are operators and fields that are there from the beginning on
+    slot%working = 4*bytes/5
+    call require_memory(bytes, error, slot%n_threads)
+  end subroutine secure
+
   !> Look a handle up and mark it as at work.
-  subroutine enter(handle, n_node, slot, error)
+  subroutine enter(handle, n_node, slot, error, more)
     integer(c_int64_t), intent(in) :: handle
     integer(c_int), intent(in) :: n_node
     type(slot_t), pointer, intent(out) :: slot
     type(error_t), allocatable, intent(out) :: error
-    logical :: busy
+    !> Bytes that the work takes beyond what solving does
+    integer(c_int64_t), intent(in), optional :: more
+    integer(c_int64_t) :: bytes
+    logical :: stale, busy
 
     slot => slots(int(modulo(handle, int(n_slot, c_int64_t))) + 1)
-    if (handle < 0 .or. slot%generation /= handle/n_slot) then
+    busy = .true.
+    call lock(handle_table)
+    stale = handle < 0 .or. slot%generation /= handle/n_slot
+    if (.not. stale) then
+      busy = slot%busy
+      slot%busy = .true.
+    end if
+    call unlock(handle_table)
+    if (stale) then
       call raise(error, status%bad_handle, 'the handle is stale: its object has been freed')
       return
     end if
+    if (busy) then
+      call raise(error, status%bad_handle, 'the object is at work in another thread')
+      return
+    end if
     call check_size(slot, n_node, error)
-    if (allocated(error)) return
-    !$omp critical (hc_handles)
-    busy = slot%busy
-    slot%busy = .true.
-    !$omp end critical (hc_handles)
-    if (busy) call raise(error, status%bad_handle, 'the object is at work in another thread')
+    if (.not. allocated(error)) then
+      bytes = slot%working
+      if (present(more)) bytes = bytes + more
+      call require_memory(bytes, error, slot%n_threads)
+    end if
+    if (allocated(error)) call leave(slot)
   end subroutine enter
 
   !> Refuse arrays that do not fit the window of a slot.
@@ -122,9 +165,10 @@ contains
   !> Mark a handle as free for work.
   subroutine leave(slot)
     type(slot_t), pointer, intent(in) :: slot
-    !$omp critical (hc_handles)
+
+    call lock(handle_table)
     slot%busy = .false.
-    !$omp end critical (hc_handles)
+    call unlock(handle_table)
   end subroutine leave
 
   !> Elastic constants from a vector.

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from .errors import Fault
 
 P = ParamSpec("P")
+# of the system, of threads and of the netCDF library
+_NO_MEMORY = ("failed to map segment", "can't start new thread", "Memory allocation (malloc) failure")
 Content = Mapping[str, Any] | None
 """What a command has to say to a program; None if it was not asked by ``--json``."""
 
@@ -84,7 +86,7 @@ def _told(error: BaseException) -> _Told | None:
         return _Told(message, error.exit_code, getattr(error, "faults", ()), getattr(error, "details", None))
     if isinstance(error, UnicodeEncodeError):
         return _Told(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
         return _Told("the machine has not enough memory for this", ResourceError.exit_code)
     if isinstance(error, OSError) and error.strerror:
         named = f"{error.filename}: " if error.filename else ""

@@ -5,16 +5,19 @@ number of rows and columns alone and, with friction, on the ratios ``beta`` and 
 not on spacing, moduli, shapes, loads or the coefficient of friction. So problems alike share them. Answers
 are the same to the bit, whether spectra were made or found.
 
-Three environment variables say what is kept; `configure` does the same from Python.
+Four environment variables say what is kept; `configure` does the same from Python.
 
 - ``HEXCONTACT_KERNEL_MEMORY``: bytes in memory at most, such as ``1 GB``; 256 MB if not set, 0 for none.
 - ``HEXCONTACT_KERNEL_FOLDER``: a folder for spectra that other processes may use; none if not set.
 - ``HEXCONTACT_KERNEL_FOLDER_SIZE``: bytes in it at most; 2 GB if not set.
+- ``HEXCONTACT_KERNEL_FOLDER_SHARED``: ``yes`` to take a folder, and files in it, that other users may have
+  written. Otherwise a folder of somebody else, or one that others may write to, is not used.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import logging
@@ -32,15 +35,19 @@ from .errors import DeckError, KernelFolderWarning
 
 _cache: Any = _core.hc_f2py_cache
 
-MEMORY, FOLDER, FOLDER_SIZE = (f"HEXCONTACT_KERNEL_{word}" for word in ("MEMORY", "FOLDER", "FOLDER_SIZE"))
+MEMORY, FOLDER, FOLDER_SIZE, SHARED = (
+    f"HEXCONTACT_KERNEL_{word}" for word in ("MEMORY", "FOLDER", "FOLDER_SIZE", "FOLDER_SHARED")
+)
 _DEFAULTS = {MEMORY: "256 MB", FOLDER_SIZE: "2 GB"}
 _UNITS = {"": 1, "B": 1} | {
     f"{prefix}{unit}": base**power
     for power, prefix in enumerate(("k", "M", "G", "T"), start=1)
     for unit, base in (("B", 1000), ("iB", 1024))
 }
+_FILE = re.compile(r"[a-z-]+-\d+x\d+-[0-9A-F]{16}\.kernels(\.[0-9a-f]+-\d+\.part)?")
 _DAY = 86400.0
 _LOGGER = logging.getLogger("hexcontact")
+_NOT_OURS = f"other users may write to it (chmod go-w, or {SHARED}=yes if all of them are trusted)"
 
 
 class Statistics(NamedTuple):
@@ -66,6 +73,7 @@ class _Settings:
     bound: int | None = None  # bytes in memory; None: nothing was said yet
     folder: Path | None = None
     folder_size = 0
+    shared = False  # the folder, with other users
     process = 0  # that the folder was opened by: a fork needs names of its own
 
 
@@ -77,6 +85,7 @@ def configure(
     memory: int | float | str | None = None,
     folder: str | os.PathLike[str] | bool | None = None,
     folder_size: int | float | str | None = None,
+    folder_shared: bool | None = None,
 ) -> None:
     """Say what this process keeps; what is not given stays as it is.
 
@@ -90,6 +99,8 @@ def configure(
         Folder for spectra that other processes may use; it is made if it is not there. False: none.
     folder_size : number or str, optional
         Bytes in the folder at most. When a process begins with more, the oldest go.
+    folder_shared : bool, optional
+        Take a folder, and files in it, that other users may have written.
 
     Raises
     ------
@@ -118,7 +129,9 @@ def configure(
         _settings.folder = Path(folder).expanduser().absolute()
     elif folder is not None:
         _settings.folder = None
-    if folder is not None or size is not None:
+    if folder_shared is not None:
+        _settings.shared = folder_shared
+    if (folder, size, folder_shared) != (None, None, None):
         _open_folder()
 
 
@@ -150,9 +163,10 @@ def leave(spare: int) -> None:
 def ready() -> None:
     """Take the settings from the environment, once; give a forked process names of its own."""
     if _settings.bound is None:
-        given = {name: os.environ.get(name, "").strip() for name in (MEMORY, FOLDER, FOLDER_SIZE)}
+        given = {name: os.environ.get(name, "").strip() for name in (MEMORY, FOLDER, FOLDER_SIZE, SHARED)}
         memory, size = (_bytes(given[name] or _DEFAULTS[name], name) for name in (MEMORY, FOLDER_SIZE))
         _settings.bound, _settings.folder_size = memory, size
+        _settings.shared = _yes(given[SHARED], SHARED)
         _cache.limit_kernels(memory)
         if given[FOLDER]:
             _settings.folder = Path(given[FOLDER]).expanduser().absolute()
@@ -183,6 +197,13 @@ def _bytes(value: float | str, name: str) -> int:
     return int(float(match[1]) * factor)
 
 
+def _yes(text: str, name: str) -> bool:
+    """Return whether an environment variable says yes."""
+    if text.lower() not in ("", "no", "yes"):
+        raise DeckError(f"{name} = {text!r}: expected yes or no")
+    return text.lower() == "yes"
+
+
 # --- the folder ---------------------------------------------------------------------------------------------
 
 
@@ -192,20 +213,23 @@ def _open_folder() -> None:
     folder, room = _settings.folder, 0
     if folder is not None:
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True, mode=0o777 if _settings.shared else 0o755)
+            state = folder.stat()
+            if not _settings.shared and (state.st_uid not in (0, os.geteuid()) or state.st_mode & 0o022):
+                raise PermissionError(errno.EPERM, _NOT_OURS, str(folder))
             room = max(0, _settings.folder_size - _pruned(folder, _settings.folder_size))
         except OSError as error:
             _settings.folder = folder = None
             _warn(f"no kernels are kept in {error.filename}: {error.strerror}")
     # the core takes blanks at the end for none
     name = b"" if folder is None else os.fsencode(folder) + b"/"
-    _cache.use_kernel_folder(name, _maker(), uuid.uuid4().hex[:12], room)
+    _cache.use_kernel_folder(name, _maker(), uuid.uuid4().hex[:12], room, _settings.shared)
 
 
 def _pruned(folder: Path, bound: int) -> int:
     """Remove the oldest spectra of a folder until three quarters of the bound are left; return the bytes."""
     files = []
-    for path in folder.glob("*.kernels*"):
+    for path in filter(lambda path: _FILE.fullmatch(path.name), folder.iterdir()):
         with contextlib.suppress(OSError):  # another process has renamed or removed it
             state = path.stat()
             if path.suffix == ".part" and time.time() - state.st_mtime > _DAY:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import mmap
 import os
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import ResourceError
 
 GB = 1e9
+# Bytes of address space: of the netCDF library when it is loaded, and for what it holds of fifty variables
+# while it writes them; of the second thread of a run, for its stack and 64 MiB of malloc.
+_LOADING, WRITING, _THREAD = 30_000_000, 64_000_000, 80_000_000
 
 
 def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/proc/self/cgroup")) -> int:
@@ -23,7 +28,8 @@ def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/pro
     """
     import psutil
 
-    return min([int(psutil.virtual_memory().available), *_left_in_groups(cgroups, process)])
+    machine = int(psutil.virtual_memory().available)
+    return min([machine, *_left_in_limits(), *_left_in_groups(cgroups, process)])
 
 
 def resident() -> int:
@@ -68,6 +74,35 @@ def require(needed: int, what: str, advice: str) -> None:
         raise ResourceError(
             f"{what} needs {needed / GB:.3g} GB of memory and {there / GB:.3g} GB are available; {advice}"
         )
+
+
+def claim(needed: int) -> None:
+    """Raise OSError unless so many bytes can be had at once; libraries that find no memory would crash."""
+    mmap.mmap(-1, needed, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS).close()
+
+
+def _left_in_limits() -> Iterator[int]:
+    """Yield what limits leave of the address space of this process (``ulimit -v``) and its data (``-d``)."""
+    import resource
+
+    allowed = {name: resource.getrlimit(getattr(resource, name))[0] for name in ("RLIMIT_AS", "RLIMIT_DATA")}
+    if set(allowed.values()) == {resource.RLIM_INFINITY}:
+        return
+    import psutil
+
+    try:
+        claim(_LOADING + WRITING)
+    except OSError:
+        yield 0
+        return
+    import netCDF4  # noqa: F401  # which a run needs in the end
+
+    spare = WRITING + _THREAD * (threading.active_count() == 1)
+    taken = psutil.Process().memory_info()
+    used = {"RLIMIT_AS": taken.vms, "RLIMIT_DATA": getattr(taken, "data", 0)}
+    for name, limit in allowed.items():
+        if limit != resource.RLIM_INFINITY:
+            yield max(0, limit - used[name] - spare)
 
 
 def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:

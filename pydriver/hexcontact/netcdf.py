@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import mesh
+from . import memory, mesh
 from .errors import LACKING, DeckError, HexcontactError, ResourceError
 from .files import require_ordinary, require_utf8
 from .result import Layout, Metadata, Result, Step
@@ -89,6 +89,7 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     """Create a file; in the end close it, add its checksum and flush it to disk."""
     import netCDF4
 
+    memory.claim(memory.WRITING)  # it crashes without
     try:
         with _alone():
             file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")

@@ -10,6 +10,7 @@ program tester
   use test_pyramid_influence, only: collect_pyramid_influence
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
+  use test_kernel_file, only: collect_kernel_file
   use test_vectors, only: collect_vectors
   use test_arguments, only: collect_arguments
   use test_contact, only: collect_contact
@@ -30,6 +31,7 @@ program tester
     new_suite('pyramid_influence', collect_pyramid_influence), &
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
+    new_suite('kernel_file', collect_kernel_file), &
     new_suite('vectors', collect_vectors), &
     new_suite('arguments', collect_arguments), &
     new_suite('contact', collect_contact), &

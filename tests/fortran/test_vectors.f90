@@ -2,6 +2,7 @@
 module test_vectors
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_lapack, only: eliminate
   use hc_friction_law, only: coulomb_t, linearize, on_cone
   use hc_friction_rows, only: cone_row, residual_row, soften_row, zone_row
   use hc_contact_state, only: separated
@@ -23,7 +24,8 @@ contains
       new_test('vectors', test_sums), &
       new_test('packing', test_packing), &
       new_test('rows_like_nodes', test_rows), &
-      new_test('springs', test_springs) &
+      new_test('springs', test_springs), &
+      new_test('elimination', test_elimination) &
     ]
   end subroutine collect_vectors
 
@@ -34,6 +36,24 @@ contains
     integer :: i
     sample = [(sin(1.7_wp*i) + 0.3_wp*cos(0.9_wp*i*i), i=1, n)]
   end function sample
+
+  !> A first pivot of zero takes an exchange of rows; dependent rows leave a pivot of zero.
+  subroutine test_elimination(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: a(3, 3), x(3, 2), b(3, 2)
+    integer :: i
+
+    a = reshape([0.0_wp, 2.0_wp, -1.0_wp, 3.0_wp, 0.5_wp, 4.0_wp, 1.0_wp, -2.0_wp, 7.0_wp], [3, 3])
+    x = reshape([1.0_wp, -2.0_wp, 0.25_wp, 5.0_wp, 0.0_wp, -3.0_wp], [3, 2])
+    b = matmul(a, x)
+    call eliminate(a, b)
+    call check_true(error, all(abs(b - x) < 1.0e-14_wp), 'solution of three equations')
+    if (allocated(error)) return
+    a = spread([1.0_wp, 2.0_wp, 3.0_wp], 2, 3)
+    b = x
+    call eliminate(a, b)
+    call check_true(error, any([(abs(a(i, i)) <= 0.0_wp, i=1, 3)]), 'dependent equations')
+  end subroutine test_elimination
 
   subroutine test_sums(error)
     type(error_t), allocatable, intent(out) :: error

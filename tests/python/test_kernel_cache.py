@@ -28,10 +28,10 @@ FORCE = ("force", "force", "force", "displacement")
 @pytest.fixture(autouse=True)
 def as_before() -> Iterator[None]:
     """Start with an empty cache, and leave the settings as they are without an environment."""
-    kernel_cache.configure(memory="256 MB", folder=False, folder_size="2 GB")
+    kernel_cache.configure(memory="256 MB", folder=False, folder_size="2 GB", folder_shared=False)
     kernel_cache.clear()
     yield
-    kernel_cache.configure(memory="256 MB", folder=False, folder_size="2 GB")
+    kernel_cache.configure(memory="256 MB", folder=False, folder_size="2 GB", folder_shared=False)
 
 
 def window(n_row: int = 47, n_col: int = 52, spacing: float = SPACING) -> Lattice:
@@ -220,6 +220,13 @@ def flipped(place: int) -> Damage:
     return flip
 
 
+def swap_pages(path: Path) -> None:
+    """Exchange two pages, as a file system does that mixes blocks up."""
+    content = path.read_bytes()
+    head, one, two, rest = content[:4096], content[4096:8192], content[8192:12288], content[12288:]
+    path.write_bytes(head + two + one + rest)
+
+
 DAMAGES: dict[str, Damage] = {
     "empty": lambda path: path.write_bytes(b""),
     "short": lambda path: path.write_bytes(path.read_bytes()[:-8]),
@@ -232,6 +239,9 @@ DAMAGES: dict[str, Damage] = {
     "key": flipped(296),
     "maker": flipped(60),
     "layout": flipped(24),
+    "bytes of a value": flipped(360),
+    "hash": flipped(392),
+    "swapped pages": swap_pages,
 }
 
 
@@ -265,6 +275,117 @@ def test_spectra_of_another_window_are_not_taken(tmp_path: Path) -> None:
     for lattice, answer in zip(windows, before, strict=True):
         with pytest.warns(KernelFolderWarning, match="is damaged, or was made by something else"):
             assert_array_equal(normal(lattice), answer)
+
+
+def test_file_that_is_no_file_is_passed_over(tmp_path: Path) -> None:
+    kernel_cache.configure(memory=0, folder=tmp_path)
+    before = quietly()
+    for path in tmp_path.iterdir():
+        path.unlink()
+        os.mkfifo(path)  # to open it would wait for somebody who writes
+    with pytest.warns(KernelFolderWarning, match="cannot be read: the kernels are worked out anew"):
+        assert_array_equal(normal(), before)
+    assert_array_equal(quietly(), before)
+
+
+def test_file_that_comes_and_goes_is_no_reason_to_warn(tmp_path: Path) -> None:
+    kernel_cache.configure(memory=0, folder=tmp_path)
+    operator(4)
+    (path,) = tmp_path.iterdir()
+    kernel_cache._cache.use_kernel_folder(os.fsencode(tmp_path) + b"/", kernel_cache._maker(), "0", 0, False)
+    code = """
+import os, sys
+path, running = sys.argv[1:]
+while os.path.exists(running):
+    os.rename(path, path + ".away")
+    os.rename(path + ".away", path)
+"""
+    running = tmp_path / "running"
+    running.touch()
+    start = kernel_cache.statistics()
+    process = subprocess.Popen([sys.executable, "-c", code, str(path), str(running)])
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            while since(start).made < 500:
+                operator(4)
+    finally:
+        running.unlink()
+        assert process.wait() == 0
+    assert since(start).read > 0
+
+
+# --- files of other users -----------------------------------------------------------------------------------
+
+Change = Callable[[Path], object]
+root_alone = pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
+CHANGES = [
+    pytest.param(lambda path: path.chmod(path.stat().st_mode | 0o020), id="group may write"),
+    pytest.param(lambda path: path.chmod(path.stat().st_mode | 0o002), id="all may write"),
+    pytest.param(lambda path: os.chown(path, 54321, -1), id="another owner", marks=root_alone),
+]
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_file_of_another_user_is_not_believed(change: Change, tmp_path: Path) -> None:
+    kernel_cache.configure(memory=0, folder=tmp_path)
+    before = quietly()
+    victim = max(tmp_path.iterdir(), key=lambda path: path.stat().st_size)
+    change(victim)
+    kernel_cache.configure(folder_shared=True)
+    start = kernel_cache.statistics()
+    assert_array_equal(quietly(), before)
+    assert since(start).made == 0
+    kernel_cache.configure(folder_shared=False)
+    with pytest.warns(KernelFolderWarning) as said:
+        assert_array_equal(normal(), before)
+    assert [str(w.message) for w in said] == [
+        f"{victim} may have been written by another user: the kernels are worked out anew"
+    ]
+    start = kernel_cache.statistics()
+    assert_array_equal(quietly(), before)
+    assert since(start).made == 0
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_folder_of_another_user_is_not_used_unless_it_is_shared(
+    change: Change, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kernel_cache.configure(memory=0, folder=tmp_path)
+    quietly()
+    files = set(tmp_path.iterdir())
+    change(tmp_path)
+    with pytest.warns(KernelFolderWarning, match="no kernels are kept in .*: other users may write to it"):
+        kernel_cache.configure(folder=tmp_path)
+    start = kernel_cache.statistics()
+    quietly(window(40, 41))
+    assert since(start).read == 0
+    assert set(tmp_path.iterdir()) == files
+    monkeypatch.setattr(kernel_cache, "_settings", kernel_cache._Settings())
+    monkeypatch.setenv(kernel_cache.FOLDER, str(tmp_path))
+    monkeypatch.setenv(kernel_cache.MEMORY, "0")
+    monkeypatch.setenv(kernel_cache.SHARED, "yes")
+    start = kernel_cache.statistics()
+    quietly()
+    assert since(start).made == 0
+
+
+def test_folder_and_files_are_made_so_that_no_other_user_may_write(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        kernel_cache.configure(memory=0, folder=tmp_path / "kernels")
+        quietly()
+    finally:
+        os.umask(before)
+    modes = {path.stat().st_mode & 0o022 for path in tmp_path.rglob("*")}
+    assert modes == {0}
+
+
+def test_shared_says_yes_or_no(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel_cache, "_settings", kernel_cache._Settings())
+    monkeypatch.setenv(kernel_cache.SHARED, "perhaps")
+    with pytest.raises(DeckError, match="HEXCONTACT_KERNEL_FOLDER_SHARED = 'perhaps': expected yes or no"):
+        operator(20)
 
 
 @pytest.mark.parametrize("name", ["ends with a blank ", "Müller", "two\nlines"])
@@ -325,25 +446,27 @@ def test_folder_that_cannot_be_made_is_told_of(tmp_path: Path) -> None:
 
 
 def test_oldest_files_go_when_the_folder_is_too_large(tmp_path: Path) -> None:
+    old = "pressure-{0}x{0}-0123456789ABCDEF.kernels"
     for age in range(8):
-        path = tmp_path / f"pressure-{age}x{age}-00.kernels"
+        path = tmp_path / old.format(age)
         path.write_bytes(b"x" * 1000)
         os.utime(path, (1e9 - age, 1e9 - age))
-    (tmp_path / "notes.txt").write_bytes(b"x" * 5000)
-    killed, running = (tmp_path / f"a.kernels.{word}.part" for word in ("old", "new"))
-    killed.write_bytes(b"x")
-    os.utime(killed, (1e9, 1e9))
+    killed, running = (tmp_path / f"{old.format(9)}.{word}-1.part" for word in ("01d", "2e3"))
+    others = [tmp_path / name for name in ("notes.txt", "my.kernels", "a.kernels.old.part")]
+    for path in (killed, *others):
+        path.write_bytes(b"x" * 5000)
+        os.utime(path, (1e9, 1e9))
     running.write_bytes(b"x")
     kernel_cache.configure(folder=tmp_path, folder_size=8100)
-    assert len(list(tmp_path.glob("*.kernels"))) == 8
+    assert len(list(tmp_path.glob("*F.kernels"))) == 8
     kernel_cache.configure(folder_size=4000)
     assert {path.name for path in tmp_path.iterdir()} == {
-        "notes.txt",
         running.name,
-        *(f"pressure-{age}x{age}-00.kernels" for age in range(2)),
+        *(path.name for path in others),
+        *(old.format(age) for age in range(2)),
     }
     quietly()  # no room for the larger ones: they are not kept, without a word
-    assert sum(path.stat().st_size for path in tmp_path.glob("*.kernels")) <= 4000
+    assert sum(path.stat().st_size for path in tmp_path.glob("*x*.kernels")) <= 4000
 
 
 def test_many_processes_may_fill_a_folder_at_once(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import itertools
 import math
 import operator
 import pickle
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -62,6 +63,13 @@ def assert_same(one: Result, other: Result) -> None:
 
 
 # --- threads ------------------------------------------------------------------------------------------------
+
+
+def test_locks_hold_in_a_build_without_openmp() -> None:
+    sources = sorted((Path(__file__).parents[2] / "fortran").rglob("*.f90"))
+    assert len(sources) > 50
+    for path in sources:
+        assert not re.search(r"(?i)!\$omp\s+(critical|atomic)", path.read_text(encoding="utf-8")), path
 
 
 def test_cases_in_threads_have_the_answers_of_cases_in_turn(tmp_path: Path) -> None:

@@ -1,0 +1,50 @@
+!> Memory that is asked for before work begins.
+!>
+!> An array of the compiler's own making, a thread, or a plan of FFTW for which there is no memory ends the whole
+!> program. So whoever begins to work looks first whether all that it may take can be had; a limit on the address
+!> space (`ulimit -v`) or a machine that promises no more than it has then leads to an error.
+module hc_memory
+  use, intrinsic :: iso_c_binding, only: c_size_t, c_int
+  use, intrinsic :: iso_fortran_env, only: int64
+  use hc_error, only: error_t, status, raise
+  implicit none
+  private
+
+  public :: require_memory
+
+  !> Bytes for what does not depend on the window: plans, lists, messages.
+  integer(int64), parameter :: margin = 8000000
+
+  interface
+    integer(c_int) function can_map(bytes) bind(c, name='hexcontact_can_map')
+      import :: c_size_t, c_int
+      integer(c_size_t), value :: bytes
+    end function can_map
+
+    integer(c_size_t) function stack_size() bind(c, name='hexcontact_stack_size')
+      import :: c_size_t
+    end function stack_size
+  end interface
+
+contains
+
+  !> Refuse work for which there is no memory. Nothing is touched, so that it costs no more than a call of the system.
+  subroutine require_memory(bytes, error, n_threads)
+    !> Bytes that the work takes at most
+    integer(int64), intent(in) :: bytes
+    !> Allocated if they cannot be had
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads that may have to be started
+    integer, intent(in), optional :: n_threads
+    integer(int64) :: needed
+    character(len=16) :: megabytes
+
+    needed = bytes + margin
+    if (present(n_threads)) needed = needed + max(n_threads - 1, 0)*int(stack_size(), int64)
+    if (can_map(int(needed, c_size_t)) /= 0) return
+    write (megabytes, '(i0)') needed/1000000 + 1
+    call raise(error, status%resources, 'not enough memory: '//trim(megabytes)//' MB more are needed; '// &
+               'choose a smaller window')
+  end subroutine require_memory
+
+end module hc_memory

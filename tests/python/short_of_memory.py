@@ -1,0 +1,64 @@
+"""Solve with ever more address space: short_of_memory.py normal|friction|direct. Prints how each try ended.
+
+Each try is a process of its own, so that none finds memory that another one has left behind.
+"""
+
+import os
+import resource
+import sys
+
+import numpy as np
+
+from hexcontact import FrictionalContact, Lattice, NormalContact, ResourceError, kernel_cache
+from hexcontact.native import ElasticPair
+
+PAIR = ElasticPair(2e-12, -0.5e-12, 0.9e-12)
+SPACING = 2e-6
+MB = 1_000_000
+
+
+def attempt(kind: str) -> None:
+    """Set a problem up and solve it twice."""
+    half = 10 if kind == "direct" else 40
+    lattice = Lattice(SPACING, -half, -half, 2 * half, 2 * half)
+    gap = (lattice.x**2 + lattice.y**2) / (400 * SPACING)
+    approach = (0.7 * half * SPACING) ** 2 / (200 * SPACING)
+    if kind == "normal":
+        contact = NormalContact(lattice, PAIR, gap)
+        for share in (0.3, 1.0):
+            assert contact.solve(approach=share * approach).converged
+        return
+    method = "direct" if kind == "direct" else "fft"
+    problem = FrictionalContact(lattice, PAIR, gap, friction_coefficient=0.5, method=method)
+    state = problem.virgin()
+    for depth, shift in ((0.3, 0.0), (1.0, 0.0), (1.0, 0.1)):
+        state = problem.advance(state, ("displacement",) * 4, (depth * approach, shift * approach, 0.0, 0.0))
+        assert state.converged
+
+
+def limited(kind: str, spare: int) -> int:
+    """Return how a process ends that may take so many bytes more than this one has: 0 done, 4 no memory."""
+    child = os.fork()
+    if child:
+        status = os.waitpid(child, 0)[1]
+        return os.waitstatus_to_exitcode(status)
+    code = 99
+    try:
+        with open("/proc/self/statm") as file:
+            taken = int(file.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (taken + spare, resource.RLIM_INFINITY))
+        attempt(kind)
+        code = 0
+    except (ResourceError, MemoryError):
+        code = 4
+    finally:
+        os._exit(code)
+
+
+kernel_cache.configure(memory=0)
+np.linalg.norm(np.ones(3))
+step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB}[sys.argv[1]]
+codes: list[int] = []
+while codes[-2:] != [0, 0] and len(codes) < 60:
+    codes.append(limited(sys.argv[1], step * len(codes)))
+print(*codes)

@@ -62,7 +62,7 @@ module hc_contact_state
     real(wp) :: residual_torque = 0.0_wp
     !> All residuals are within the tolerance
     logical :: converged = .false.
-    !> No node sticks and the tangential load cannot be carried
+    !> The tangential loads are more than full sliding carries
     logical :: sliding = .false.
     !> Active sets that were tried on the finest lattice
     integer :: sweeps = 0

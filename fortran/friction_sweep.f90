@@ -52,6 +52,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: q(:)
 
+    ! the pressure is found under the shear traction: what each of them causes has to be known
+    if (now%joint) call now%refresh(error)
+    if (allocated(error)) return
     call press(now, error)
     if (allocated(error)) return
     if (now%dragging .and. now%cold .and. now%first) then
@@ -66,6 +69,7 @@ contains
       call now%cut_to_cone(q)
       call now%operators%apply([along_x, along_y], q, [normal], now%closing, error)
       if (allocated(error)) return
+      now%cut = .true.
     end if
     call now%find_residuals()
     now%first = .false.
@@ -182,17 +186,22 @@ contains
                           residual, iterations, error)
         if (allocated(error)) return
       end if
-      now%sliding = .not. independent
-      if (size(missing) == 0 .or. holding .or. any(active(n + 1:))) exit
+      now%adrift = .not. independent
+      if (size(missing) == 0 .or. holding) exit
       ! where all nodes slip, only their directions resist a load: not beyond reason
       if (independent) then
+        if (any(active(n + 1:))) exit
         if (maxval(abs(x(:n))) <= beyond_reason*now%traction_scale()) exit
       end if
       holding = .true.
       now%caution = max(cautious*now%caution, least_caution)
       now%q = q
     end do
-    if (now%sliding) return
+    if (now%adrift) then
+      now%q = q
+      call now%refresh(error)
+      return
+    end if
     motion = now%motion
     call driven%set_motions(multiplier, now%motion)
     call now%shear%to_plane(x, now%q)

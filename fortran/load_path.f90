@@ -83,7 +83,8 @@ contains
         now = next
         from => now
       else
-        if (cuts == max_cuts) exit
+        ! no path leads to loads that full sliding does not carry
+        if (cuts == max_cuts .or. (next%sliding .and. done + part >= 1.0_wp)) exit
         cuts = cuts + 1
         part = 0.5_wp*part
       end if

@@ -88,7 +88,7 @@ class ContactState:
     converged : bool
         All residuals are within the tolerance.
     sliding : bool
-        No node sticks, and the tangential load cannot be carried.
+        The tangential loads are more than full sliding carries.
     touches_rim : bool
         There is contact at the rim of the window.
     sweeps, cuts : int

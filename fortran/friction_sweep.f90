@@ -86,14 +86,16 @@ contains
     logical, allocatable :: contact(:)
     real(wp) :: goal, residual, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations
-    logical :: changed, independent
+    logical :: changed, independent, searching
 
     n = size(now%p)
+    ! a start that knows of no contact: the one without shear has to be found before stick and slip can be
+    searching = now%cold .and. now%first
     cell_area = now%problem%lattice%cell_area()
     n_constraint = merge(1, 0, now%target%control(normal) == force_control)
     allocate (constraint(n, n_constraint), rhs(n))
     level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
-    do area = 1, merge(max_areas, max_areas_alone, now%pressing)
+    do area = 1, merge(max_areas, max_areas_alone, now%pressing .and. .not. searching)
       call now%find_gap(gap)
       now%residual_normal = now%gap_residual(gap)
       missing = 0.0_wp
@@ -107,8 +109,10 @@ contains
         if (.not. changed) changed = count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if
+      if (searching .and. now%pressing .and. .not. changed) return
 
       if (changed) call now%pressure%take(now%contact)
+      if (searching .and. now%pressing .and. allocated(now%lift)) deallocate (now%lift)
       !$omp parallel do schedule(static) num_threads(now%pressure%n_threads)
       do i = 1, n
         if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))

@@ -3,8 +3,10 @@
 #
 #   PYTHON=/path/to/python3.12   the interpreter .venv is made with
 #   APT=no                       install no system package, only name what is missing
-#   PYTEST_ARGS='-k deck -x'     more words for pytest
+#   PYTEST_ARGS='-k deck -x'     more words for pytest, which then runs in one process
+#   PYTEST_JOBS=4                processes that share the Python tests; 0: all in one
 #   BENCH_ARGS='--only counts'   more words for the benchmarks
+#   CHECKS='fretting torsion'    which comparisons make verify makes
 
 VENV := .venv
 STAMPS := $(VENV)/.stamps
@@ -12,6 +14,12 @@ STAMPS := $(VENV)/.stamps
 BUILD := $(if $(wildcard $(STAMPS)/editable),build/editable,build/release)
 DEBUG_BUILD := build/debug
 DEBUG_SITE := build/debug-site
+COVERAGE_BUILD := build/coverage
+COVERAGE_SITE := build/coverage-site
+
+# Least share of lines that tests must reach, percent.
+COVERED_FORTRAN := 95
+COVERED_PYTHON := 90
 
 export PYTHON APT
 # The build tools (meson, ninja, f2py) are looked up on the path.
@@ -20,14 +28,25 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 py := $(CURDIR)/$(VENV)/bin/python
 pip := $(py) -m pip
 pip_build := $(pip) install --quiet --no-build-isolation
+# Files of tests go to one process each, so that what they share is made once.
+PYTEST_JOBS ?= $(if $(strip $(PYTEST_ARGS)),0,logical)
+pytest := -m pytest --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 --dist=loadscope $(PYTEST_ARGS)
+# A build with checks, installed beside that of .venv and not hidden by an editable one: site, build folder, more settings.
+define build_with_checks
+@rm -rf $(1)
+@$(pip_build) --no-deps --target $(1) -C build-dir=$(2) -C setup-args=-Dtests=true -C setup-args=-Ddebug_checks=true \
+    -C setup-args=-Dbuildtype=debug $(3) .
+@cp .ci/sitecustomize.py $(1)
+@PYTHONPATH=$(CURDIR)/$(1) $(py) -c "import hexcontact, sys; '/$(1)/' in hexcontact.__file__ or sys.exit('hexcontact is not imported from $(1)')"
+endef
 
 # A .venv that is broken, was moved, or holds another Python is made anew.
 ifneq ($(shell PYTHON='$(PYTHON)' sh .ci/bootstrap.sh --venv-ok && echo ok),ok)
   $(shell rm -rf $(STAMPS))
 endif
 
-build_files := pyproject.toml meson.build meson.options $(wildcard fortran/meson.build pydriver/meson.build)
-library_sources := $(wildcard fortran/*.f90 fortran/*.F90 fortran/*.inc)
+build_files := pyproject.toml meson.build meson.options $(wildcard fortran/meson.build fortran/*/meson.build pydriver/meson.build)
+library_sources := $(wildcard fortran/*.f90 fortran/*/*.f90)
 python_sources := $(shell find pydriver -type f ! -name '*.so' ! -name '*.pyc')
 fortran_tests := $(shell find tests/fortran tests/bench -type f ! -name '*.pyc' 2>/dev/null)
 sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
@@ -35,7 +54,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo test test-fortran test-python debug-test verify bench lint format docs docs-links pictures editable clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -81,12 +100,16 @@ demo: install  ## press a sphere on aluminum, then shear it: history, result and
 	cd output && hexcontact report dissimilar_fretting.nc
 
 verify: install  ## compare with published, discrete and analytic solutions (minutes)
-	hexcontact verify
+	$(py) tests/validation/run.py $(CHECKS)
 
 bench: install  ## work, times, memory, other codes side by side: docs/performance.md (BENCH_ARGS=--quick: two minutes)
 	$(py) tests/bench/run.py --build $(BUILD) $(BENCH_ARGS)
 
 # --- tests -------------------------------------------------------------------
+
+check: install $(STAMPS)/extra-test  ## the quick tests: each part once, in less than a minute
+	@meson test -C $(BUILD) --quiet --print-errorlogs
+	@$(py) -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
 
 test: install test-fortran test-python  ## build and run all tests
 
@@ -94,15 +117,31 @@ test-fortran: install  ## Fortran unit tests
 	@meson test -C $(BUILD) --print-errorlogs
 
 test-python: install $(STAMPS)/extra-test  ## Python tests
-	@$(py) -m pytest $(PYTEST_ARGS)
+	@$(py) $(pytest)
 
 debug-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## all tests on a build that checks bounds and traps NaN
 	@echo "Building hexcontact with checks ($(DEBUG_BUILD))"
-	@rm -rf $(DEBUG_SITE)
-	@$(pip_build) --no-deps --target $(DEBUG_SITE) -C build-dir=$(DEBUG_BUILD) \
-	    -C setup-args=-Dtests=true -C setup-args=-Ddebug_checks=true -C setup-args=-Dbuildtype=debug .
+	$(call build_with_checks,$(DEBUG_SITE),$(DEBUG_BUILD))
 	@meson test -C $(DEBUG_BUILD) --print-errorlogs --timeout-multiplier 10
-	@PYTHONPATH=$(CURDIR)/$(DEBUG_SITE) $(py) -m pytest $(PYTEST_ARGS)
+	@PYTHONPATH=$(CURDIR)/$(DEBUG_SITE) $(py) $(pytest)
+
+# The counters are atomic: threads would lose counts, and lines that were run would seem not to be.
+coverage: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test $(STAMPS)/extra-coverage  ## the same with counters: lists the lines that no test reaches
+	@echo "Building hexcontact with checks and counters ($(COVERAGE_BUILD))"
+	$(call build_with_checks,$(COVERAGE_SITE),$(COVERAGE_BUILD),-C setup-args=-Db_coverage=true -C setup-args=-Dfortran_args=-fprofile-update=atomic)
+	@rm -rf build/coverage-data && find $(COVERAGE_BUILD) -name '*.gcda' -delete
+	@meson test -C $(COVERAGE_BUILD) --print-errorlogs --timeout-multiplier 10
+	@PYTHONPATH=$(CURDIR)/$(COVERAGE_SITE) $(py) -m coverage run $(pytest)
+	@$(MAKE) --no-print-directory coverage-report
+
+# Reads what the tests left.
+coverage-report:
+	@$(py) -m coverage combine --quiet
+	@$(py) -m coverage report --fail-under=$(COVERED_PYTHON); python=$$?; \
+	$(py) -m gcovr --root . --filter fortran/ --fail-under-line $(COVERED_FORTRAN) $(COVERAGE_BUILD) && exit $$python
+
+package: $(STAMPS)/build-tools  ## source archive, wheel, pip install .: build them and use them outside the checkout
+	@$(py) .ci/package.py
 
 # --- development -------------------------------------------------------------
 

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 import hexcontact
-from hexcontact.analytic_friction import goodman_stick_ratio
+from hexcontact.analytic.friction import goodman_stick_ratio
 from hexcontact.surfaces import Sphere
 
 matplotlib.use("agg")  # pictures go to files; leave this out in a notebook

@@ -15,12 +15,14 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
+from ._version import __version__ as __version__
 from .errors import (
     AccuracyWarning,
     ConvergenceError,
     DeckError,
     HexcontactError,
     KernelFolderWarning,
+    PathWarning,
     ResourceError,
     StopRun,
 )
@@ -42,8 +44,6 @@ if TYPE_CHECKING:
     from .step import Step
     from .store import open_result
     from .study import Study, run_study
-
-__version__ = "0.3.0"
 
 _HOME = {
     "Case": "case",
@@ -76,6 +76,7 @@ __all__ = [
     "KernelFolderWarning",
     "Lattice",
     "NormalContact",
+    "PathWarning",
     "ResourceError",
     "Result",
     "Session",

@@ -21,8 +21,8 @@ from .load_history import LEAST, LoadStep
 from .step_error import STICK_SAFETY, Change, Memory, change, shear_free
 
 if TYPE_CHECKING:
-    from .case import Case
     from .native_friction import ContactState
+    from .problem import Problem
     from .result import Step
     from .window_friction import FrictionWindow
 
@@ -135,7 +135,7 @@ class AdaptivePath:
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The problem.
     window : FrictionWindow
         Window to start with.
@@ -152,7 +152,7 @@ class AdaptivePath:
         How much of it is done.
     """
 
-    def __init__(self, case: Case, window: FrictionWindow, before: Sequence[Step]) -> None:
+    def __init__(self, case: Problem, window: FrictionWindow, before: Sequence[Step]) -> None:
         self.case, self.window = case, window
         self.position, self.fraction = 0, 0.0
         self._number = len(before)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,19 @@ def integer(value: Any, name: str, expected: str = "an integer") -> int:
     if abs(found) > _LARGEST_INTEGER:
         raise DeckError(f"{name} = {_shown(value)}: expected {expected} of at most {_LARGEST_INTEGER}")
     return found
+
+
+def word(value: Any, name: str, allowed: Collection[str]) -> str:
+    """Return an argument that has to be one of a few words.
+
+    Raises
+    ------
+    DeckError
+        If it is none of them.
+    """
+    if not isinstance(value, str) or value not in allowed:
+        raise DeckError(f"{name} = {_shown(value)}: expected {' or '.join(map(repr, allowed))}")
+    return value
 
 
 def _shown(value: Any) -> str:

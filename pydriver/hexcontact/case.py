@@ -1,8 +1,7 @@
-"""A checked contact problem in SI units: what a deck or a Python script asks for, ready to be solved."""
+"""A contact problem from a deck or from Python, and its solution in one call."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,24 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import deck as decks
-from . import grid as grids
-from . import native, native_friction
-from .arguments import reals
-from .case_arguments import as_toml, body_keys, given, middle_of, segments
-from .case_checks import algorithm_of, checked_deck
-from .case_settings import AccuracySettings, Body, OutputSettings, SolverSettings
-from .deck import Deck
-from .deck_assembly import Assembled, assemble
+from .case_arguments import body_keys, gap_given, given, middle_of, segments
+from .case_settings import Body, OutputSettings, SolverSettings
+from .deck_assembly import assemble
 from .errors import DeckError
-from .grid import Estimate, NoContactFound
 from .lattice import Lattice
-from .load_history import LoadStep, Target, load_steps
-from .messages import MISSING, Problem, Source, deck_error
-from .native import ElasticPair, Method
-from .surfaces import Separation
-from .validation import SMALLEST
-from .variables import LARGEST
+from .load_history import LoadStep, Target
+from .messages import Source
+from .problem import Problem
 
 if TYPE_CHECKING:
     from .progress import Reporter
@@ -39,11 +28,8 @@ __all__ = ["Body", "Case", "LoadStep", "OutputSettings", "SolverSettings", "Targ
 
 Array = NDArray[np.float64]
 
-# Windows of up to so many nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
-MOST_DIRECT_NODES = 200
 
-
-class Case:
+class Case(Problem):
     """A checked contact problem.
 
     Made from a deck by `from_toml` or `from_dict`, or here from arguments in SI units, which are checked in
@@ -54,9 +40,10 @@ class Case:
     body_1, body_2 : Body or mapping
         The bodies; a mapping has the keys of [body.1] (an angle carries its unit here, too: "30 deg").
     gap : callable or array_like, optional
-        Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m), or an array
-        (n_row, n_col) over the nodes of the window. Infinite where nothing can touch. The approach is
-        measured from gap = 0.
+        Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m); an array
+        (n_row, n_col) over the nodes of `lattice`; or heights on a rectangular grid, an xarray.DataArray
+        with the coordinates x and y (in m, or in their attribute ``units``), which a cubic spline joins.
+        Infinite where nothing can touch. The approach is measured from gap = 0.
     lattice : Lattice, optional
         The window, instead of the keyword arguments of the grid.
     spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
@@ -78,35 +65,7 @@ class Case:
     title : str, optional
         A line about the case.
 
-    Attributes
-    ----------
-    title : str
-        A line about the case.
-    body_1, body_2 : Body
-        The bodies.
-    pair : ElasticPair
-        Their compliances.
-    friction_coefficient : float
-        Coefficient of friction.
-    solver : SolverSettings
-        How it is solved.
-    accuracy : AccuracySettings or None
-        How accurate the result is to be; None: the lattice is not refined.
-    load_steps : tuple of LoadStep
-        The history; a segment in adaptive steps is one of them.
-    output : OutputSettings
-        What is kept.
-    deck : Deck
-        The deck, checked and in SI.
-    deck_text : str
-        The case as a deck, whole: with what it includes, what was set, and the series of loads from files.
-    deck_file : Path or None
-        The file it was read from.
-    lattice : Lattice
-        The window to start with.
-    window_fixed : bool
-        Whether the size of the window was given: contact at its rim is an error then, otherwise the window
-        grows.
+    The attributes are those of `Problem`.
 
     Raises
     ------
@@ -127,21 +86,6 @@ class Case:
     >>> round(case.pair.effective_modulus / 1e9, 2)
     115.38
     """
-
-    title: str
-    body_1: Body
-    body_2: Body
-    pair: ElasticPair
-    friction_coefficient: float
-    solver: SolverSettings
-    accuracy: AccuracySettings | None
-    load_steps: tuple[LoadStep, ...]
-    output: OutputSettings
-    deck: Deck
-    deck_text: str
-    deck_file: Path | None = None
-    lattice: Lattice
-    window_fixed: bool
 
     def __init__(
         self,
@@ -173,13 +117,14 @@ class Case:
         every: int | None = None,
         title: str = "",
     ) -> None:
-        array = None if gap is None or callable(gap) else reals(gap, "gap").copy()
+        given_gap = gap_given(gap, lattice)
         if lattice is not None:
+            for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
+                if value is not None:
+                    raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
-            if gap is None:  # so that the deck of the case finds the same window again
+            if not callable(given_gap):  # so that the deck of the case finds the same window again
                 center = middle_of(lattice)
-        elif array is not None and window is None and array.ndim == 2:
-            window = array.shape
         if loads is None:
             loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
         elif normal_load is not None or approach is not None or steps is not None:
@@ -210,200 +155,7 @@ class Case:
             load=segments(loads),
             output=given(fields=fields, every=every) or None,
         )
-        self._set_up(assemble(data, None, Source(), Path()), gap if callable(gap) else array, lattice)
-
-    @classmethod
-    def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
-        """Read a deck.
-
-        Parameters
-        ----------
-        path : str or Path
-            The deck.
-        overrides : mapping, optional
-            Values for single keys in place of the deck's: ``{"grid.spacing": "0.1 mm", "load.1.steps": 5}``.
-            Entries of arrays count from 1; None removes a key.
-
-        Raises
-        ------
-        DeckError
-            If it cannot be read, or with a sentence for each thing that is wrong with it.
-        """
-        data, text = decks.read_toml(path)
-        case = cls._made(data, text, Source(str(path), text), Path(path).parent, overrides)
-        case.deck_file = Path(path).absolute()
-        return case
-
-    @classmethod
-    def from_text(cls, text: str, name: str = "deck", overrides: Mapping[str, Any] | None = None) -> Case:
-        """Read a deck from its text (as a result file keeps it); `name` is what messages call it."""
-        return cls._made(decks.parse_toml(text, name), text, Source(name, text), overrides=overrides)
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Case:
-        """Make a case from the tables of a deck: ``{"body": {"1": {...}, ...}, "grid": {...}, ...}``."""
-        return cls._made(data, None, Source())
-
-    @classmethod
-    def _made(
-        cls,
-        data: Mapping[str, Any],
-        text: str | None,
-        source: Source,
-        folder: Path = Path(),
-        overrides: Mapping[str, Any] | None = None,
-    ) -> Case:
-        if not isinstance(data, Mapping):
-            raise DeckError("a deck: expected tables of keys")
-        case = cls.__new__(cls)
-        case._set_up(assemble(data, text, source, folder, overrides), None, None)
-        return case
-
-    def _set_up(
-        self,
-        given: Assembled,
-        gap: Callable[[Array, Array], ArrayLike] | Array | None,
-        lattice: Lattice | None,
-    ) -> None:
-        source = given.source
-        deck, problems = checked_deck(given.data, given.problems, gap is not None)
-        if deck is None or problems:
-            raise deck_error(problems, source)
-        self.deck = deck
-        self.deck_text = given.text or given.remark + as_toml(given.data, gap is not None)
-        self.title = deck.title
-        self.body_1, self.body_2 = _body(deck.body.body_1), _body(deck.body.body_2)
-        self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
-        algorithm, _ = algorithm_of(deck.friction, deck.solver)
-        given_solver = deck.solver
-        self.solver = SolverSettings(
-            algorithm,
-            given_solver.method,
-            given_solver.tolerance,
-            given_solver.coupling,
-            given_solver.entry,
-            given_solver.step_tolerance,
-        )
-        wanted = deck.accuracy
-        self.accuracy = AccuracySettings(wanted.target, wanted.max_nodes) if wanted else None
-        self.output = OutputSettings(
-            Path(deck.output.file) if deck.output.file else None, deck.output.fields or (), deck.output.every
-        )
-        mu = self.friction_coefficient if self.frictional else None
-        self.load_steps, _ = load_steps(deck.load, mu)
-        self._surface_gap = (
-            Separation(deck.body.body_1.surface, deck.body.body_2.surface) if gap is None else None
-        )
-        self._given_gap = gap
-
-        self.pair = ElasticPair.from_materials(
-            self.body_1.young_modulus,
-            self.body_1.poisson_ratio,
-            self.body_2.young_modulus,
-            self.body_2.poisson_ratio,
-        )
-        self.window_fixed = grids.is_fixed(deck.grid)
-        self._contact: Estimate | None = None  # where the window follows from it alone
-        self.lattice = self._size(deck.grid, source, lattice)
-        if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
-            raise deck_error(problems, source)
-
-    @property
-    def adaptive(self) -> bool:
-        """Whether load steps are chosen on the way: some are "auto", and the answer depends on them."""
-        incremental = self.solver.algorithm == "incremental"
-        return incremental and any(step.ramp is not None for step in self.load_steps)
-
-    @property
-    def planned_steps(self) -> int:
-        """Number of load steps; 0 if it shows on the way."""
-        return 0 if self.adaptive else len(self.load_steps)
-
-    @property
-    def frictional(self) -> bool:
-        """Whether shear tractions are solved for."""
-        return self.solver.algorithm != "frictionless"
-
-    # --- what solving needs ---------------------------------------------------------------------------------
-
-    def initial_gap(self, lattice: Lattice) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the gap before loading, over the nodes of a window.
-
-        Parameters
-        ----------
-        lattice : Lattice
-            The window.
-
-        Returns
-        -------
-        gap : ndarray, (n_row, n_col)
-            Initial gap (m) from first touch; inf where nothing can touch.
-        candidate : ndarray of bool, (n_row, n_col)
-            False where the two bodies can never touch, as outside a punch.
-
-        Raises
-        ------
-        DeckError
-            If a gap given in Python does not fit the window or is not a number somewhere.
-        """
-        if isinstance(self._given_gap, np.ndarray):
-            gap = self._given_gap
-        else:
-            gap = self._gap_at(lattice.x, lattice.y)
-        if gap.shape != lattice.shape:
-            raise DeckError(
-                f"gap: expected an array of shape {lattice.shape} (n_row, n_col), not {gap.shape}"
-            )
-        if np.isnan(gap).any() or np.isneginf(gap).any():
-            raise DeckError("gap: expected numbers, or inf where nothing can touch, at every node")
-        if (abs(gap[np.isfinite(gap)]) > LARGEST).any():
-            raise DeckError(f"gap: expected lengths of at most {LARGEST:g} m, or inf where nothing can touch")
-        return gap, np.isfinite(gap)
-
-    def grown(self, lattice: Lattice, contact: NDArray[np.bool_] | None = None) -> Lattice:
-        """Return a larger window with the same nodes, for a contact that reached the rim.
-
-        Parameters
-        ----------
-        lattice : Lattice
-            The window that became too small.
-        contact : ndarray of bool, (n_row, n_col), optional
-            The nodes in contact: only the sides that they reach grow, by a quarter each. All sides without
-            it.
-        """
-        return grids.grown(lattice) if contact is None else grids.grown(lattice, grids.rim_sides(contact))
-
-    def on_lattice(self, spacing: float, origin: tuple[float, float]) -> Case:
-        """Return the same problem on another lattice, solved on that one alone.
-
-        Parameters
-        ----------
-        spacing : float
-            Spacing, m.
-        origin : (float, float)
-            Position of a node, m.
-        """
-        other = copy.copy(self)
-        other.accuracy = None
-        moved = np.array(grids.lattice_coordinates(*self.lattice.origin, origin))
-        if self._contact is not None:
-            bounds = self._contact.bounds + moved[:, None]
-            other.lattice = grids.enclosing(bounds[:, 0], bounds[:, 1], spacing, grids.MARGIN, origin)
-        else:
-            other.lattice = grids.covering(self.lattice, spacing, origin)
-        return other
-
-    def method_for(self, lattice: Lattice) -> Method:
-        """Return the method to use on a window, "direct" or "fft"; decides what "auto" means."""
-        if self.solver.method == "auto":
-            # with friction transforms are faster on any window, without it they need a few nodes for that
-            return "direct" if lattice.size <= MOST_DIRECT_NODES and not self.frictional else "fft"
-        return "direct" if self.solver.method == "direct" else "fft"
-
-    def memory_needed(self, lattice: Lattice) -> int:
-        """Return the memory (bytes) that solving on a window takes."""
-        method, shape = self.method_for(lattice), lattice.shape
-        return (native_friction if self.frictional else native).memory_needed(method, *shape)
+        self._set_up(assemble(data, None, Source(), Path()), given_gap, lattice)
 
     def run(
         self,
@@ -460,132 +212,8 @@ class Case:
 
         return Session(self, output, overwrite)
 
-    def changed(self, changes: Mapping[str, Any]) -> Case:
-        """Return the same case with other values for some keys of its deck.
-
-        Parameters
-        ----------
-        changes : mapping
-            New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
-            "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is found
-            anew, also where a `Lattice` was given.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each thing that is wrong then.
-        """
-        data = decks.parse_toml(self.deck_text, "deck")
-        if self._given_gap is not None:
-            del data["body"]["1"]["surface"]  # stands for the gap
-        folder = self.deck_file.parent if self.deck_file else Path()
-        case = type(self).__new__(type(self))
-        case._set_up(assemble(data, None, Source(), folder, changes), self._given_gap, None)
-        case.deck_file = self.deck_file
-        return case
-
-    def __eq__(self, other: object) -> bool:
-        """Whether two cases are the same problem, solved and kept in the same way."""
-        if not isinstance(other, Case):
-            return NotImplemented
-        mine, other_gap = self._given_gap, other._given_gap
-        same_gap = mine is other_gap or (
-            isinstance(mine, np.ndarray)
-            and isinstance(other_gap, np.ndarray)
-            and np.array_equal(mine, other_gap)
-        )
-        return same_gap and (self.deck, self.load_steps, self.lattice) == (
-            other.deck,
-            other.load_steps,
-            other.lattice,
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def __repr__(self) -> str:
-        """Name the case, its window and its steps."""
-        rows, cols = self.lattice.shape
-        title = f"{self.title!r}, " if self.title else ""
-        what = "adaptive segment" if self.adaptive else "load step"
-        return (
-            f"Case({title}{self.solver.algorithm}, {rows} x {cols} nodes, "
-            f"{(n := len(self.load_steps))} {what}{'s' * (n > 1)})"
-        )
-
     def _repr_html_(self) -> str:
-        from .display import html_table
         from .summary import case_rows
+        from .text import html_table
 
         return html_table(self.title or "Case", ("", ""), case_rows(self))
-
-    # --- the window -----------------------------------------------------------------------------------------
-
-    def _refinement_problems(self, wanted: AccuracySettings) -> list[Problem]:
-        """Complain about what cannot be refined, or not far enough for errors to be told."""
-        if isinstance(self._given_gap, np.ndarray):
-            sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
-            return [Problem(("accuracy", "target"), wanted.target, sentence)]
-        if self.adaptive:
-            sentence = 'expected steps as numbers with it, not "auto": all lattices need the same load steps'
-            return [Problem(("accuracy", "target"), wanted.target, sentence)]
-        third = self.on_lattice(self.lattice.spacing / 2, self.lattice.origin).lattice.size
-        if third <= wanted.max_nodes:
-            return []
-        sentence = (
-            f"expected at least {third}, the nodes of the third lattice, or a coarser grid to begin with"
-        )
-        return [Problem(("accuracy", "max_nodes"), wanted.max_nodes, sentence)]
-
-    def _gap_at(self, x: Array, y: Array) -> Array:
-        if self._surface_gap is not None:
-            return self._surface_gap(x, y)
-        assert callable(self._given_gap)
-        gap = reals(self._given_gap(x, y), "gap")
-        if gap.shape != np.shape(x):
-            raise DeckError(f"gap: expected an array of the shape of x, {np.shape(x)}, not {gap.shape}")
-        if (bad := np.isnan(gap)).any():
-            where = f"x = {x[bad][0]:.4g} m, y = {y[bad][0]:.4g} m"
-            raise DeckError(f"gap: expected numbers, or inf where nothing can touch; it is NaN at {where}")
-        return gap
-
-    def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:
-        """Return the window, checked against an estimate of the contact wherever there is one."""
-        touch = self._surface_gap.first_touch[:2] if self._surface_gap is not None else (0.0, 0.0)
-        center = grid.center or touch
-        if isinstance(self._given_gap, np.ndarray):
-            if grid.spacing is None or grid.window is None:
-                sentence = "an array gap needs a spacing and a window of its shape"
-                raise deck_error([Problem(("grid",), MISSING, sentence)], source)
-            lattice = lattice or grids.centered(grid.spacing, center, grid.window, grid.origin)
-            self.initial_gap(lattice)
-            return lattice
-        try:
-            estimate = self._estimate(center if self._surface_gap is None else touch, grid.origin)
-        except NoContactFound as error:
-            raise deck_error(
-                [Problem(("grid",), MISSING, f"no window can be found: {error}")], source
-            ) from None
-        if lattice is None and not (self.window_fixed or grid.nodes_across):
-            self._contact = estimate
-        lattice = lattice or grids.window(grid, center, estimate)
-        if problems := grids.check(grid, lattice, estimate):
-            raise deck_error(problems, source)
-        return lattice
-
-    def _estimate(self, center: tuple[float, float], origin: tuple[float, float]) -> Estimate:
-        """Estimate the contact at the largest load of the history, by force and by approach."""
-        largest = {
-            name: max((s.z.value for s in self.load_steps if s.z.control == control), default=0.0)
-            for name, control in (("normal_load", "force"), ("approach", "displacement"))
-        }
-        found = [
-            grids.estimate_contact(self.pair, self._gap_at, center, origin, **{name: value})
-            for name, value in largest.items()
-            if value >= SMALLEST
-        ]
-        return found[0] if len(found) == 1 else found[0].joined(found[1])
-
-
-def _body(body: decks.Body) -> Body:
-    surface = None if body.surface.shape == "flat" else body.surface
-    return Body(body.young_modulus, body.poisson_ratio, body.rigid, surface)

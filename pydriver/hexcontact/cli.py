@@ -6,14 +6,14 @@ Every command imports what it needs when it runs, so that ``hexcontact --help`` 
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from typing import Annotated
 
 import typer
 
-from . import __version__, cli_deck, cli_show, cli_solve, plot_choices
-from .cli_guard import Commands, warn_plainly
+from . import cli_deck, cli_show, cli_solve, interruption, plot_choices
+from ._version import __version__
+from .cli_guard import Commands, standard_streams, warn_plainly
 
 app = typer.Typer(
     name="hexcontact",
@@ -28,11 +28,10 @@ def main() -> None:
     """Entry point of the command."""
     # Threads that wait spin by default, which on a busy machine takes the core from those that work.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a terminal without µ gets a question mark, not a traceback
+    interruption.ends_process = True
     warn_plainly()
-    app()
+    with standard_streams():
+        app()
 
 
 def _print_version(wanted: bool) -> None:

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from .cli_guard import Content, guarded
+from .cli_guard import Content, guarded, say
 from .cli_options import AsJson, DeckFile, Settings
 from .errors import DeckError
+from .text import visible
 
 
 @guarded
@@ -29,7 +30,7 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
     target = run_command.target_of(case, deck)
     if as_json:
         return json_output.of_case(case, target)
-    console.print(f"{deck} is ready to run", soft_wrap=True)
+    console.print(visible(f"{deck} is ready to run"), soft_wrap=True)
     return None
 
 
@@ -46,10 +47,10 @@ def schema(
     if output is None or str(output) == "-":
         print(text, end="")
         return
-    if output.exists() and not output.read_bytes().lstrip().startswith(b"{"):
+    if output.is_file() and not output.read_bytes().lstrip().startswith(b"{"):
         raise DeckError(f"{output} is there and no JSON, so it is not overwritten; choose another output")
     output.write_text(text, encoding="utf-8")
-    print(f'written: {output}; first line of a deck that uses it: "#:schema {output}"')
+    say(f'written: {output}; first line of a deck that uses it: "#:schema {output}"')
 
 
 @guarded
@@ -85,4 +86,4 @@ def new(
             file.write(starters.text(name))
     except FileExistsError:
         raise DeckError(f"{target} exists already; choose another name with --output") from None
-    print(f"written: {target}; now: hexcontact run {target}")
+    say(f"written: {target}; now: hexcontact run {target}")

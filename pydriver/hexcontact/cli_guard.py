@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import functools
+import io
 import os
 import sys
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
 
 import typer
 from typer.core import TyperGroup
 
-from .errors import DeckError, HexcontactError, KernelFolderWarning, ResourceError
+from .errors import LACKING, DeckError, HexcontactError, KernelFolderWarning, PathWarning, ResourceError
+from .text import visible
 
 if TYPE_CHECKING:
     from .errors import Fault
@@ -53,7 +57,7 @@ def guarded(command: Callable[P, Content]) -> Callable[P, None]:
             content = command(*args, **kwargs)
             if name:
                 _print_json(name, content or {})
-        except (BrokenPipeError, typer.Exit):
+        except typer.Exit:
             raise
         except (Exception, KeyboardInterrupt) as error:
             told = None if os.environ.get("HEXCONTACT_DEBUG") else _told(error)
@@ -78,20 +82,84 @@ def _told(error: BaseException) -> _Told | None:
     if isinstance(error, HexcontactError):
         message = "\n".join([str(error), *getattr(error, "__notes__", ())])
         return _Told(message, error.exit_code, getattr(error, "faults", ()), getattr(error, "details", None))
+    if isinstance(error, UnicodeEncodeError):
+        return _Told(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError):
         return _Told("the machine has not enough memory for this", ResourceError.exit_code)
     if isinstance(error, OSError) and error.strerror:
         named = f"{error.filename}: " if error.filename else ""
-        return _Told(named + error.strerror, DeckError.exit_code)
+        kind = ResourceError if error.errno in LACKING else DeckError
+        return _Told(named + error.strerror, kind.exit_code)
+    if isinstance(error, UnicodeEncodeError):  # bytes of a name or an argument that are no text
+        return _Told(f"{error.object}: expected text in UTF-8", DeckError.exit_code)
     if isinstance(error, RuntimeError | OSError) and "NetCDF" in str(error):
         return _Told(f"the result file is damaged ({error})", DeckError.exit_code)
     return None
 
 
+# --- standard streams ---------------------------------------------------------------------------------------
+
+
+class _Outlet(io.FileIO):
+    """Standard output or error; once it cannot be written any more, what is printed goes nowhere."""
+
+    lost: OSError | None = None
+
+    def write(self, content: Any) -> int:
+        """Write bytes, or drop them."""
+        if self.lost is None:
+            try:
+                return super().write(content)
+            except OSError as error:
+                self.lost = error
+        return memoryview(content).nbytes
+
+
+@contextlib.contextmanager
+def standard_streams() -> Iterator[None]:
+    """Let a command end as it would, though its standard streams are closed, full or not read any more.
+
+    Raises
+    ------
+    SystemExit
+        With the code of lacking resources if all went well but what was printed is lost; who closes a pipe
+        has read enough.
+    """
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass  # else the next files got the numbers of the closed ones, and what libraries print
+    os.close(descriptor)
+    output, error = _Outlet(1, "w", closefd=False), _Outlet(2, "w", closefd=False)
+    for name, outlet in (("stdout", output), ("stderr", error)):
+        plain = getattr(sys, name)
+        setattr(
+            sys,
+            name,
+            io.TextIOWrapper(
+                io.BufferedWriter(outlet),
+                encoding=plain.encoding if plain else "utf-8",
+                errors="replace",  # a terminal without µ gets a question mark, not a traceback
+                line_buffering=name == "stderr" or outlet.isatty(),
+            ),
+        )
+    try:
+        yield
+    except SystemExit as ending:
+        sys.stdout.flush()
+        if output.lost and output.lost.errno != errno.EPIPE and not ending.code:
+            complain(f"cannot write to standard output: {output.lost.strerror}")
+            raise SystemExit(ResourceError.exit_code) from None
+        raise
+
+
 def complain(message: str) -> None:
     """Print a message on standard error, each line marked as ours."""
     for line in message.splitlines() or [""]:
-        print(f"hexcontact: {line}", file=sys.stderr)
+        print(f"hexcontact: {visible(line)}", file=sys.stderr)
+
+
+def say(message: str) -> None:
+    """Print a message on standard output."""
+    print(visible(message))
 
 
 def warn_plainly() -> None:
@@ -99,7 +167,7 @@ def warn_plainly() -> None:
     shown = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *more: Any, **options: Any) -> None:
-        if issubclass(category, KernelFolderWarning):
+        if issubclass(category, KernelFolderWarning | PathWarning):
             complain(f"warning: {message}")
         else:
             shown(message, category, *more, **options)

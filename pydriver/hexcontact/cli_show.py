@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .cli_guard import Content, guarded
+from .cli_guard import Content, guarded, say
 from .cli_options import AsJson, ResultFile
 from .errors import DeckError
 
@@ -35,7 +35,8 @@ class Arrows(enum.StrEnum):
 @guarded
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Say what a result holds: origin, history, residuals, the last load step against Hertz."""
-    from . import json_output, summary
+    from . import json_output, remarks, summary
+    from .text import rich_table
 
     result = _open(file)
     if as_json:
@@ -46,9 +47,11 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
     console.print(summary.history_table(histories, console))
     console.print(summary.pairs("Last load step", summary.step_rows(histories[-1])))
     if case is not None and (rows := summary.hertz_rows(case, histories[-1])):
-        console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+        console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if rows := summary.trial_rows(result):
-        console.print(summary.table("Accuracy", summary.TRIAL_HEADERS, rows))
+        console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, rows))
+    for remark in remarks.remarks(histories, result.dataset.attrs):
+        console.print(f"note: {remark}", soft_wrap=True)
     return None
 
 
@@ -122,16 +125,16 @@ def plot(
     if not files:
         if chosen:
             raise DeckError(f"--{next(iter(chosen))}: not an option of --what {what}")
-        print(f"written: {command.general_picture(what, output or Path(f'{what}{suffix}'))}")
+        say(f"written: {command.general_picture(what, output or Path(f'{what}{suffix}'))}")
         return
     results, first = [_open(file) for file in files], output or files[0].with_suffix(suffix)
     if what == "all":
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
-        print("\n".join(command.all_pictures(results[0], first, chosen)))
+        say("\n".join(command.all_pictures(results[0], first, chosen)))
         return
     picture = first if output else first.with_stem(f"{first.stem}_{what}")
-    print(f"written: {command.picture_of(results, what, picture, chosen)}")
+    say(f"written: {command.picture_of(results, what, picture, chosen)}")
 
 
 @guarded
@@ -142,9 +145,9 @@ def report(
     ] = None,
 ) -> None:
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
-    from .report import write_report
+    from .plotting.report import write_report
 
-    print(f"written: {write_report(_open(file), output or file.with_suffix('.html'))}")
+    say(f"written: {write_report(_open(file), output or file.with_suffix('.html'))}")
 
 
 @guarded
@@ -176,4 +179,4 @@ def export(
     written = [write.to_vtk(result, folder, stem, steps)] if vtk else []
     written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps)] if ugrid else []
     written += write.to_csv(result, folder, stem, steps) if csv else []
-    print("\n".join(f"written: {path}" for path in written))
+    say("\n".join(f"written: {path}" for path in written))

@@ -16,6 +16,7 @@ from .interruption import Interrupted, in_background, news
 
 @guarded
 def run(
+    context: typer.Context,
     deck: DeckFile,
     output: Annotated[
         Path | None,
@@ -41,7 +42,8 @@ def run(
         case = command.case_of(deck, settings)
         target = command.target_of(case, deck, output)
         listeners.spare(target)
-        with news() as heard, Store(target, metadata_of(case), overwrite) as store:
+        heard = context.with_resource(news())  # up to the end: what is complete stays so, whatever comes
+        with Store(target, metadata_of(case), overwrite) as store:
             histories = command.solved(case, store, heard, deck.stem, listeners)
         picture = command.overview(store.path) if plot else None
     return listeners.tell(case, histories, target, picture)
@@ -49,6 +51,7 @@ def run(
 
 @guarded
 def resume(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The output of the run.", show_default=False)],
     plot: Plot = False,
     quiet: Quiet = False,
@@ -73,11 +76,8 @@ def resume(
 
     listeners = command.Listeners("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))
-    with (
-        listeners.logging(file),
-        news() as heard,
-        restart.reopened(file, overrides=overrides) as again,
-    ):
+    heard = context.with_resource(news())
+    with listeners.logging(file), restart.reopened(file, overrides=overrides) as again:
         if again is not None:
             if again.warning:
                 complain(f"warning: {again.warning}")
@@ -91,6 +91,7 @@ def resume(
 
 @guarded
 def study(
+    context: typer.Context,
     file: Annotated[
         Path, typer.Argument(metavar="STUDY", help="The study, a TOML file.", show_default=False)
     ],
@@ -138,7 +139,7 @@ def study(
         return None
     with listeners.logging(file, planned.output):
         if case is not None:
-            outcome = command.run_case(planned, case, retry, listeners)
+            outcome = command.run_case(planned, case, retry, listeners, context.with_resource(news()))
             if outcome.exit_code:
                 raise Failure(outcome.message, outcome.exit_code)
             return {
@@ -156,15 +157,12 @@ def study(
                 "retry": retry,
                 "watcher": command.watcher(listeners.silent),
             }
-            work, over = command.run_in_background(planned, cancel, options)
-            with news() as heard:
-                try:
-                    in_background(work, heard)
-                except Interrupted as signaled:
-                    cancel.set()
-                    over.wait()
-                    message = f"interrupted; {command.interrupted(planned)}"
-                    raise Failure(message, signaled.exit_code) from None
+            work, ends = command.run_in_background(planned, cancel, options)
+            try:
+                in_background(work, context.with_resource(news()), ends)
+            except Interrupted as signaled:
+                message = f"interrupted; {command.interrupted(planned)}"
+                raise Failure(message, signaled.exit_code) from None
     code = command.report(planned, quiet or as_json)
     if as_json:
         return {"exit_code": code, **json_output.of_study(planned)}
@@ -180,14 +178,14 @@ def verify(
         typer.Argument(metavar="[NAME]...", help="Which comparisons; default: all.", show_default=False),
     ] = None,
     listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
-    table: Annotated[bool, typer.Option("--table", help="Print Markdown tables.")] = False,
     as_json: AsJson = False,
 ) -> Content:
-    """Compare with published, analytic and converged solutions; exit code 1 if a comparison fails."""
+    """Test the installation: solve a few contacts and compare them with known solutions.
+
+    Exit code 1 if a comparison fails.
+    """
     from . import verify as comparisons
 
     if as_json:
-        if table:
-            raise DeckError("expected --table or --json, not both")
         return comparisons.for_programs(names or [], listing=listing)
-    raise typer.Exit(comparisons.main(names or [], table=table, listing=listing))
+    raise typer.Exit(comparisons.main(names or [], listing=listing))

@@ -18,7 +18,8 @@ from typing import Annotated, Any, cast
 from pydantic import Field, TypeAdapter, ValidationError
 
 from .errors import DeckError, Fault
-from .load_series import LOADS, QUANTITIES, Series
+from .files import text_of
+from .load_series import LOADS, MOST_STEPS, QUANTITIES, Series
 from .messages import Problem
 from .surfaces import Flat, Point, Surface, SurfaceKind
 from .units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE
@@ -28,7 +29,6 @@ from .variables import FIELDS
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
 
-MOST_STEPS = 100_000
 DEEPEST = 50  # levels of tables and arrays; no key needs more than six
 
 YoungModulus = Annotated[float, Quantity(PRESSURE, above=0)]
@@ -376,19 +376,7 @@ def read_toml(path: str | Path) -> tuple[dict[str, Any], str]:
     DeckError
         If there is no such file, it cannot be read, or it is not TOML.
     """
-    try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise DeckError(f"{path}: no such file; expected a deck (a TOML file)") from None
-    except IsADirectoryError:
-        raise DeckError(f"{path}: is a folder; expected a deck (a TOML file)") from None
-    except UnicodeDecodeError as error:
-        raise DeckError(
-            f"{path}: is not UTF-8 text (byte {error.start}); expected a deck (a TOML file)"
-        ) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DeckError(f"{path}: cannot be read ({reason}); expected a deck (a TOML file)") from None
+    text = text_of(path, "a deck (a TOML file)")
     return parse_toml(text, str(path)), text
 
 

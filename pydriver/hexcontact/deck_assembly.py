@@ -14,8 +14,13 @@ from typing import Any
 
 from .deck import read_toml, refuse_deep, with_overrides
 from .errors import DeckError
+from .files import LARGEST_TEXT
 from .load_series import Columns, read_series
 from .messages import MISSING, Problem, Source, listed
+from .text import visible
+
+MOST_INCLUDED = 100  # files; one that several others include counts each time
+MOST_SERIES = 1000  # files of series
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Assembled:
         remark = f"# Put together from {listed(files, 'and')}" if files else ""
         if remark and self.source.overrides:
             remark += f", with {listed(sorted(self.source.overrides), 'and')} set"
-        return " ".join(remark.split()) + ".\n" if remark else ""
+        return visible(" ".join(remark.split())) + ".\n" if remark else ""
 
 
 def assemble(
@@ -80,7 +85,7 @@ def assemble(
     if not ("include" in data or overrides or any(True for _ in _series_with_files(data))):
         return Assembled(dict(data), text, source, [])
     name = Path(source.name) if source.name else None
-    merged, included = _merged(data, source, folder, (name.resolve(),) if name else ())
+    merged, included = _merged(data, source, folder, (name.resolve(),) if name else (), [])
     if overrides:
         if "include" in overrides:
             raise DeckError("include: cannot be replaced; expected in the deck")
@@ -93,9 +98,12 @@ def assemble(
 
 
 def _merged(
-    data: Mapping[str, Any], source: Source, folder: Path, chain: tuple[Path, ...]
+    data: Mapping[str, Any], source: Source, folder: Path, chain: tuple[Path, ...], sizes: list[int]
 ) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    """Return a deck with what it includes beneath it, and the files, the one that counts most first."""
+    """Return a deck with what it includes beneath it, and the files, the one that counts most first.
+
+    `sizes` collects those of all files read.
+    """
     own = {key: value for key, value in data.items() if key != "include"}
     if "include" not in data:
         return own, []
@@ -107,6 +115,9 @@ def _merged(
     files: list[tuple[str, str]] = []
     for name in names:
         path = folder / name
+        if len(sizes) == MOST_INCLUDED or sum(sizes) > LARGEST_TEXT:
+            most = f"{MOST_INCLUDED} files and {LARGEST_TEXT >> 20} MB in all"
+            raise DeckError(f"{prefix}include: expected at most {most}, counting a file each time")
         try:
             tables, text = read_toml(path)
         except DeckError as error:
@@ -114,7 +125,9 @@ def _merged(
         if path.resolve() in chain:
             turns = " -> ".join(link.name for link in (*chain[chain.index(path.resolve()) :], path))
             raise DeckError(f"{prefix}include: {path} includes itself ({turns})")
-        inner, further = _merged(tables, Source(str(path), text), path.parent, (*chain, path.resolve()))
+        sizes.append(len(text))
+        below = Source(str(path), text)
+        inner, further = _merged(tables, below, path.parent, (*chain, path.resolve()), sizes)
         for series in _series_with_files(inner):  # relative to the file that names them
             series["file"] = os.path.relpath(path.parent / series["file"], folder)
         beneath = _over(inner, beneath)
@@ -145,6 +158,8 @@ def _series_with_files(data: Mapping[str, Any]) -> Iterator[Any]:
 def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Problem]:
     """Put the rows in the place of the names of files, and yield what is wrong with them."""
     known = {"file", "columns"}
+    if sum(1 for _ in _series_with_files(data)) > MOST_SERIES:
+        raise DeckError(f"load: expected at most {MOST_SERIES} files of series")
     for number, load in enumerate(data["load"] if isinstance(data.get("load"), list) else ()):
         series = next(_series_with_files({"load": [load]}), None)
         if series is None:

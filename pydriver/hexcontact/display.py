@@ -2,69 +2,21 @@
 
 from __future__ import annotations
 
-import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .progress import quantity
+from .text import Row, html_table, quantity, visible
 
 if TYPE_CHECKING:
     from .result import Result
-
-Row = Sequence[str]
-
-_TABLE = "border-collapse:collapse;margin:0.3em 0"
-_CELL = "padding:0.15em 1.2em 0.15em 0;border:0;background:none"
-_HEAD = f"{_CELL};border-bottom:1px solid currentColor;font-weight:600"
-_TITLE = "font-weight:600;text-align:left;padding:0.2em 0;color:inherit;caption-side:top"
 
 # Colors of a map of pressure, from none to the largest (viridis), and of zones: separated, stick, slip.
 _SHADES = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725")
 _ZONES = ("#ffffff", "#0072b2", "#f0c05a")
 _PIXELS = 240  # of the longer side of a picture
-
-
-def text_table(headers: Row, rows: Iterable[Row]) -> str:
-    """Return a table as plain text; numbers are at the right of their columns."""
-    table = [list(headers), *map(list, rows)]
-    widths = [max(len(row[k]) for row in table) for k in range(len(headers))]
-    left = [k == 0 or not _numbers(row[k] for row in table[1:]) for k in range(len(headers))]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if first else cell.rjust(width)
-            for cell, width, first in zip(row, widths, left, strict=True)
-        ).rstrip()
-        for row in table
-    ]
-    return "\n".join(lines if any(headers) else lines[1:])
-
-
-def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") -> str:
-    """Return a table as HTML that looks the same in light and dark notebooks."""
-    rows = [list(row) for row in rows]
-    right = [k > 0 and _numbers(row[k] for row in rows) for k in range(len(headers))]
-
-    def line(row: Row, tag: str, style: str) -> str:
-        cells = (
-            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{html.escape(cell)}</{tag}>'
-            for cell, at_right in zip(row, right, strict=True)
-        )
-        return f'<tr style="background:none">{"".join(cells)}</tr>'
-
-    head = f"<thead>{line(headers, 'th', _HEAD)}</thead>" if any(headers) else ""
-    body = "".join(line(row, "td", _CELL) for row in rows)
-    caption = f'<caption style="{_TITLE}">{html.escape(title)}</caption>' if title else ""
-    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{html.escape(note)}</div>' if note else ""
-    return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
-
-
-def _numbers(cells: Iterable[str]) -> bool:
-    """Tell whether a column holds numbers, some of which may be missing."""
-    found = [cell for cell in cells if cell not in ("", "-")]
-    return bool(found) and all(cell.lstrip("+-").replace("inf", "0")[:1].isdigit() for cell in found)
 
 
 # --- results ------------------------------------------------------------------------------------------------
@@ -80,7 +32,7 @@ def result_header(result: Result) -> str:
     named = [f"Result of {result.case_title!r}" if result.case_title else "Result", result.path]
     about = f"{steps}, {sizes['row']} x {sizes['col']} nodes"
     spacing = quantity(float(attributes.get("lattice_spacing", np.nan)), "m")
-    return ", ".join(filter(None, named)) + f"\n  {about}, spacing {spacing}"
+    return visible(", ".join(filter(None, named))) + f"\n  {about}, spacing {spacing}"
 
 
 def result_rows(result: Result) -> list[Row]:
@@ -110,7 +62,7 @@ def result_html(result: Result) -> str:
 
 def _pictures(result: Result) -> Iterable[str]:
     """Yield maps of the last step: pressure, and where there is friction the zones."""
-    from .report_fields import Plane
+    from .plotting.report_fields import Plane
     from .step_view import StepView
 
     try:
@@ -143,7 +95,7 @@ def _rgb(color: str) -> list[int]:
 
 def _figure(colors: NDArray[np.float64], caption: str) -> str:
     """Return a picture with its caption (HTML)."""
-    from .report_fields import png_of
+    from .plotting.report_fields import png_of
 
     picture = png_of(np.round(colors).astype("u1"))
     rows, cols = colors.shape[:2]

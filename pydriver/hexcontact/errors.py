@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
+
+LACKING = frozenset(  # what the system says if it is not the input that is wrong
+    {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE}
+)
 
 
 class Fault(NamedTuple):
@@ -62,6 +67,10 @@ class AccuracyWarning(UserWarning):
     """The lattice could not be refined to the accuracy asked for; the finest result is kept."""
 
     exit_code = 3
+
+
+class PathWarning(UserWarning):
+    """A load step was solved in parts, along a path that the load history does not prescribe."""
 
 
 class ConvergenceError(HexcontactError, RuntimeError):

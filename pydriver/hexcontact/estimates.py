@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .case import Case
+    from .problem import Problem
 
 # Operator applications of a load step to 1e-8, as measured on meshes of 20 to 60 spacings in the radius.
 # Without friction they are of the pressure alone, a third of an application each.
@@ -16,37 +16,32 @@ _ADAPTIVE, _ADAPTIVE_SIMILAR = (
     30,
     6,
 )  # solutions in a segment of adaptive steps: as measured, within a factor of 3
-_SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
 
 # Seconds per application and node of the window on one core of 2020 or so, with all that goes with it.
 _SECONDS_FRICTIONLESS, _SECONDS = 2e-7, 1.3e-7
 _SECONDS_LEAST = 5e-3  # of a step, whatever its size
 
 
-def operator_applications(case: Case) -> float | None:
+def operator_applications(case: Problem) -> float | None:
     """Return about how many operator applications all load steps take; None for the direct method."""
     if case.method_for(case.lattice) == "direct":
         return None
     if not case.frictional:
         return _FRICTIONLESS * len(case.load_steps)
-    each = _DISSIMILAR if _coupled(case) else _SIMILAR
+    each = _DISSIMILAR if case.coupled else _SIMILAR
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         each *= _INTERPOLATED
     return each * _solutions(case)
 
 
-def _coupled(case: Case) -> bool:
-    return case.solver.coupling == "full" and abs(case.pair.beta) > _SMALLEST_BETA
-
-
-def _solutions(case: Case) -> int:
+def _solutions(case: Problem) -> int:
     """Return how many solutions a case takes; a guess for segments whose steps are chosen on the way."""
     adaptive = sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
-    each = _ADAPTIVE if _coupled(case) else _ADAPTIVE_SIMILAR
+    each = _ADAPTIVE if case.coupled else _ADAPTIVE_SIMILAR
     return len(case.load_steps) - adaptive + each * adaptive
 
 
-def seconds(case: Case) -> float | None:
+def seconds(case: Problem) -> float | None:
     """Return about how long a run takes on one core (s); None for the direct method."""
     applications = operator_applications(case)
     if applications is None:
@@ -55,7 +50,7 @@ def seconds(case: Case) -> float | None:
     return applications * each + _SECONDS_LEAST * _solutions(case)
 
 
-def work(case: Case) -> str:
+def work(case: Problem) -> str:
     """Say it in words: "about 1,800 operator applications, about 4 s on one core"."""
     from .refinement import least_and_most
 
@@ -78,7 +73,7 @@ def _total(parts: Iterable[float | None]) -> float | None:
 
 def _rounded(number: float) -> int:
     """Round to two digits; more would pretend to be exact."""
-    return int(float(f"{number:.2g}"))
+    return round(float(f"{number:.2g}"))
 
 
 def _duration(time: float) -> str:

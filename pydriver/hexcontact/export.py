@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import base64
+import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import DeckError
 from .mesh import triangles
+from .text import escaped, visible
 from .variables import FIELDS, NOT_KEPT, VARIABLES
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
         (folder / names[-1]).write_text(_vtu(result, number), encoding="utf-8")
     series = folder / f"{stem}.pvd"
     sets = "".join(
-        f'    <DataSet timestep="{number}" part="0" file={quoteattr(name)}/>\n'
+        f'    <DataSet timestep="{number}" part="0" file="{escaped(name)}"/>\n'
         for number, name in zip(steps, names, strict=True)
     )
     series.write_text(
@@ -140,7 +141,7 @@ def _vtu(result: Result, number: int) -> str:
         '<?xml version="1.0"?>\n'
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
         'compressor="vtkZLibDataCompressor">\n'
-        f"<!-- {escape(_about(result, number)).replace('--', '- -')} -->\n"
+        f"<!-- {re.sub('-(?=-)', '- ', escaped(_about(result, number)))} -->\n"
         f"<UnstructuredGrid>\n<FieldData>\n{''.join(data)}</FieldData>\n"
         f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(faces)}">\n'
         f"<PointData>\n{''.join(fields)}</PointData>\n<CellData/>\n"
@@ -178,10 +179,10 @@ def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
     text = (base64.b64encode(header) + base64.b64encode(packed)).decode()
     shape = f' NumberOfComponents="{data.shape[1]}"' if data.ndim > 1 else ""
     alone = ' NumberOfTuples="1"' if data.size == 1 else ""
-    key = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">' + escape(unit) + "</InformationKey>\n"
+    key = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">' + unit + "</InformationKey>\n"
     kind = _VTK_TYPES[data.dtype.str[1:]]
     return (
-        f'<DataArray type="{kind}" Name={quoteattr(name)}{shape}{alone} format="binary">\n{text}\n'
+        f'<DataArray type="{kind}" Name="{escaped(name)}"{shape}{alone} format="binary">\n{text}\n'
         f"{key if unit not in ('', '1') else ''}</DataArray>\n"
     )
 
@@ -281,7 +282,7 @@ def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
     steps = [] if numbers is None else kept_steps(result, numbers)
     _make(folder)
     written = [folder / f"{stem}_history.csv"]
-    result.history.rename(columns=_with_unit).to_csv(written[0])
+    result.history.rename(columns=_with_unit).map(_cell).to_csv(written[0])
     for number in steps:
         rows, cols = np.meshgrid(result.lattice.rows, result.lattice.cols, indexing="ij")
         columns = {"row": rows, "col": cols, "x": result.lattice.x, "y": result.lattice.y}
@@ -289,6 +290,14 @@ def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
         written.append(folder / f"{stem}_{number:04d}.csv")
         table.rename(columns=_with_unit).to_csv(written[-1], index=False)
     return written
+
+
+def _cell(value: Any) -> Any:
+    """Return what stands in a table; text that a spreadsheet would run as a formula begins with ' there."""
+    if not isinstance(value, str):
+        return value
+    text = visible(value)
+    return f"'{text}" if text.lstrip().startswith(("=", "+", "-", "@")) else text
 
 
 def _with_unit(name: str) -> str:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # the last comes from Slurm, before a time limit
 
+ends_process = False  # whether it ends with the command: then no signal changes its exit code any more
+
 
 class Interrupted(BaseException):
     """A signal has come that ends the run."""
@@ -37,29 +39,51 @@ def news() -> Iterator[tuple[int, int]]:
         yield reader, writer
     finally:
         for number, handler in heeded.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if ends_process else handler)
         signal.set_wakeup_fd(former)
         os.close(reader)
         os.close(writer)
 
 
-def in_background(work: Callable[[], None], heard: tuple[int, int]) -> None:
+def in_background(
+    work: Callable[[], object], heard: tuple[int, int], ends: Callable[[Interrupted], bool] = lambda _: True
+) -> None:
     """Do `work` in a second thread while this one waits for it, and for signals.
 
     The compiled core cannot be interrupted; a thread that waits can.
+
+    Parameters
+    ----------
+    work : callable
+        What to do.
+    heard : tuple of int
+        The pipe of `news`.
+    ends : callable
+        Tells whether a signal ends the work; if not, it goes on.
+
+    Raises
+    ------
+    Interrupted
+        If a signal ends the work; the thread may still be at it.
     """
     reader, writer = heard
     raised: list[BaseException] = []
+    own = os.dup(writer)  # the pipe may be closed by the time, and its number be that of another file
 
     def worker() -> None:
         try:
             work()
         except BaseException as error:
             raised.append(error)
-        os.write(writer, bytes([0]))  # is the number of no signal
+        with contextlib.suppress(OSError):  # nobody waits any more
+            os.write(own, bytes([0]))  # is the number of no signal
+        os.close(own)
 
-    threading.Thread(target=worker, daemon=True).start()
-    if number := os.read(reader, 1)[0]:
-        raise Interrupted(number)
+    thread = threading.Thread(target=worker, daemon=True)
+    thread.start()
+    while number := os.read(reader, 1)[0]:
+        if ends(signaled := Interrupted(number)):
+            raise signaled
+    thread.join()
     if raised:
         raise raised[0]

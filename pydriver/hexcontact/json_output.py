@@ -8,12 +8,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import __version__
+from ._version import __version__
 from .errors import ConvergenceError, DeckError, Fault, ResourceError
 from .progress import RESIDUALS
+from .remarks import remarks
+from .text import visible
 
 if TYPE_CHECKING:
-    from .case import Case
+    from .problem import Problem
     from .result import Result
     from .study import Study
     from .verify import Check, Comparison
@@ -37,7 +39,7 @@ def write(command: str, content: Mapping[str, Any]) -> None:
         What it has to say; `plain` makes JSON of it.
     """
     whole = {"hexcontact": __version__, "command": command, "exit_code": 0, **content}
-    print(json.dumps(plain(whole), ensure_ascii=False, allow_nan=False), flush=True)
+    print(visible(json.dumps(plain(whole), ensure_ascii=False, allow_nan=False)), flush=True)
 
 
 def plain(value: Any) -> Any:
@@ -87,11 +89,11 @@ def error(
 # --- what commands have to say ----------------------------------------------------------------------------
 
 
-def of_case(case: Case, output: Path) -> dict[str, Any]:
+def of_case(case: Problem, output: Path) -> dict[str, Any]:
     """Return what would be run."""
     from . import estimates
     from .solve import parameters_of
-    from .window import memory_needed
+    from .window import peak_memory
 
     lattice = case.lattice
     return {
@@ -106,7 +108,7 @@ def of_case(case: Case, output: Path) -> dict[str, Any]:
         "window_fixed": case.window_fixed,
         "load_steps": case.planned_steps or None,
         "segments": case.load_steps[-1].segment + 1,
-        "memory": memory_needed(case, lattice),
+        "memory": peak_memory(case, lattice),
         "operator_applications": estimates.operator_applications(case),
         "seconds": estimates.seconds(case),
     }
@@ -117,7 +119,7 @@ def of_steps(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [{"step": number, **history} for number, history in enumerate(histories, start=1)]
 
 
-def of_run(case: Case | None, title: str, histories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def of_run(case: Problem | None, title: str, histories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return what came out of a run that is complete; without a case nothing about Hertz."""
     from .summary import against_hertz
 
@@ -147,13 +149,15 @@ def of_result(result: Result) -> dict[str, Any]:
     attributes["complete"] = result.complete
     sizes = result.dataset.sizes
     fields = [str(name) for name, v in result.dataset.data_vars.items() if v.dims == ("step", "row", "col")]
+    histories = histories_of(result)
     return {
         "file": result.path,
         **attributes,
         "rows": sizes["row"],
         "columns": sizes["col"],
         "fields": fields,
-        "steps": of_steps(histories_of(result)),
+        "warnings": remarks(histories, attributes),
+        "steps": of_steps(histories),
     }
 
 

@@ -222,7 +222,7 @@ def _pruned(folder: Path, bound: int) -> int:
 
 def _maker() -> str:
     """Say what the bits of a spectrum depend on: the program, the processor, libraries for mathematics."""
-    from . import __version__
+    from ._version import __version__
 
     core = Path(str(_core.__file__)).stat()
     parts = [__version__, f"core {core.st_size} {core.st_mtime_ns}", platform.machine()]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from .arguments import integer, number
+from .arguments import integer, number, reals
 from .errors import DeckError
 
 
@@ -45,6 +45,9 @@ class Lattice:
             raise DeckError(f"spacing = {self.spacing!r}: expected {kind}")
         for name in ("row_first", "col_first", "n_row", "n_col"):
             integer(getattr(self, name), name)
+        origin = reals(self.origin, "origin")
+        if origin.shape != (2,) or not np.isfinite(origin).all():
+            raise DeckError(f"origin = {self.origin!r}: expected two finite lengths in meters")
         if self.n_row < 1 or self.n_col < 1:
             raise DeckError(
                 f"window = [{self.n_row}, {self.n_col}]: expected at least one row and one column"

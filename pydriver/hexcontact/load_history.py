@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
-from .deck import MOST_STEPS, Load, Segment
-from .load_series import LOADS
+from .deck import Load, Segment
+from .load_series import LOADS, MOST_STEPS
 from .messages import MISSING, Problem
 from .validation import SMALLEST
 

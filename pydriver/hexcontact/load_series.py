@@ -17,6 +17,7 @@ from pydantic import Field
 from pydantic_core import PydanticCustomError
 
 from .errors import DeckError
+from .files import require_ordinary, text_of
 from .messages import did_you_mean, listed, shown
 from .units import ANGLE, FORCE, LENGTH, TORQUE
 from .validation import Kind, Quantity, Several, Table, Text, refuse
@@ -43,6 +44,11 @@ QUANTITIES: dict[str, Quantity] = {
 
 _PASSED_OVER = ("time", "step")  # columns of files that need not be deck keys
 _MOST_COMPLAINTS = 10
+_LONGEST_LABEL = 1000  # characters
+_EXPECTED = "a CSV or netCDF file of loads"
+
+MOST_STEPS = 100_000
+"""Load steps of a history, and rows of a series."""
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -320,16 +326,19 @@ def _split(match: re.Match[str]) -> tuple[str, str]:
 
 def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
     """Read a text file; empty lines and those that begin with # are passed over."""
-    text = _text(path)
     lines = [
         (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
+        for number, line in enumerate(text_of(path, _EXPECTED).splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
         raise DeckError(f"{path}: is empty; expected a line of headers such as normal_load [N], and rows")
+    _refuse_many(path, len(lines) - 1)
     separator = next((mark for mark in ("\t", ";", ",") if mark in lines[0][1]), ",")
-    rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
+    try:
+        rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
+    except csv.Error as error:
+        raise DeckError(f"{path}: cannot be read ({error}); expected {_EXPECTED}") from None
     if len(
         problems := [
             f"{path}, line {number}: expected {len(rows[0])} cells, as many as headers, not {len(row)}"
@@ -346,19 +355,9 @@ def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
     return columns, [number for number, _ in lines[1:]]
 
 
-def _text(path: Path) -> str:
-    expected = "expected a CSV or netCDF file of loads"
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise DeckError(f"{path}: no such file; {expected}") from None
-    except IsADirectoryError:
-        raise DeckError(f"{path}: is a folder; {expected}") from None
-    except UnicodeDecodeError as error:
-        raise DeckError(f"{path}: is not UTF-8 text (byte {error.start}); {expected}") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DeckError(f"{path}: cannot be read ({reason}); {expected}") from None
+def _refuse_many(path: Path, rows: int) -> None:
+    if rows > MOST_STEPS:
+        raise DeckError(f"{path}: expected at most {MOST_STEPS} rows, not {rows}")
 
 
 def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
@@ -367,30 +366,44 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
     import numpy as np
 
     if not path.exists():
-        raise DeckError(f"{path}: no such file; expected a CSV or netCDF file of loads")
+        raise DeckError(f"{path}: no such file; expected {_EXPECTED}")
+    require_ordinary(path, _EXPECTED)
     try:
         with netCDF4.Dataset(path) as file:
-            lengths: dict[str, int] = {}
+            lengths = {
+                name: variable.shape[0]
+                for name, variable in file.variables.items()
+                if name not in file.dimensions
+                and ((variable.ndim == 1 and _is_readable(variable.dtype)) or _is_text(variable))
+            }
+            longest = max(lengths.values(), default=0)
+            count = next((lengths[key] for key in QUANTITIES if key in lengths), longest)
+            _refuse_many(path, count)
             columns = []
-            for name, variable in file.variables.items():
-                text = variable.dtype == "S1" and variable.ndim == 2  # characters of labels
-                if (variable.ndim != 1 and not text) or name in file.dimensions:
-                    continue
+            for name in (name for name, length in lengths.items() if length == count):
+                variable = file.variables[name]
                 values = variable[:]
-                if text and values.dtype == "S1":
+                if _is_text(variable) and values.dtype == "S1":
                     values = netCDF4.chartostring(np.ma.filled(values, b""))
-                if text or variable.dtype is str:
+                if _is_text(variable) or variable.dtype is str:
                     cells = [str(value) for value in values]
-                elif np.issubdtype(values.dtype, np.number):
+                else:
                     numbers = np.ma.filled(values.astype(float), np.nan)
                     cells = ["" if np.isnan(number) else number for number in numbers.tolist()]
-                else:
-                    continue
                 unit = str(getattr(variable, "units", "")).strip()
                 columns.append(_Column(name, "" if unit == "1" else unit, cells))
-                lengths[name] = len(cells)
-    except (OSError, RuntimeError) as error:
+    except DeckError:
+        raise
+    except Exception as error:  # damage takes any form
         raise DeckError(f"{path}: cannot be read as netCDF ({error})") from None
-    count = next((lengths[key] for key in QUANTITIES if key in lengths), max(lengths.values(), default=0))
-    columns = [column for column in columns if len(column.cells) == count]
     return columns, list(range(1, count + 1))
+
+
+def _is_readable(dtype: Any) -> bool:
+    """Tell whether a variable of this type holds numbers or text."""
+    return dtype is str or getattr(dtype, "kind", "") in tuple("iuf")
+
+
+def _is_text(variable: Any) -> bool:
+    """Tell whether a variable holds texts as characters."""
+    return bool(variable.dtype == "S1" and variable.ndim == 2 and variable.shape[1] <= _LONGEST_LABEL)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import json
 import math
 import os
 import socket
+import stat
 import time
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from typing import Any
 from .errors import DeckError
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
+LONGEST = 1000  # bytes of a lock
 
 
 class Lock:
@@ -34,13 +37,13 @@ class Lock:
     Raises
     ------
     DeckError
-        If another run holds it.
+        If another run holds it, or what is there is no lock: that stays as it is.
     """
 
     def __init__(self, path: Path, output: Path) -> None:
         self.path = path
         while True:
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            self._descriptor = _opened(path)
             try:
                 fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 held = False
@@ -52,6 +55,9 @@ class Lock:
                 break
             os.close(self._descriptor)  # the one who held it deleted the file in between
         holder = self._holder()
+        if holder is None:
+            os.close(self._descriptor)
+            raise _no_lock(path)
         if held or holder.get("host", socket.gethostname()) != socket.gethostname():
             os.close(self._descriptor)
             since = f" since {holder['since']}" if "since" in holder else ""
@@ -75,28 +81,56 @@ class Lock:
             self.release()
             raise
 
-    def _holder(self) -> dict[str, Any]:
-        with contextlib.suppress(ValueError):
-            holder = json.loads(os.pread(self._descriptor, 1000, 0))
-            if isinstance(holder, dict):
-                return holder
-        return {}
+    def _holder(self) -> dict[str, Any] | None:
+        """Return who has written the lock, nobody if it is blank; None if it is no lock."""
+        return holder_of(os.pread(self._descriptor, LONGEST + 1, 0))
 
     def release(self) -> None:
-        """Let go of the lock."""
-        self.path.unlink(missing_ok=True)
+        """Let go of the lock; a file that came in its place stays."""
+        if _same_file(self.path, self._descriptor):
+            self.path.unlink(missing_ok=True)
         os.close(self._descriptor)
 
 
-def _is_running(holder: dict[str, Any]) -> bool:
+def holder_of(text: bytes) -> dict[str, Any] | None:
+    """Return who has written the text of a lock, nobody if it is blank or cut short; None if it is no lock."""
+    if not text.strip(b"\0"):  # nothing yet; zeros after a power failure
+        return {}
+    with contextlib.suppress(ValueError, RecursionError):
+        holder = json.loads(text)
+        return holder if isinstance(holder, dict) and holder.keys() >= {"process", "host"} else None
+    return {} if text.startswith(b'{"process": ') and len(text) <= LONGEST else None
+
+
+def _opened(path: Path) -> int:
+    """Open a lock, or make it; DeckError for anything but a file of this one name."""
+    try:
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+        descriptor = os.open(path, flags, 0o666)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):  # a link, a folder, a socket
+            raise _no_lock(path) from None
+        raise
+    there = os.fstat(descriptor)
+    if not stat.S_ISREG(there.st_mode) or there.st_nlink > 1:
+        os.close(descriptor)
+        raise _no_lock(path)
+    return descriptor
+
+
+def _no_lock(path: Path) -> DeckError:
+    return DeckError(f"{path} is not a lock of hexcontact; move it away")
+
+
+def _is_running(holder: dict[str, Any] | None) -> bool:
     """Tell whether a process of this machine holds the lock, not one that got its number since."""
     import psutil
 
-    if holder.get("host") != socket.gethostname():
+    if not holder or holder.get("host") != socket.gethostname():
         return False
     try:
         began = psutil.Process(int(holder.get("process", -1))).create_time()
-    except (psutil.NoSuchProcess, ValueError):
+    except (psutil.NoSuchProcess, ValueError, TypeError):
         return False
     except psutil.Error:
         return True
@@ -105,6 +139,6 @@ def _is_running(holder: dict[str, Any]) -> bool:
 
 def _same_file(path: Path, descriptor: int) -> bool:
     try:
-        return os.path.samestat(os.stat(path), os.fstat(descriptor))
+        return os.path.samestat(os.lstat(path), os.fstat(descriptor))
     except FileNotFoundError:
         return False

@@ -18,10 +18,11 @@ from typing import IO, TYPE_CHECKING, Any
 
 from .errors import DeckError, HexcontactError
 from .progress import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
+from .text import visible
 
 if TYPE_CHECKING:
-    from .case import Case
     from .lattice import Lattice
+    from .problem import Problem
     from .result import Step
 
 logger = logging.getLogger("hexcontact")
@@ -46,9 +47,9 @@ def _word(value: Any) -> str:
 # --- what is told -----------------------------------------------------------------------------------------
 
 
-def begun(case: Case, lattice: Lattice, done: int) -> None:
+def begun(case: Problem, lattice: Lattice, done: int) -> None:
     """Tell of a run that begins, or goes on after so many steps."""
-    from . import __version__
+    from ._version import __version__
     from .solve import parameters_of
 
     if not logger.isEnabledFor(logging.INFO):
@@ -137,7 +138,7 @@ class _Lines(logging.Formatter):
         self.converter = time.gmtime
 
     def format(self, record: logging.LogRecord) -> str:
-        return "; ".join(super().format(record).splitlines())
+        return visible("; ".join(super().format(record).splitlines()))
 
 
 class _File(logging.FileHandler):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,6 +24,21 @@ def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/pro
     import psutil
 
     return min([int(psutil.virtual_memory().available), *_left_in_groups(cgroups, process)])
+
+
+def resident() -> int:
+    """Return the memory in bytes that this process takes now, with the interpreter and all libraries."""
+    import psutil
+
+    return int(psutil.Process().memory_info().rss)
+
+
+def threads() -> int:
+    """Return how many threads the core uses on large windows."""
+    wanted = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
+    if wanted.isdecimal() and int(wanted):
+        return int(wanted)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def require(needed: int, what: str, advice: str) -> None:

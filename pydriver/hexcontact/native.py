@@ -13,14 +13,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, kernel_cache
-from .arguments import number, reals
+from .arguments import integer, number, reals, word
 from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
 from .lattice import Lattice
 
 _api = _core.hc_f2py_api
 
 Method = Literal["direct", "fft"]
+MOST_IN_CONTACT = 10**8  # nodes of which memory is asked; the square of more would overflow, and fits nowhere
 _METHODS = {"direct": 0, "fft": 1}
+_STOPPED = (  # in the order of fortran/contact_state.f90
+    "nothing was solved",
+    "",  # within the tolerance
+    "all iterations that are allowed were made",
+    "no iteration brings the residuals further down",
+    "no node sticks, and a load cannot be carried",
+    "the contact reaches the rim of the window before the end of the step",
+    "numbers are not finite",
+)
 _ERRORS: dict[int, type[HexcontactError]] = {
     1: DeckError,
     2: ConvergenceError,
@@ -54,10 +64,16 @@ def checked_mask(candidate: ArrayLike | None, lattice: Lattice) -> NDArray[np.bo
 
 
 def shaped(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
-    """Return values over the window, whatever they are."""
+    """Return values over the window, whatever they are; of an xarray.DataArray x and y must be its nodes."""
     array = reals(values, name)
     if array.shape != lattice.shape:
         raise DeckError(f"{name}: an array of shape {array.shape}, expected {lattice.shape} (rows, columns)")
+    labeled: Any = values if hasattr(values, "coords") else None
+    for key in ("x", "y"):
+        if labeled is not None and key in labeled.coords:
+            points, nodes, near = labeled.coords[key], getattr(lattice, key), 1e-6 * lattice.spacing
+            if points.dims != labeled.dims or not np.allclose(points, nodes, rtol=0.0, atol=near):
+                raise DeckError(f"{name}: its coordinate {key} is not that of the nodes of the lattice")
     return array
 
 
@@ -70,9 +86,17 @@ def checked_tolerance(tolerance: float) -> None:
 
 def method_code(name: str) -> int:
     """Return the number of a method in the core."""
-    if name not in _METHODS:
-        raise DeckError(f"method = {name!r}: expected 'direct' or 'fft'")
-    return _METHODS[name]
+    return _METHODS[word(name, "method", _METHODS)]
+
+
+def thread_count(threads: int) -> int:
+    """Return a number of threads as the core takes it; the core knows how many there may be."""
+    return integer(threads, "threads", "an integer of at least 0")
+
+
+def why_stopped(code: int) -> str:
+    """Say in words why a solver stopped short of the tolerance; empty if it met it."""
+    return _STOPPED[code]
 
 
 @dataclass(frozen=True)
@@ -92,6 +116,14 @@ class ElasticPair:
     lambda_1: float
     lambda_2: float
     lambda_5: float
+
+    def __post_init__(self) -> None:
+        one, two, five = (number(getattr(self, f"lambda_{k}"), f"lambda_{k}") for k in (1, 2, 5))
+        if not (0 < one < np.inf and abs(two) < one and -one < five < np.inf):
+            raise DeckError(
+                f"lambda_1, lambda_2, lambda_5 = {one:g}, {two:g}, {five:g}: expected finite numbers with "
+                "lambda_1 > 0, |lambda_2| < lambda_1 and lambda_5 > -lambda_1"
+            )
 
     @classmethod
     def from_materials(
@@ -165,7 +197,7 @@ class FlexibilityOperator:
         extent = [lattice.n_col, lattice.n_row]
         kernel_cache.ready()
         self._handle, code, message = _api.create_operator(
-            method_code(method), lattice.basis.T, extent, pair.as_array(), threads
+            method_code(method), lattice.basis.T, extent, pair.as_array(), thread_count(threads)
         )
         raise_for(code, message)
         weakref.finalize(self, _api.free_handle, self._handle)
@@ -215,6 +247,10 @@ class NormalSolution:
         Residuals of the contact conditions and of the prescribed load.
     converged
         Both residuals are within the tolerance.
+    touches_rim
+        There is contact at the rim of the window; a larger window may have another solution.
+    stopped
+        Why the solver stopped, in words; empty if it converged.
     sweeps
         Active sets that were tried on the finest lattice.
     operator_applications
@@ -231,6 +267,8 @@ class NormalSolution:
     converged: bool
     sweeps: int
     operator_applications: float
+    touches_rim: bool = False
+    stopped: str = ""
 
 
 class NormalContact:
@@ -277,7 +315,7 @@ class NormalContact:
             pair.as_array(),
             checked_field(gap, lattice, "initial_gap"),
             mask.ravel().astype(np.int32),
-            threads,
+            thread_count(threads),
         )
         raise_for(code, message)
         weakref.finalize(self, _api.free_handle, self._handle)
@@ -322,9 +360,14 @@ class NormalContact:
                 raise DeckError(f"approach = {approach!r}: expected a number")
         checked_tolerance(tolerance)
         out: Any = _api.solve_normal_contact(
-            self._handle, 1 if approach is None else 2, target, tolerance, max_sweeps, self.lattice.size
+            self._handle,
+            1 if approach is None else 2,
+            target,
+            tolerance,
+            integer(max_sweeps, "max_sweeps"),
+            self.lattice.size,
         )
-        pressure, gap, zone, load, delta, residuals, sweeps, work, converged, code, message = out
+        pressure, gap, zone, load, delta, residuals, sweeps, work, flags, code, message = out
         kernel_cache.told()
         raise_for(code, message)
         shape = self.lattice.shape
@@ -338,14 +381,22 @@ class NormalContact:
             approach=delta,
             residual_normal=float(residuals[0]),
             residual_force=float(residuals[1]),
-            converged=bool(converged),
+            converged=bool(flags[0]),
             sweeps=sweeps,
             operator_applications=work,
+            touches_rim=bool(flags[1]),
+            stopped=why_stopped(flags[2]),
         )
 
 
 def memory_needed(
-    method: Method, n_row: int, n_col: int, *, operator_only: bool = False, threads: int = 1
+    method: Method,
+    n_row: int,
+    n_col: int,
+    *,
+    contact: int | None = None,
+    part: Literal["problem", "operator", "set-up of the operator"] = "problem",
+    threads: int = 1,
 ) -> int:
     """Return the bytes that a frictionless problem takes on a window of the given size.
 
@@ -355,9 +406,14 @@ def memory_needed(
         ``"direct"`` or ``"fft"``.
     n_row, n_col
         Rows and columns of the window.
-    operator_only
-        The full 3x3 flexibility operator alone instead.
+    contact
+        Nodes in contact; default: all.
+    part
+        The whole problem; the full 3x3 flexibility operator alone; or what that takes besides at its set-up.
     threads
         Threads that will be used.
     """
-    return int(_api.memory_needed(method_code(method), [n_col, n_row], int(operator_only), threads))
+    code = ("problem", "operator", "set-up of the operator").index(part)
+    extent = [integer(n_col, "n_col"), integer(n_row, "n_row")]
+    nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
+    return int(_api.memory_needed(method_code(method), extent, nodes, code, thread_count(threads)))

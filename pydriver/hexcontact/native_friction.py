@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, kernel_cache
-from .arguments import number, reals
+from .arguments import integer, number, reals, word
 from .errors import DeckError
 from .lattice import Lattice
 from .native import (
+    MOST_IN_CONTACT,
     ElasticPair,
     Method,
     checked_field,
@@ -27,6 +28,8 @@ from .native import (
     method_code,
     raise_for,
     shaped,
+    thread_count,
+    why_stopped,
 )
 
 _api = _core.hc_f2py_friction
@@ -36,7 +39,7 @@ Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
-_FIELDS = (  # in the order of fortran/f2py_friction.f90
+_FIELDS = (  # in the order of fortran/python/f2py_friction.f90
     "pressure",
     "traction_x",
     "traction_y",
@@ -84,13 +87,16 @@ class ContactState:
     dissipated_energy : float
         Energy that friction took so far [J].
     residual_normal, residual_tangential, residual_force, residual_shear_force, residual_torque : float
-        Residuals of the contact conditions and of the prescribed loads.
+        Residuals of the contact conditions and of the prescribed loads. That of the friction conditions is
+        of the slip of the whole step: if the step was halved, it may be above the tolerance.
     converged : bool
-        All residuals are within the tolerance.
+        All residuals are within the tolerance, in each part of a step that was halved.
     sliding : bool
         The tangential loads are more than full sliding carries.
     touches_rim : bool
-        There is contact at the rim of the window.
+        There is contact at the rim of the window, at the end of the step or of a part of it.
+    stopped : str
+        Why the solver stopped, in words; empty if it converged.
     sweeps, cuts : int
         Active sets that were tried; times that the step was halved.
     operator_applications : float
@@ -127,6 +133,7 @@ class ContactState:
     sweeps: int = 0
     cuts: int = 0
     operator_applications: float = 0.0
+    stopped: str = ""
 
 
 class FrictionalContact:
@@ -169,8 +176,7 @@ class FrictionalContact:
         kind = "a number of at least 0, or inf"
         if not number(friction_coefficient, "friction_coefficient", kind) >= 0:
             raise DeckError(f"friction_coefficient = {friction_coefficient!r}: expected {kind}")
-        if coupling not in ("full", "goodman"):
-            raise DeckError(f"coupling = {coupling!r}: expected 'full' or 'goodman'")
+        word(coupling, "coupling", ("full", "goodman"))
         # nodes that can never touch may have any gap, also none at all
         self._mask = mask
         self._gap = shaped(initial_gap, lattice, "initial_gap")
@@ -186,7 +192,7 @@ class FrictionalContact:
             mask.ravel().astype(np.int32),
             min(friction_coefficient, np.finfo(float).max),
             int(coupling == "goodman"),
-            threads,
+            thread_count(threads),
         )
         raise_for(code, message)
         weakref.finalize(self, _api_free, self._handle)
@@ -236,19 +242,19 @@ class FrictionalContact:
         Returns
         -------
         ContactState
-            Look at ``converged`` (if not, the residuals are those of the attempt that failed) and at
-            ``touches_rim`` (contact at the rim of the window, where the advance ends: go on from the
-            old state on a larger one).
+            Look at ``converged`` (if not, the residuals are those of the attempt that failed, and ``stopped``
+            says why) and at ``touches_rim`` (contact at the rim of the window, where the advance ends, be it
+            in a part of the step, and is not converged: go on from the old state on a larger one).
         """
-        if not isinstance(control, list | tuple) or len(control) != 4 or not set(control) <= _CONTROLS.keys():
+        known = isinstance(control, list | tuple) and len(control) == 4
+        if not known or not all(isinstance(kind, str) and kind in _CONTROLS for kind in control):
             raise DeckError(f"control = {control!r}: expected four of 'force' and 'displacement'")
         targets = reals(value, "value")
         if targets.shape != (4,) or not np.isfinite(targets).all():
             raise DeckError(f"value = {value!r}: expected four finite numbers")
         if control[0] == "force" and targets[0] < 0:
             raise DeckError(f"normal_load = {targets[0]:g}: expected a number not below zero")
-        if entry not in ("implicit", "interpolated"):
-            raise DeckError(f"entry = {entry!r}: expected 'implicit' or 'interpolated'")
+        word(entry, "entry", ("implicit", "interpolated"))
         checked_tolerance(tolerance)
         fields = np.empty((self.lattice.size, len(_FIELDS)), order="F")
         for column, name in enumerate(_FIELDS):
@@ -258,7 +264,7 @@ class FrictionalContact:
                 self.lattice,
                 name,
             )
-        numbers = [getattr(state, name) for name in _NUMBERS]
+        numbers = [number(getattr(state, name), name) for name in _NUMBERS]
         out: Any = _api.advance_friction(
             self._handle,
             [_CONTROLS[word] for word in control],
@@ -266,8 +272,8 @@ class FrictionalContact:
             int(static),
             int(entry == "interpolated"),
             tolerance,
-            max_sweeps,
-            max_cuts,
+            integer(max_sweeps, "max_sweeps"),
+            integer(max_cuts, "max_cuts"),
             fields,
             numbers,
         )
@@ -288,6 +294,7 @@ class FrictionalContact:
             converged=bool(flags[0]),
             sliding=bool(flags[1]),
             touches_rim=bool(flags[2]),
+            stopped=why_stopped(flags[3]),
             sweeps=sweeps,
             cuts=cuts,
             operator_applications=work,
@@ -334,7 +341,16 @@ def _api_free(handle: int) -> None:
     _core.hc_f2py_api.free_handle(handle)
 
 
-def memory_needed(method: Method, n_row: int, n_col: int, threads: int = 1) -> int:
+def memory_needed(
+    method: Method,
+    n_row: int,
+    n_col: int,
+    *,
+    contact: int | None = None,
+    loads: int = 4,
+    coupled: bool = True,
+    threads: int = 1,
+) -> int:
     """Return the bytes that a problem with friction takes on a window of the given size.
 
     Parameters
@@ -343,7 +359,16 @@ def memory_needed(method: Method, n_row: int, n_col: int, threads: int = 1) -> i
         ``"direct"`` or ``"fft"``.
     n_row, n_col
         Rows and columns of the window.
+    contact
+        Nodes in contact; default: all.
+    loads
+        How many loads are prescribed, 1 to 4; the other motions are.
+    coupled
+        Whether pressure and shear move each other.
     threads
         Threads that will be used.
     """
-    return int(_api.friction_memory_needed(method_code(method), [n_col, n_row], threads))
+    extent = [integer(n_col, "n_col"), integer(n_row, "n_row")]
+    nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
+    count = thread_count(threads)
+    return int(_api.friction_memory_needed(method_code(method), extent, nodes, loads, coupled, count))

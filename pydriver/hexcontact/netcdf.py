@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import mesh
-from .errors import DeckError, HexcontactError
+from .errors import LACKING, DeckError, HexcontactError, ResourceError
+from .files import require_ordinary, require_utf8
 from .result import Layout, Metadata, Result, Step
-from .result_check import fault_of_dimensions, fault_of_result
+from .result_check import fault_of_dimensions, fault_of_fields, fault_of_result
+from .seal import check_seal, is_sealed, seal
 from .variables import SCHEMA_VERSION, VARIABLES
 
 if TYPE_CHECKING:
@@ -84,7 +86,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
 
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Create a file; in the end close it and flush it to disk."""
+    """Create a file; in the end close it, add its checksum and flush it to disk."""
     import netCDF4
 
     try:
@@ -97,6 +99,7 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
                 file.close()
     except RuntimeError as error:  # the HDF5 library hides the reason, a full disk mostly
         raise OSError(None, str(error), str(path)) from error
+    seal(path)
     flush(path)
 
 
@@ -111,6 +114,8 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
     column = file.createVariable(name, variable.dtype, variable.dims, **options)
+    if options:
+        column.set_var_chunk_cache(size=0)  # chunks are written once; HDF5 kept 64 MB of each variable
     column.setncatts(layout.attributes_of(name))
     if variable.dims[-2:] == ("row", "col") and name not in ("x", "y"):
         column.coordinates = "x y"
@@ -149,13 +154,16 @@ def flush(path: Path) -> None:
 @contextlib.contextmanager
 def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
     """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
+    require_utf8(path, kind)
     try:
         yield
-    except (HexcontactError, FileNotFoundError):
+    except (HexcontactError, FileNotFoundError, MemoryError):
         raise
     except PermissionError as error:
         raise DeckError(f"{path} cannot be read: {error.strerror}") from error
     except Exception as error:  # damage takes any form: every library below has its own exceptions
+        if isinstance(error, OSError) and error.errno in LACKING:
+            raise ResourceError(f"{path} cannot be read: {error.strerror}") from error
         raise DeckError(
             f"{path} is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
         ) from error
@@ -172,12 +180,26 @@ def _check_ours(attributes: dict[str, Any], path: Path) -> None:
         )
 
 
+def is_ours(path: Path) -> bool:
+    """Tell whether a file is a result, of whatever version, or was one before it was damaged."""
+    import netCDF4
+
+    if is_sealed(path):
+        return True
+    with contextlib.suppress(OSError, RuntimeError), _alone(), netCDF4.Dataset(path) as file:
+        return {"schema_version", "hexcontact_version"} <= set(file.ncattrs())
+    return False
+
+
 def _attributes(file: netCDF4.Dataset) -> dict[str, Any]:
     return {name: file.getncattr(name) for name in file.ncattrs()}
 
 
 def read_output(path: Path) -> Result:
     """Open an output file; its fields are read when they are asked for.
+
+    All bytes are checked first. In a file without a checksum, of an earlier version or rewritten by another
+    program, the fields are read once to see that they can be values of a solution.
 
     Raises
     ------
@@ -188,6 +210,9 @@ def read_output(path: Path) -> Result:
     """
     import netCDF4
 
+    require_ordinary(path, "a netCDF file")
+    with reading(path):
+        sealed = check_seal(path)
     with reading(path), _alone(), netCDF4.Dataset(path) as file:
         attributes = _attributes(file)
         _check_ours(attributes, path)
@@ -204,9 +229,9 @@ def read_output(path: Path) -> Result:
         dataset = xarray.open_dataset(path, engine="netcdf4", drop_variables=mesh.VARIABLES)
         result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
-            if variable.ndim < 2:
+            if variable.ndim < 3:
                 variable.load()
-        if fault := fault_of_result(result.dataset):
+        if fault := fault_of_result(result.dataset) or ("" if sealed else fault_of_fields(result.dataset)):
             result.close()
             raise DeckError(f"{path} is damaged: {fault}")
         _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from .errors import ConvergenceError
 from .load_history import LEAST
 from .messages import listed
-from .progress import RESIDUALS, quantity
+from .progress import RESIDUALS
+from .text import quantity
 
 if TYPE_CHECKING:
-    from .case import Case
     from .lattice import Lattice
     from .load_history import LoadStep
     from .native import NormalSolution
     from .native_friction import ContactState
+    from .problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ class Worst(NamedTuple):
 
 
 def error(
-    case: Case,
+    case: Problem,
     lattice: Lattice,
     solution: NormalSolution | ContactState,
     target: LoadStep,
@@ -57,7 +58,7 @@ def error(
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The case.
     lattice : Lattice
         The window.
@@ -76,6 +77,7 @@ def error(
         "iterations": solution.sweeps,
         "halvings": getattr(solution, "cuts", 0),
         "tolerance": case.solver.tolerance,
+        "stopped": solution.stopped,
         "residuals": residuals,
         "worst": worst._asdict(),
     }
@@ -94,13 +96,15 @@ def error(
     elif worst.what and worst.value > case.solver.tolerance:
         times = worst.value / case.solver.tolerance
         lines.append(f"worst is {worst.residual}, {_number(times)} times its bound: {worst.what}")
+    if solution.stopped:
+        lines.append(f"the last attempt ended since {solution.stopped}")
     if target.ramp is not None:
         lines.append(f"it is {LEAST:.1%} of its segment, the least of adaptive steps")
     lines.append(f"to try: {'; or '.join(_advice(case, worst, doubtful, target.ramp is not None))}")
     return ConvergenceError("\n".join(lines), details)
 
 
-def _residuals(case: Case, solution: NormalSolution | ContactState, target: LoadStep) -> dict[str, float]:
+def _residuals(case: Problem, solution: NormalSolution | ContactState, target: LoadStep) -> dict[str, float]:
     """Return the residuals that have to be small, by the symbol of the theory."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     wanted = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
@@ -120,7 +124,7 @@ def _tried(solution: NormalSolution | ContactState) -> list[str]:
 
 
 def _sliding(
-    case: Case, solution: NormalSolution | ContactState, target: LoadStep, values: tuple[float, ...]
+    case: Problem, solution: NormalSolution | ContactState, target: LoadStep, values: tuple[float, ...]
 ) -> tuple[bool, str]:
     """Return whether the load may be more than friction can carry; if it is, a sentence about that."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
@@ -136,7 +140,7 @@ def _sliding(
     return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}"
 
 
-def _advice(case: Case, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:
+def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:
     """Return what may help, the likeliest first."""
     mu, advice = case.friction_coefficient, []
     if case.frictional and math.isinf(mu) and worst.residual in ("R_n", "R_t"):
@@ -161,7 +165,7 @@ def _advice(case: Case, worst: Worst, doubtful: bool, adaptive: bool) -> list[st
 
 
 def _worst(
-    case: Case,
+    case: Problem,
     lattice: Lattice,
     solution: NormalSolution | ContactState,
     residuals: dict[str, float],
@@ -204,7 +208,7 @@ def _instead(name: str, carried: float, wanted: float, unit: str) -> str:
     )
 
 
-def _self_compliances(case: Case, lattice: Lattice) -> tuple[float, float]:
+def _self_compliances(case: Problem, lattice: Lattice) -> tuple[float, float]:
     """Return d_n and d_t (m/Pa): the displacement of a node under its own pyramid of unit traction."""
     from .influence import pyramid_kernels
 
@@ -213,7 +217,7 @@ def _self_compliances(case: Case, lattice: Lattice) -> tuple[float, float]:
     return normal, normal + pair.lambda_5 * float(kernels.Kxx) * spacing
 
 
-def _normal(case: Case, lattice: Lattice, solution: NormalSolution | ContactState) -> Array:
+def _normal(case: Problem, lattice: Lattice, solution: NormalSolution | ContactState) -> Array:
     """Return |p - max(0, p - g/d_n)|/p_max at the nodes."""
     gap, known = solution.gap, np.isfinite(solution.gap)
     pressure, (compliance, _) = solution.pressure, _self_compliances(case, lattice)
@@ -221,7 +225,7 @@ def _normal(case: Case, lattice: Lattice, solution: NormalSolution | ContactStat
     return np.where(known, abs(pressure - aim), 0.0) / pressure.max()
 
 
-def _normal_fault(case: Case, solution: NormalSolution | ContactState, row: int, col: int) -> str:
+def _normal_fault(case: Problem, solution: NormalSolution | ContactState, row: int, col: int) -> str:
     pressure, gap = float(solution.pressure[row, col]), float(solution.gap[row, col])
     if pressure < 0:
         return f"there is a tension of {quantity(-pressure, 'Pa')}"
@@ -230,7 +234,7 @@ def _normal_fault(case: Case, solution: NormalSolution | ContactState, row: int,
     return f"there is a pressure of {quantity(pressure, 'Pa')} across a gap of {quantity(gap, 'm')}"
 
 
-def _tangential(case: Case, lattice: Lattice, solution: Any) -> Array:
+def _tangential(case: Problem, lattice: Lattice, solution: Any) -> Array:
     """Return |q - P(q - ds/d_t)|/tau at the nodes, P the projection on the cone."""
     mu, (_, compliance) = case.friction_coefficient, _self_compliances(case, lattice)
     pressure = np.maximum(solution.pressure, 0.0)
@@ -249,7 +253,7 @@ def _tangential(case: Case, lattice: Lattice, solution: Any) -> Array:
     return np.where(solution.pressure > 0, missed, 0.0) / (scale or 1.0)
 
 
-def _tangential_fault(case: Case, solution: Any, row: int, col: int) -> str:
+def _tangential_fault(case: Problem, solution: Any, row: int, col: int) -> str:
     traction = math.hypot(solution.traction_x[row, col], solution.traction_y[row, col])
     slip = math.hypot(solution.slip_increment_x[row, col], solution.slip_increment_y[row, col])
     if math.isinf(case.friction_coefficient):

@@ -79,7 +79,7 @@ def refuse_unknown(what: str, has_file: bool) -> None:
 
 def general_picture(what: str, picture: Path) -> Path:
     """Draw one of the pictures that belong to no result."""
-    from .plotting_influence import FIGURES
+    from .plotting.influence import FIGURES
 
     return _save(FIGURES[what], what, picture)
 

@@ -8,34 +8,10 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from typing import IO, TYPE_CHECKING, Any
 
+from .text import percent, quantity, visible
+
 if TYPE_CHECKING:
-    from .result import Step
-
-PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-
-
-def quantity(value: float, unit: str = "", digits: int = 4) -> str:
-    """Write a number as an engineer would: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``.
-
-    Parameters
-    ----------
-    value : float
-        The number, in SI.
-    unit : str
-        A unit that takes a prefix; without one, or where no prefix fits, the number is written plainly.
-    digits : int
-        Significant digits.
-    """
-    if math.isnan(value):
-        return "-"
-    if value == 0 or math.isinf(value):
-        return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
-    rounded = float(f"{value:.{digits - 1}e}")
-    power = 3 * math.floor(math.log10(abs(rounded)) / 3)
-    if not unit or power not in PREFIXES:
-        return f"{rounded:.{digits}g} {unit}".rstrip()
-    scaled = f"{rounded / 10.0**power:#.{digits}g}".rstrip(".")
-    return f"{scaled} {PREFIXES[power]}{unit}"
+    from .step import Step
 
 
 class Reporter:
@@ -127,7 +103,7 @@ class Lines(Reporter):
 
     def _print(self, line: str) -> None:
         with contextlib.suppress(OSError):  # nobody listens any more; the run goes on
-            print(line, file=self.stream, flush=True)
+            print(visible(line), file=self.stream, flush=True)
 
 
 class Bar(Reporter):
@@ -150,9 +126,10 @@ class Bar(Reporter):
 
         self._counted = steps > 0  # else by the share of the load history
         count = MofNCompleteColumn() if self._counted else TextColumn("{task.percentage:.0f} %")
-        columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), count]
+        columns = [SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(), count]
         self._bar = Progress(*columns, TimeElapsedColumn())
-        self._title, self._task = title, self._bar.add_task(title, total=steps or 1.0)
+        self._title = visible(title)
+        self._task = self._bar.add_task(self._title, total=steps or 1.0)
         self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
         with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
             yield
@@ -163,11 +140,11 @@ class Bar(Reporter):
 
     def says(self, words: str) -> None:
         """Show it until the next step."""
-        self._latest.plain = f"  {words}"
+        self._latest.plain = f"  {visible(words)}"
 
     def finished(self, step: Step) -> None:
         """Move the bar on by one step."""
-        self._latest.plain = "  " + describe(step.history, short=True)
+        self._latest.plain = "  " + visible(describe(step.history, short=True))
         self._bar.update(self._task, completed=step.number if self._counted else step.done)
 
 
@@ -247,11 +224,6 @@ def error_of(name: str, history: Mapping[str, Any]) -> str:
     return f" ± {percent(error / value)}" if value > least and error > 0.0 else ""
 
 
-def percent(share: float) -> str:
-    """Write a share with two digits, as "0.051 %"."""
-    return f"{100.0 * share:.2g} %" if math.isfinite(share) else "-"
-
-
 def stick_share(history: Mapping[str, Any]) -> str:
     """Write how much of the contact area sticks."""
     area = fitted("contact_area", history)
@@ -262,6 +234,12 @@ def step_error_share(history: Mapping[str, Any]) -> float | None:
     """Return the bound on the error of the stick area by load steps, as a share of the contact area."""
     error, area = float(history.get("stick_area_step_error", math.nan)), fitted("contact_area", history)
     return None if math.isnan(error) or not area else error / area
+
+
+def halved(history: Mapping[str, Any]) -> str:
+    """Say how often a step was halved until the solver converged; empty if it was not."""
+    cuts = int(history.get("cuts", 0))
+    return f"halved {cuts} time{'s' * (cuts > 1)}" if cuts else ""
 
 
 def residuals(history: Mapping[str, Any]) -> dict[str, float]:
@@ -289,6 +267,7 @@ def describe(history: Mapping[str, Any], short: bool = False) -> str:
         if not short:
             parts.append(f"radius {quantity(fitted('contact_radius', history), 'm')}")
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
+    parts.append(halved(history))
     if not short:
         parts.append(quantity(history["seconds"], "s", 3))
     return "  ".join(part for part in parts if part)

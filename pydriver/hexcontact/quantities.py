@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from .display import html_table, text_table
 from .messages import did_you_mean
+from .text import html_table, text_table
 from .variables import VARIABLES, Variable
 
 _HEADERS = ("quantity", "unit", "given", "meaning")

@@ -21,12 +21,13 @@ import numpy as np
 from . import accuracy, log
 from .accuracy import LEAST_LEVELS, RATIO, SHIFTS, Solution
 from .errors import ResourceError, StopRun
-from .progress import Reporter, quantity
+from .progress import Reporter
 from .result import Metadata, Result, Step, assemble
+from .text import quantity
 from .variables import ESTIMATED
 
 if TYPE_CHECKING:
-    from .case import Case
+    from .problem import Problem
 
 History = Mapping[str, Any]
 
@@ -46,7 +47,7 @@ class Trial:
     level: int
     copy: int = 0
 
-    def case(self, case: Case) -> Case:
+    def case(self, case: Problem) -> Problem:
         """Return the case on this lattice."""
         spacing = case.lattice.spacing / RATIO**self.level
         origin = np.array(case.lattice.origin)
@@ -73,14 +74,14 @@ class Solver(ABC):
     in_memory: ClassVar[bool] = False
 
     @abstractmethod
-    def solve(self, trial: Trial, case: Case) -> Solution:
+    def solve(self, trial: Trial, case: Problem) -> Solution:
         """Solve the load history on a lattice.
 
         Parameters
         ----------
         trial : Trial
             The lattice.
-        case : Case
+        case : Problem
             The case on it.
         """
 
@@ -151,12 +152,12 @@ class Outcome:
         return dataclasses.replace(step, history={**step.history, **errors})
 
 
-def refine(case: Case, solver: Solver, shown: Reporter) -> Outcome:
+def refine(case: Problem, solver: Solver, shown: Reporter) -> Outcome:
     """Solve a case on finer and finer lattices, until its accuracy is reached or a limit is.
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The case, with an accuracy to reach.
     solver : Solver
         Solves it.
@@ -196,7 +197,7 @@ def refine(case: Case, solver: Solver, shown: Reporter) -> Outcome:
             return Outcome(solutions, errors, relative, target, limit)
 
 
-def _solved(trial: Trial, case: Case, solver: Solver, shown: Reporter) -> Solution:
+def _solved(trial: Trial, case: Problem, solver: Solver, shown: Reporter) -> Solution:
     lattice = case.lattice
     log.logger.info(log.words("lattice", name=trial.name, spacing=lattice.spacing, nodes=lattice.size))
     shown.lattice(
@@ -213,7 +214,7 @@ def _words(name: str) -> str:
     return name.removesuffix("_fit").replace("_", " ")
 
 
-def limit_of(case: Case, last: Solution, in_memory: bool) -> str:
+def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
     """Return what keeps the lattice from being refined after a solution; empty if nothing does."""
     from .window import require_memory
 
@@ -234,7 +235,7 @@ def limit_of(case: Case, last: Solution, in_memory: bool) -> str:
     return ""
 
 
-def least_and_most(case: Case) -> tuple[list[Case], list[Case]]:
+def least_and_most(case: Problem) -> tuple[list[Problem], list[Problem]]:
     """Return a case on all lattices of the shortest refinement, and of the longest that max_nodes allows.
 
     The last one is the finest.
@@ -267,7 +268,7 @@ class InMemory(Solver):
         self._shown, self._on_step = shown, on_step
         self.steps: list[Step] = []
 
-    def solve(self, trial: Trial, case: Case) -> Solution:
+    def solve(self, trial: Trial, case: Problem) -> Solution:
         """Solve the load history on a lattice."""
         from .solve import steps, stops
 
@@ -285,7 +286,7 @@ class InMemory(Solver):
         return solution_of(trial, case, heads)
 
 
-def solution_of(trial: Trial, case: Case, heads: Sequence[Step]) -> Solution:
+def solution_of(trial: Trial, case: Problem, heads: Sequence[Step]) -> Solution:
     """Return what the load steps on a lattice came to."""
     lattice = case.lattice
     nodes = max(step.lattice.size for step in heads)
@@ -293,7 +294,7 @@ def solution_of(trial: Trial, case: Case, heads: Sequence[Step]) -> Solution:
     return Solution(trial.level, trial.copy, lattice.spacing, lattice.origin, nodes, histories)
 
 
-def in_memory(case: Case, shown: Reporter, on_step: Callable[[Step], object] | None) -> Result:
+def in_memory(case: Problem, shown: Reporter, on_step: Callable[[Step], object] | None) -> Result:
     """Solve a case until its accuracy is reached or a limit is, and return the result; errors as `refine`."""
     from .solve import metadata_of
 

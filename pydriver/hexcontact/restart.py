@@ -14,20 +14,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import __version__
+from ._version import __version__
 from .errors import DeckError, HexcontactError
 from .netcdf import read_output
 from .progress import Reporter, reporter
+from .record import PHYSICS, physics
 from .result import Metadata, Result, Step, now
 from .solve import checked, metadata_of, record
 from .store import Store, journal_of, open_result
 from .trial_folder import TrialFolder
 
 if TYPE_CHECKING:
-    from .case import Case
+    from .problem import Problem
 
-_PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that decide what is solved
-_NOT_PHYSICS = ("title", "solver", "output")  # tables of a deck that do not
 _SAME = 1e-9  # relative difference of initial gaps that are the same
 
 
@@ -37,7 +36,7 @@ class Restart:
 
     Attributes
     ----------
-    case : Case
+    case : Problem
         What is solved.
     store : Store
         Where its steps are, and go.
@@ -47,7 +46,7 @@ class Restart:
         Why the result may not be to the bit that of an uninterrupted run; may be empty.
     """
 
-    case: Case
+    case: Problem
     store: Store
     before: list[Step]
     warning: str = ""
@@ -56,7 +55,7 @@ class Restart:
 def resume(
     path: str | os.PathLike[str],
     *,
-    case: Case | None = None,
+    case: Problem | None = None,
     overrides: Mapping[str, Any] | None = None,
     on_step: Callable[[Step], object] | None = None,
     progress: Reporter | bool | None = None,
@@ -69,7 +68,7 @@ def resume(
     ----------
     path : path
         The output of the run; the steps that are finished are in the journal beside it.
-    case : Case, optional
+    case : Problem, optional
         The problem. Only needed if the deck does not say all of it, as with a gap given in Python.
     overrides : mapping, optional
         New values for keys of the solver, as ``{"solver.tolerance": 1e-7}``, for the steps to come.
@@ -107,7 +106,7 @@ def resume(
 
 @contextlib.contextmanager
 def reopened(
-    path: str | os.PathLike[str], case: Case | None = None, overrides: Mapping[str, Any] | None = None
+    path: str | os.PathLike[str], case: Problem | None = None, overrides: Mapping[str, Any] | None = None
 ) -> Iterator[Restart | None]:
     """Open a run to go on with it, and close it in the end; arguments and errors as `resume`.
 
@@ -162,20 +161,20 @@ def _found(path: Path) -> tuple[Store | None, Step | None]:
     raise DeckError(f"there is neither a file {path} nor a journal {journal_of(path)} of a run")
 
 
-def _case(metadata: Metadata, case: Case | None, overrides: Mapping[str, Any], path: Path) -> Case:
+def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any], path: Path) -> Problem:
     """Make the case again that the run solves."""
-    from .case import Case
+    from .problem import Problem
 
     for key in overrides:
         table, _, name = key.partition(".")
-        if table != "solver" or name.partition(".")[0] in ("", *_PHYSICS):
+        if table != "solver" or name.partition(".")[0] in ("", *PHYSICS):
             raise DeckError(
                 f"{key}: a run that goes on may only change how it is solved, such as solver.tolerance"
             )
     if case is not None:
         if overrides:
             raise DeckError("expected a case or overrides, not both")
-        if not metadata.deck or _physics(metadata.deck) != _physics(case.deck_text):
+        if not metadata.deck or physics(metadata.deck) != physics(case.deck_text):
             raise DeckError(f"the case is not the one that {path} is the result of: their decks differ")
         return case
     if not metadata.deck:
@@ -185,7 +184,7 @@ def _case(metadata: Metadata, case: Case | None, overrides: Mapping[str, Any], p
             f"the gap of {path} was given in Python; go on there: hexcontact.resume({str(path)!r}, case=case)"
         )
     try:
-        again = Case.from_text(metadata.deck, metadata.deck_file or f"deck of {path}", overrides)
+        again = Problem.from_text(metadata.deck, metadata.deck_file or f"deck of {path}", overrides)
     except HexcontactError as error:
         if metadata.version != __version__:
             error.add_note(f"the run was started by hexcontact {metadata.version}, this is {__version__}")
@@ -199,14 +198,7 @@ def _from_python(deck: str) -> bool:
     return body.get("1", {}).get("surface", {}).get("shape") == "python"
 
 
-def _physics(deck: str) -> dict[str, Any]:
-    """Return what a deck says about the problem, not about how it is solved and what is kept."""
-    tables = tomllib.loads(deck)
-    solver = {key: value for key, value in tables.get("solver", {}).items() if key in _PHYSICS}
-    return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
-
-
-def _check(case: Case, store: Store, last: Step | None) -> None:
+def _check(case: Problem, store: Store, last: Step | None) -> None:
     """See to it that the case is the one of the steps, though files that its deck names may have changed."""
     found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
     planned = store.metadata.planned_steps
@@ -218,7 +210,7 @@ def _check(case: Case, store: Store, last: Step | None) -> None:
         check_step(case, last, found)
 
 
-def check_step(case: Case, last: Step, found: str) -> None:
+def check_step(case: Problem, last: Step, found: str) -> None:
     """See to it that lattice and surfaces of a case are those of a finished step; `found` names it."""
     if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
         raise DeckError(f"the deck now leads to another lattice than that of the {found}")
@@ -230,7 +222,7 @@ def check_step(case: Case, last: Step, found: str) -> None:
         raise DeckError(f"the surfaces are no longer those of the {found}")
 
 
-def _continued(store: Store, case: Case) -> Metadata:
+def _continued(store: Store, case: Problem) -> Metadata:
     """Return what the result says from now on: as before, and that it went on."""
     old, new = store.metadata, metadata_of(case)
     changed = [

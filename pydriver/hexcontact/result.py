@@ -42,7 +42,7 @@ def now() -> str:
 
 
 def _version() -> str:
-    from . import __version__
+    from ._version import __version__
 
     return __version__
 
@@ -188,7 +188,7 @@ class Layout:
 
     def attributes(self, complete: bool) -> dict[str, Any]:
         """Global attributes; `complete` says whether all planned steps are there."""
-        from . import __version__
+        from ._version import __version__
 
         window = self.window
         return {
@@ -474,7 +474,8 @@ class Result(ResultTools):
 
     def __repr__(self) -> str:
         """Say in a few lines what is there."""
-        from .display import result_header, result_rows, text_table
+        from .display import result_header, result_rows
+        from .text import text_table
 
         fields = [name for name in FIELDS if name in self.dataset]
         table = text_table(("", ""), result_rows(self))

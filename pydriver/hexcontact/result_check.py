@@ -8,19 +8,24 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable, Mapping
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .variables import FIELDS, LARGEST, VARIABLES
+from .variables import FIELDS, LARGEST, NOT_KEPT, VARIABLES
 
 if TYPE_CHECKING:
     import xarray
 
     from .result import Metadata, Step
 
-_CLOSE = 1e-6  # spacings by which a node may be away from where it belongs
+_CLOSE = 1e-6  # spacings by which a node may be away from where it belongs; relative difference of sums
+_ROUNDED = 1 + 1e-5  # of tolerances in the story of a run
+_CHANGED = re.compile(r"(?<!step_)tolerance = (\S+) instead of ([^\s,]+)")
 
 # what a run has always written, and with friction besides
 _HISTORY = (
@@ -40,6 +45,11 @@ _FRICTIONAL_HISTORY = (
     *("tangential_load_x", "tangential_load_y", "torque", "shift_x", "shift_y", "twist", "cuts"),
     *("stick_area", "stick_radius", "stick_center_x", "stick_center_y", "max_traction", "dissipated_energy"),
     *("elastic_energy", "residual_tangential", "residual_shear_force", "residual_torque"),
+)
+
+_NOT_NEGATIVE = (
+    *("normal_load", "contact_area", "contact_radius", "stick_area", "stick_radius", "max_pressure"),
+    *("max_traction", "operator_applications", "seconds"),
 )
 
 
@@ -74,6 +84,7 @@ _PARAMETERS: dict[str, Callable[[Any], bool]] = {  # that describe the case: all
     "coupling": _one_of("full", "goodman"),
     "tolerance": _is_positive,
 }
+MATERIALS = tuple(name for name in _PARAMETERS if name != "tolerance")  # and laws
 _ATTRIBUTES: dict[str, Callable[[Any], bool]] = {
     "title": _is_text,
     "deck": _is_text,
@@ -158,11 +169,74 @@ def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
 
 def _fault_of_histories(dataset: xarray.Dataset) -> str:
     """Tell of numbers that no load step has."""
-    for name, known in VARIABLES.items():
-        if known.dims == ("step",) and known.dtype == "f8" and name in dataset.variables:
-            values = dataset[name].values
-            if (abs(values) > LARGEST).any() or (name in _HISTORY and np.isnan(values).any()):
-                return f"{name} holds numbers that no load step has"
+    for name in _HISTORY:
+        if name in dataset.variables and name != "label" and np.isnan(dataset[name].values).any():
+            return f"{name} holds numbers that no load step has"
+    known = {str(name) for name in dataset.data_vars if dataset[name].dims == ("step",)} & VARIABLES.keys()
+    history = {name: dataset[name].values for name in known if VARIABLES[name].dtype != "str"}
+    return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]))
+
+
+def _fault_of_numbers(history: Mapping[str, Any], parameters: Mapping[Any, Any], story: str) -> str:
+    """Tell of values by step that no step has; a run that was resumed may have had several tolerances."""
+    tolerances = [parameters.get("tolerance", 1.0), *map(float, chain(*_CHANGED.findall(story)))]
+    cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
+    for name, values in history.items():
+        low, high = -LARGEST, LARGEST
+        if VARIABLES[name].dtype != "f8":
+            low, high = NOT_KEPT, max(VARIABLES[name].flags, default=LARGEST)
+        elif name in _NOT_NEGATIVE:
+            low = 0.0
+        elif name.startswith("residual_"):
+            low, high = 0.0, max(tolerances) * _ROUNDED
+            if name == "residual_tangential":  # parts of a step are solved from one to the next
+                values = np.where(cut, np.minimum(values, high), values)
+        if (np.less(values, low) | np.greater(values, high)).any():
+            return f"{name} holds numbers that no load step has"
+    return ""
+
+
+def fault_of_fields(dataset: xarray.Dataset) -> str:
+    """Return what is wrong with the fields of a result; empty if nothing is. Reads them, step by step."""
+    numbers, every = dataset["step"].values, int(dataset.attrs["output_every"])
+    for place, number in enumerate(numbers):
+        step = dataset.isel(step=place)
+        fields = {str(name): v.values for name, v in step.data_vars.items() if v.dims == ("row", "col")}
+        history = {str(name): v.item() for name, v in step.data_vars.items() if not v.dims}
+        kept = number % every == 0 or number == numbers[-1]
+        if fault := _fault_of_values(fields, history, float(dataset.attrs["lattice_spacing"]), kept):
+            return f"{fault} in step {number}"
+    return ""
+
+
+def _fault_of_values(
+    fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], spacing: float, kept: bool = True
+) -> str:
+    """Tell of values at nodes that no load step has, or that do not fit to its history."""
+    zone, pressure = fields.get("zone"), fields.get("pressure")
+    contact = zone > 0 if zone is not None else pressure > 0 if pressure is not None else None
+    for name, values in fields.items():
+        known = VARIABLES[name]
+        if not kept and known.is_field:
+            wrong = ~np.isnan(values) if known.dtype == "f8" else values != NOT_KEPT
+        elif name == "zone":
+            wrong = (values < 0) | (values > max(known.flags))
+        else:
+            wrong = ~(abs(values) < LARGEST)
+            if known.padding != 0:  # there may be no value out of contact
+                wrong &= contact is not None and contact
+            if name in ("pressure", "accumulated_slip"):
+                wrong |= values < 0
+        if wrong.any():
+            return f"{name} holds numbers that no node has"
+    if pressure is not None and kept and "max_pressure" in history:
+        peak = pressure.max()
+        if not math.isclose(peak, history["max_pressure"], rel_tol=_CLOSE):
+            return "pressure does not fit to max_pressure"
+    if zone is not None and kept and "contact_area" in history:
+        cells = history["contact_area"] / (spacing**2 * math.sqrt(0.75))
+        if abs(np.count_nonzero(zone > 0) - cells) > _CLOSE * (1 + cells):
+            return "zone does not fit to contact_area"
     return ""
 
 
@@ -191,7 +265,15 @@ def fault_of_record(metadata: Metadata, step: Step) -> str:
             return f"its {name} is not what it should be"
     if given and (missing := _PARAMETERS.keys() - given):
         return f"it has no {min(missing)}"
-    return _fault_of_step(step)
+    return _fault_of_step(step) or _fault_of_values_of(metadata, step)
+
+
+def _fault_of_values_of(metadata: Metadata, step: Step) -> str:
+    """Tell of numbers that are none of a load step."""
+    history = {name: value for name, value in step.history.items() if not isinstance(value, str)}
+    return _fault_of_numbers(history, metadata.parameters, metadata.story) or _fault_of_values(
+        step.fields, history, step.lattice.spacing
+    )
 
 
 def _fault_of_step(step: Step) -> str:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
 
-    from .comparison import Comparison
+    from .analytic.compare import Comparison
     from .quantities import Quantities
     from .result import Result
 
@@ -213,6 +213,8 @@ class ResultTools:
         IndexError
             If there is no such step.
         """
-        from .comparison import compare
+        from .analytic.compare import compare
 
-        return compare(self._result, exact, step, name)
+        for quantity in exact if isinstance(exact, Mapping) else ():
+            self._result[str(quantity)]  # else KeyError
+        return compare(self._result.dataset, self._result.step(step), exact, name)

@@ -13,15 +13,18 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from . import json_output, log, solve, summary
-from .cli_guard import complain
+from .cli_guard import complain, say
 from .cli_options import LogLevel, setting
 from .errors import AccuracyWarning, DeckError
 from .interruption import Interrupted, in_background
 from .progress import reporter
+from .remarks import remarks
 from .store import open_result
+from .text import rich_table, visible
 
 if TYPE_CHECKING:
     from .case import Case
+    from .problem import Problem
     from .result import Result, Step
     from .store import Store
 
@@ -35,7 +38,7 @@ def case_of(deck: Path, settings: list[str] | None) -> Case:
     return Case.from_toml(deck, overrides=dict(map(setting, settings or ())))
 
 
-def target_of(case: Case, deck: Path, output: Path | None = None) -> Path:
+def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:
     """Return the file that a run writes: what the user, else the deck, else the deck's name says."""
     target = output or case.output.file or Path(f"{deck.stem}.nc")
     if target.suffix in _PICTURES:
@@ -99,7 +102,7 @@ class Listeners:
 
     def tell(
         self,
-        case: Case,
+        case: Problem,
         histories: list[Any],
         target: Path,
         picture: Path | None,
@@ -113,7 +116,11 @@ class Listeners:
         if shortfall:
             complain(shortfall)
         if self.as_json:
-            told = [*warnings, *([shortfall] if shortfall else [])]
+            told = [
+                *warnings,
+                *remarks(histories, solve.parameters_of(case)),
+                *([shortfall] * bool(shortfall)),
+            ]
             written: dict[str, Any] = {"output": target, "picture": picture, "warnings": told}
             written["exit_code"] = AccuracyWarning.exit_code if shortfall else 0
             return written | json_output.of_run(case, case.title, histories)
@@ -125,14 +132,24 @@ class Listeners:
 
 
 def solved(
-    case: Case,
+    case: Problem,
     store: Store,
     heard: tuple[int, int],
     name: str,
     listeners: Listeners,
     before: Sequence[Step] = (),
 ) -> list[Any]:
-    """Solve a case into a store and return the histories of all its steps; signals end the process."""
+    """Solve a case into a store and return the histories of all its steps.
+
+    Signals end the process, unless the last step is finished: then the output is completed.
+    """
+
+    def ends(signaled: Interrupted) -> bool:
+        if store.has_all_steps:
+            return False
+        store.close(f"interrupted ({signaled.name})")
+        return not store.finished
+
     shown, histories = reporter(listeners.silent), [step.history for step in before]
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
@@ -140,9 +157,9 @@ def solved(
             in_background(
                 lambda: solve.record(case, store, shown, lambda step: histories.append(step.history), before),
                 heard,
+                ends,
             )
     except Interrupted as signaled:
-        store.close(f"interrupted ({signaled.name})")
         listeners.leave(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories
 
@@ -155,7 +172,7 @@ def overview(path: Path) -> Path:
 
 
 def summarize(
-    case: Case, histories: list[Any], target: Path, picture: Path | None, refined: Result | None = None
+    case: Problem, histories: list[Any], target: Path, picture: Path | None, refined: Result | None = None
 ) -> None:
     """Print what came out: history, last step, how it compares with Hertz; lattices and errors."""
     console, last = summary.console(), histories[-1]
@@ -164,12 +181,12 @@ def summarize(
     console.print(summary.pairs(f"Last load step of {case.title!r}" if case.title else "Last load step",
                                 summary.step_rows(last)))  # fmt: skip
     if rows := summary.hertz_rows(case, last):
-        console.print(summary.table("Against Hertz", summary.HERTZ_HEADERS, rows))
+        console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if refined is not None:
-        console.print(summary.table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
-    if remark := summary.limited_steps(histories, case.solver.step_tolerance):
+        console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
+    for remark in remarks(histories, solve.parameters_of(case)):
         console.print(f"note: {remark}", soft_wrap=True)
-    console.print(f"written: {target}" + (f", {picture}" if picture else ""), soft_wrap=True)
+    console.print(visible(f"written: {target}" + (f", {picture}" if picture else "")), soft_wrap=True)
 
 
 def was_finished(file: Path, picture: Path | None, listeners: Listeners) -> dict[str, Any] | None:
@@ -177,9 +194,10 @@ def was_finished(file: Path, picture: Path | None, listeners: Listeners) -> dict
     if listeners.as_json:
         result = open_result(file)
         histories, case = json_output.histories_of(result), summary.case_of(result)
-        written: dict[str, Any] = {"output": file, "picture": picture, "warnings": []}
+        told = remarks(histories, result.dataset.attrs)
+        written: dict[str, Any] = {"output": file, "picture": picture, "warnings": told}
         return written | json_output.of_run(case, result.case_title, histories)
     if not listeners.quiet:
         drawn = f"; written: {picture}" if picture else ""
-        print(f"{file} is finished, all its load steps are there{drawn}")
+        say(f"{file} is finished, all its load steps are there{drawn}")
     return None

@@ -26,7 +26,7 @@ from .validation import problems_of
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
 
-    from .case import Case
+    from .problem import Problem
     from .store import Store
 
 _AT_REST = ("tangential_load_x", "tangential_load_y", "twist")  # what is zero where nothing is said
@@ -48,7 +48,7 @@ class Session:
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The problem; its loads choose the size of the first window, which grows with the contact.
     output : path, optional
         netCDF file to write. Without it all steps stay in memory.
@@ -57,7 +57,7 @@ class Session:
 
     Attributes
     ----------
-    case : Case
+    case : Problem
         The problem.
 
     Raises
@@ -85,7 +85,7 @@ class Session:
     'half of the stick area is gone at 20 N'
     """
 
-    def __init__(self, case: Case, output: str | Path | None = None, overwrite: bool = False) -> None:
+    def __init__(self, case: Problem, output: str | Path | None = None, overwrite: bool = False) -> None:
         self.case = case
         self._about = solve.metadata_of(case)
         self._steps: list[Step] = []  # with an output all but the last without their fields

@@ -12,26 +12,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import log, nonconvergence
-from .errors import AccuracyWarning, HexcontactError, StopRun
+from .errors import AccuracyWarning, HexcontactError, PathWarning, StopRun
 from .load_series import LOADS
 from .progress import Reporter, reporter
+from .remarks import unasked_path
 from .result import Metadata, Result, Step, assemble
+from .text import visible
 from .window import kind_of
 
 if TYPE_CHECKING:
     from .adaptive_steps import AdaptivePath
-    from .case import Case
     from .lattice import Lattice
     from .load_history import LoadStep
+    from .problem import Problem
     from .store import Store
 
 
-def metadata_of(case: Case) -> Metadata:
+def metadata_of(case: Problem) -> Metadata:
     """Return what the result of `case` says about where it comes from."""
     return Metadata(
         title=case.title,
         deck=case.deck_text,
-        deck_file=str(case.deck_file or ""),
+        deck_file=visible(str(case.deck_file or "")),
         fields=tuple(case.output.fields),
         every=case.output.every,
         planned_steps=case.planned_steps,
@@ -39,7 +41,7 @@ def metadata_of(case: Case) -> Metadata:
     )
 
 
-def parameters_of(case: Case) -> dict[str, Any]:
+def parameters_of(case: Problem) -> dict[str, Any]:
     """Return what describes a case and how it is solved, and the machine that does it."""
     return {
         "effective_modulus": case.pair.effective_modulus,
@@ -65,7 +67,7 @@ def _machine() -> str:
 
 
 def run(
-    case: Case,
+    case: Problem,
     output: str | Path | None = None,
     overwrite: bool = False,
     on_step: Callable[[Step], object] | None = None,
@@ -75,7 +77,7 @@ def run(
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The checked problem.
     output : path, optional
         netCDF file to write; each step is on the disk before the next begins. Without it the
@@ -99,6 +101,8 @@ def run(
     -----
     AccuracyWarning
         If the lattice could not be refined until the accuracy of the case was reached.
+    PathWarning
+        If a static load step, or one that begins without contact, had to be solved in parts.
 
     Raises
     ------
@@ -146,7 +150,7 @@ def checked(result: Result) -> Result:
 
 
 def record(
-    case: Case,
+    case: Problem,
     store: Store,
     shown: Reporter,
     on_step: Callable[[Step], object] | None = None,
@@ -156,7 +160,7 @@ def record(
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The checked problem.
     store : Store
         Where the steps go.
@@ -218,7 +222,7 @@ def stops(on_step: Callable[[Step], object] | None, step: Step, more: bool = Fal
 
 
 def steps(
-    case: Case,
+    case: Problem,
     kept_in_memory: bool = False,
     before: Sequence[Step] = (),
     targets: Iterable[LoadStep] | None = None,
@@ -227,7 +231,7 @@ def steps(
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The checked problem.
     kept_in_memory : bool
         The caller keeps all steps, so there has to be memory for them.
@@ -257,13 +261,14 @@ def steps(
     started = time.perf_counter()
     done = len(before)
     for step in _solved(case, lattice, kept_in_memory, before, targets):
+        case.check_contact(step.number, step.lattice, step.fields["zone"] > 0)
         yield step
         done = step.number
     log.logger.info(log.words("finished", steps=done, seconds=time.perf_counter() - started))
 
 
 def _solved(
-    case: Case,
+    case: Problem,
     lattice: Lattice,
     kept_in_memory: bool,
     before: Sequence[Step],
@@ -286,6 +291,7 @@ def _solved(
             segment, begun = target.segment, reached_by_now
         if adaptive and target.ramp is not None:
             for step, reached in adaptive.steps(state, target, begun):
+                _warn_of_path(case, step, state)
                 yield step
                 state, reached_by_now = reached, _standing(step.history)
             window = adaptive.window
@@ -303,11 +309,22 @@ def _solved(
         step = window.step(target, reached, state, started)
         if adaptive:
             adaptive.window, step = window, adaptive.given(step)
+        _warn_of_path(case, step, state)
         yield step
         state, reached_by_now = reached, _standing(step.history)
 
 
-def _adaptive(case: Case, window: Any, before: Sequence[Step]) -> AdaptivePath | None:
+def _warn_of_path(case: Problem, step: Step, before: Any) -> None:
+    """Warn of a load step that was halved where nothing prescribes the path of its parts."""
+    static = case.solver.algorithm == "static"
+    if step.history.get("cuts") and (static or before is None or not (before.pressure > 0).any()):
+        in_parts = float(step.history["residual_tangential"]) > case.solver.tolerance
+        words = unasked_path([step.number], in_parts)
+        log.logger.warning(log.words("halved", step=step.number, warning=words))
+        warnings.warn(words, PathWarning, stacklevel=2)
+
+
+def _adaptive(case: Problem, window: Any, before: Sequence[Step]) -> AdaptivePath | None:
     """Return what chooses load steps, if there are some to choose."""
     if not case.adaptive:
         return None

@@ -168,8 +168,8 @@ class Step:
         return f"Step {self.number}: {about}"
 
     def _repr_html_(self) -> str:
-        from .display import html_table
         from .summary import step_rows
+        from .text import html_table
 
         return html_table(f"Load step {self.number}", ("", ""), step_rows(self.history))
 

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from .analytic.hertz_gap import SIMILAR, QuadraticGap
 from .pressure_field import PressureField, linear
 from .result import Result
+from .text import visible
 from .variables import LARGEST, NOT_KEPT
 
 if TYPE_CHECKING:
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 STICK = 1  # value of zone at a sticking node
-SIMILAR = 1e-9  # |beta| up to which shear and pressure do not feel each other
 _PREFIX = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
@@ -51,6 +52,11 @@ def worded(value: float, unit: str) -> str:
     """Write a quantity with four digits and a prefix: "747.6 µm", "1 kN"."""
     factor, scaled_unit = scaled(value, unit)
     return f"{value * factor:.4g} {scaled_unit}"
+
+
+def title_of(dataset: xarray.Dataset) -> str:
+    """Return the title of a result for pictures, in which no dollar begins a formula."""
+    return visible(str(dataset.attrs.get("title", ""))).replace("$", r"\$")
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,7 @@ class StepView:
             center = (float((pressure * x).sum() / weight), float((pressure * y).sum() / weight))
         else:
             center = gap.center
-        named = [str(dataset.attrs.get("title", ""))]
+        named = [title_of(dataset)]
         if dataset.sizes["step"] > 1:
             named.append(f"step {int(one['step'])}")
         title = ", ".join(filter(None, named)) + f" ({_loads(one)})"
@@ -246,53 +252,3 @@ def as_list(results: Results) -> list[Result | xarray.Dataset]:
 def dataset_of(result: Result | xarray.Dataset) -> xarray.Dataset:
     """Return the dataset of a result, or the dataset itself."""
     return cast("xarray.Dataset", getattr(result, "dataset", result))
-
-
-@dataclass(frozen=True)
-class QuadraticGap:
-    """An initial gap that is a quadratic form: sphere, cylinder, paraboloid.
-
-    Attributes
-    ----------
-    modulus : float
-        E*, Pa.
-    hessian : ndarray, shape (2, 2)
-        Its second derivatives, 1/m.
-    center : tuple of float
-        Where it is smallest, m.
-    """
-
-    modulus: float
-    hessian: Array
-    center: tuple[float, float]
-
-    @classmethod
-    def of(cls, dataset: xarray.Dataset) -> QuadraticGap | None:
-        """Look at the gap of a result; None if it is of another kind, or the contact is along a line."""
-        modulus = dataset.attrs.get("effective_modulus")
-        if modulus is None or "initial_gap" not in dataset:
-            return None
-        gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
-        if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
-            return None
-        size = max(np.ptp(x), np.ptp(y))
-        u, v = (x - x.mean()) / size, (y - y.mean()) / size
-        forms = np.stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2], axis=1)
-        coefficients = np.linalg.lstsq(forms, gap, rcond=None)[0]
-        if np.abs(forms @ coefficients - gap).max() > 1e-9 * np.ptp(gap):
-            return None
-        hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
-        from .analytic import hertz_ellipse
-
-        try:
-            hertz_ellipse(float(modulus), hessian, normal_load=1.0)
-        except ValueError:  # a line contact
-            return None
-        lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
-        return cls(float(modulus), hessian, (float(x.mean() + lowest[0]), float(y.mean() + lowest[1])))
-
-    def contact(self, load: float) -> EllipticContact:
-        """Return Hertz's solution under a load (N) above 0."""
-        from .analytic import hertz_ellipse
-
-        return hertz_ellipse(self.modulus, self.hessian, normal_load=load)

@@ -13,7 +13,6 @@ import contextlib
 import dataclasses
 import errno
 import os
-import re
 import shlex
 import shutil
 import threading
@@ -22,89 +21,19 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from .errors import DeckError, HexcontactError, ResourceError
+from .errors import LACKING, DeckError, HexcontactError, ResourceError
+from .files import require_utf8
+from .journal import STOPPED, names_a_run
+from .journal import Journal as Journal
+from .journal import journal_of as journal_of
 from .lock import Lock
-from .netcdf import flush, read_output, reading, write
-from .record import SUFFIX, read_record, write_record
-from .result import Layout, Metadata, Result, Step, assemble
+from .netcdf import flush, is_ours, read_output, reading, write
+from .record import SUFFIX, write_record
+from .result import Layout, Metadata, Result, Step
 from .trial_folder import TrialFolder
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
-_RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
-_STOPPED = "stopped.txt"  # in the journal: why the run ended before its time
-_LACKING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, None}
-
-
-def journal_of(path: Path) -> Path:
-    """Folder of the journal that belongs to the output `path`."""
-    return path.with_name(path.name + ".d")
-
-
-class Journal:
-    """The finished steps of a run, read from the disk one at a time.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder; one that is not there is an empty journal.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        names = sorted(os.listdir(folder)) if folder.is_dir() else []
-        self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
-
-    def __len__(self) -> int:
-        """Return the number of finished steps."""
-        return len(self.records)
-
-    def __iter__(self) -> Iterator[Step]:
-        """Read the steps; DeckError if one is missing between others or damaged."""
-        for number, record in enumerate(self.records, start=1):
-            if int(record.stem) != number:
-                raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
-            step = read_record(record)[1]
-            if step.number != number:
-                raise DeckError(f"{record} is damaged: it holds step {step.number}")
-            yield step
-
-    @property
-    def metadata(self) -> Metadata:
-        """Where the steps come from, as the last of them tells."""
-        return read_record(self.records[-1])[0]
-
-    @property
-    def stopped(self) -> str:
-        """Why the run ended before its time; empty if it goes on, was killed or has finished."""
-        with contextlib.suppress(FileNotFoundError):
-            return (self.folder / _STOPPED).read_text(encoding="utf-8", errors="replace")
-        return ""
-
-    @property
-    def complete(self) -> bool:
-        """Whether all planned steps are there."""
-        metadata, last = read_record(self.records[-1])
-        return len(self) == metadata.planned_steps or last.done == 1.0
-
-    def result(self, path: Path) -> Result:
-        """All finished steps as a result in memory; `path` is what the user calls it."""
-        with reading(self.folder, "a journal"):
-            dataset = assemble(self.metadata, self, self.complete)
-        if self.stopped:
-            dataset.attrs["stopped"] = self.stopped
-        return Result(dataset, str(path))
-
-    def remove(self) -> None:
-        """Delete the records, why they are not all, and what an interrupted write left; the lock stays."""
-        for path in self.records:
-            path.unlink(missing_ok=True)
-        TrialFolder(self.folder).remove()
-        self.tidy()
-
-    def tidy(self) -> None:
-        """Delete why the steps are not all, and what an interrupted write left."""
-        for path in (self.folder / _STOPPED, *self.folder.glob("*.tmp")):
-            path.unlink(missing_ok=True)
+_LACKING = {*LACKING, None}
 
 
 def open_result(path: str | os.PathLike[str]) -> Result:
@@ -156,12 +85,6 @@ def _continues(journal: Journal, output: Result) -> bool:
 def same_run(journal: Journal, output: Result) -> bool:
     """Whether `output` and the steps of `journal` come from one run."""
     return journal.metadata.run == output.dataset.attrs.get("run")
-
-
-def _may_be_a_result(path: Path) -> bool:
-    """Tell whether a file that is to be replaced is empty or begins like netCDF."""
-    with path.open("rb") as file:
-        return file.read(4) in (b"", b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
 
 
 class Store:
@@ -236,11 +159,13 @@ class Store:
 
     def _at(self, path: str | os.PathLike[str]) -> None:
         """Take up a place where an output can be written."""
+        require_utf8(path, "a netCDF file")
         self.path = Path(os.path.realpath(path))
         self.folder = journal_of(self.path)
         self.heads: list[Step] = []
         self._mutex = threading.RLock()  # close() may come from another thread than append()
         self._closed = False
+        self.finished = False  # whether the output is complete and in its place
         self._published = (0, time.monotonic())
         self.interim = True  # whether a long run also writes outputs on the way
         if self.path.is_dir():
@@ -315,17 +240,17 @@ class Store:
         while True:
             self.folder.mkdir(exist_ok=True)
             flush(self.path.parent)
+            left = names_a_run(self.folder / "lock")
+            if not left and (foreign := Journal(self.folder).foreign()):
+                raise DeckError(
+                    f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
+                    f"{self.folder} away or choose another output"
+                )
             with contextlib.suppress(FileNotFoundError):  # a run that just ended took the folder away
                 return Lock(self.folder / "lock", self.path)
 
     def _take_over(self, overwrite: bool) -> None:
         """Deal with what is there: an output, or what an unfinished run left."""
-        if self.path.exists() and not overwrite:
-            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
-        if self.path.exists() and not _may_be_a_result(self.path):
-            raise DeckError(
-                f"{self.path} is not a netCDF file, so it is not overwritten; choose another output"
-            )
         left, trials = Journal(self.folder), TrialFolder(self.folder)
         if (left or trials) and not overwrite:
             count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
@@ -333,6 +258,13 @@ class Store:
                 f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
                 f"hexcontact resume {shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in "
                 "Python) starts anew"
+            )
+        if self.path.exists() and not overwrite:
+            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
+        if self.path.exists() and self.path.stat().st_size and not is_ours(self.path):
+            raise DeckError(
+                f"{self.path} is not a result of hexcontact that can be read, so it is not overwritten; "
+                "delete it or choose another output"
             )
         with self.writing("the journal"):
             if left:  # they become the old output, which is only replaced by a complete new one
@@ -355,6 +287,13 @@ class Store:
         self.close((str(error) or "interrupted") if known else "")
         if isinstance(error, HexcontactError) and self.kept:
             error.add_note(self.kept)
+
+    @property
+    def has_all_steps(self) -> bool:
+        """Whether only the output is to be made of the steps."""
+        return bool(self.heads) and (
+            len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
+        )
 
     @property
     def kept(self) -> str:
@@ -439,8 +378,11 @@ class Store:
             If it cannot be written; the journal is kept.
         """
         with self._mutex:
+            if self._closed:  # by a signal, while the last step was on its way
+                raise ValueError("the store is closed")
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
             self._publish(complete=True)
+            self.finished = True
             Journal(self.folder).remove()
             self.close()
 
@@ -465,8 +407,11 @@ class Store:
         """
         layout = Layout(metadata, [step.head for step in steps], trials)
         with self._mutex:
+            if self._closed:
+                raise ValueError("the store is closed")
             with self.writing("the output"):
                 self._replace(self.path, lambda path: write(path, layout, steps, complete=True))
+            self.finished = True
             Journal(self.folder).remove()
             self.close()
 
@@ -484,7 +429,7 @@ class Store:
             self._closed = True
             if reason and (self.heads or TrialFolder(self.folder)):
                 with contextlib.suppress(OSError):
-                    (self.folder / _STOPPED).write_text(reason, encoding="utf-8")
+                    (self.folder / STOPPED).write_text(reason, encoding="utf-8")
             self._lock.release()
             with contextlib.suppress(OSError):  # unless there are records in it
                 self.folder.rmdir()

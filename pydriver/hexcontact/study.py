@@ -312,7 +312,8 @@ class Study:
         DeckError, ResourceError
             If it cannot be written.
         """
-        from . import __version__, study_collect
+        from . import study_collect
+        from ._version import __version__
 
         self.folder.enter(self.plan)
         attributes = {

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import DeckError, ResourceError
+from .files import require_ordinary
 from .netcdf import flush, reading
+from .seal import check_seal
 from .study_plan import Axis, Plan
 from .study_store import StudyFolder
 from .variables import CONVENTIONS, VARIABLES
@@ -26,6 +28,8 @@ def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
     """Read the history of a finished case: numbers by step, by the name of the quantity."""
     import netCDF4
 
+    with reading(path):
+        check_seal(path)
     with reading(path), netCDF4.Dataset(path) as file:
         file.set_auto_mask(False)
         return {
@@ -130,6 +134,7 @@ def is_study(path: Path) -> bool:
     """Tell whether a file is the result of a study."""
     import netCDF4
 
+    require_ordinary(path, "the result of a study")
     try:
         with netCDF4.Dataset(path) as file:
             return "study_version" in file.ncattrs()

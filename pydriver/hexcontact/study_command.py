@@ -7,12 +7,16 @@ import os
 import shlex
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from .progress import quantity
+from .cli_guard import complain, say
+from .errors import DeckError
+from .interruption import Interrupted, in_background
 from .study import Outcome, PlannedCase, Study, StudyWatcher
+from .study_deck import batch_text
+from .text import quantity, visible
 
 if TYPE_CHECKING:
     from .run_command import Listeners
@@ -44,7 +48,7 @@ class StudyLines(StudyWatcher):
 
     def _print(self, line: str) -> None:
         with contextlib.suppress(OSError):  # nobody listens any more; the study goes on
-            print(line, file=self.stream, flush=True)
+            print(visible(line), file=self.stream, flush=True)
 
 
 class StudyBar(StudyWatcher):
@@ -62,14 +66,16 @@ class StudyBar(StudyWatcher):
         self.study = study
         columns = [TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
         self._bar = Progress(*columns, TimeElapsedColumn(), TextColumn("left:"), Remaining())
-        self._task = self._bar.add_task(study.title, total=len(study), completed=len(study) - missing)
+        done = len(study) - missing
+        self._task = self._bar.add_task(visible(study.title), total=len(study), completed=done)
         self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
         with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
             yield
 
     def finished(self, case: PlannedCase, outcome: Outcome) -> None:
         """Move the bar on by a case."""
-        self._latest.plain = f"  case {self.study.folder.number(case)} ({case}): {_ending(outcome)}"
+        latest = f"  case {self.study.folder.number(case)} ({case}): {_ending(outcome)}"
+        self._latest.plain = visible(latest)
         self._bar.update(self._task, advance=1)
 
 
@@ -96,22 +102,19 @@ def report(study: Study, quiet: bool) -> int:
     done = sum(study.folder.done(case) for case in study.cases)
     failures = study.failures()
     if not quiet:
-        print(
-            f"written: {study.output}, {done} of {len(study)} cases (their files in {study.folder.folder}/)"
-        )
+        say(f"written: {study.output}, {done} of {len(study)} cases (their files in {study.folder.folder}/)")
     if done == len(study):
         return 0
     for case, outcome in failures[:_MOST_TOLD]:
         words = outcome.message.splitlines()[0]
-        print(f"hexcontact: case {study.folder.number(case)} ({case}) failed: {words}", file=sys.stderr)
+        complain(f"case {study.folder.number(case)} ({case}) failed: {words}")
     if len(failures) > _MOST_TOLD:
-        words = f"... and {len(failures) - _MOST_TOLD} more; all are in {study.output}"
-        print(f"hexcontact: {words}", file=sys.stderr)
+        complain(f"... and {len(failures) - _MOST_TOLD} more; all are in {study.output}")
     missing = len(study) - done - len(failures)
     if missing:
-        print(f"hexcontact: {missing} of {len(study)} cases have not been run", file=sys.stderr)
+        complain(f"{missing} of {len(study)} cases have not been run")
     if any(outcome.lasting for _, outcome in failures):
-        print("hexcontact: --retry runs cases again that failed by themselves", file=sys.stderr)
+        complain("--retry runs cases again that failed by themselves")
     return FAILED
 
 
@@ -124,27 +127,31 @@ def interrupted(study: Study) -> str:
     )
 
 
-def run_case(study: Study, number: int, retry: bool, listeners: Listeners) -> Outcome:
-    """Run one case for a job array; signals end the process, and what is finished stays."""
-    from .interruption import Interrupted, in_background, news
+def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard: tuple[int, int]) -> Outcome:
+    """Run one case for a job array; signals end the process unless it is done, and what is finished stays."""
     from .progress import reporter
 
     outcomes: list[Outcome] = []
     shown = reporter(listeners.silent)
-    with news() as heard:
-        try:
-            in_background(lambda: outcomes.append(study.run_case(number, retry, shown)), heard)
-        except Interrupted as signaled:
-            listeners.leave(
-                signaled,
-                f"the finished load steps of case {number} are kept; the same command goes on after them",
-            )
+    try:
+        in_background(
+            lambda: outcomes.append(study.run_case(number, retry, shown)),
+            heard,
+            lambda _: not outcomes,
+        )
+    except Interrupted as signaled:
+        listeners.leave(
+            signaled,
+            f"the finished load steps of case {number} are kept; the same command goes on after them",
+        )
     return outcomes[0]
 
 
-def run_in_background(study: Study, cancel: threading.Event, options: dict[str, Any]) -> Any:
-    """Return what to do in a second thread, and the event that is set when it is over."""
-    over = threading.Event()
+def run_in_background(
+    study: Study, cancel: threading.Event, options: dict[str, Any]
+) -> tuple[Callable[[], None], Callable[[Interrupted], bool]]:
+    """Return what to do in a second thread, and what cancels it, unless the study is complete by then."""
+    over, complete = threading.Event(), threading.Event()
     if (where := study.cluster(options.get("jobs"), options.get("dask"))) is not None:
         from .study_dask import load
 
@@ -152,11 +159,17 @@ def run_in_background(study: Study, cancel: threading.Event, options: dict[str, 
 
     def work() -> None:
         try:
-            study.run(cancel=cancel, **options)
+            if study.run(cancel=cancel, **options) is not None:
+                complete.set()
         finally:
             over.set()
 
-    return work, over
+    def ends(_: Interrupted) -> bool:
+        cancel.set()
+        over.wait()
+        return not complete.is_set()
+
+    return work, ends
 
 
 def slurm_script(study: Study, path: Path, retry: bool) -> str:
@@ -174,20 +187,26 @@ def slurm_script(study: Study, path: Path, retry: bool) -> str:
     numbers = sorted(study.folder.number(case) for case in study.missing(retry))
     if not numbers:
         return ""
-    options = {"job-name": study.output.stem, "output": f"{study.folder.folder}/slurm-%A_%a.log"}
-    options["signal"] = (
-        "B:USR1@60"  # a minute before a time limit, to the command that takes the shell's place
-    )
-    options |= {str(key).replace("_", "-"): value for key, value in study.file.slurm.items()}
-    words = [
-        *("hexcontact", "study", str(path.resolve()), "--output", os.path.abspath(study.output)),
-        *(("--retry",) if retry else ()),
-    ]
+    files = [str(path.resolve()), os.path.abspath(study.output)]
+    for name in files:
+        if batch_text(name) is None:
+            raise DeckError(f'{name}: a script needs a name on one line, without " and \\')
+    options: dict[str, Any] = {
+        "job-name": study.output.stem,
+        "output": str(study.folder.folder).replace("%", "%%") + "/slurm-%A_%a.log",
+        "signal": "B:USR1@60",  # a minute before a time limit, to the command that takes the shell's place
+    }
+    options |= {key.replace("_", "-"): value for key, value in study.file.slurm.items()}
+    words = ["hexcontact", "study", files[0], "--output", files[1], *(["--retry"] if retry else [])]
     lines = [
         "#!/bin/sh",
-        f"# {study.title}: {len(numbers)} of {len(study)} cases. Afterwards: {shlex.join(words)} --collect",
+        f"# {len(numbers)} of {len(study)} cases. Afterwards: {shlex.join(words)} --collect",
         f"#SBATCH --array={_ranges(numbers)}",
-        *(f"#SBATCH --{key}={value}" for key, value in options.items()),
+        *(
+            f"#SBATCH --{key}" + ("" if value is True else f"={batch_text(str(value))}")
+            for key, value in options.items()
+            if value is not False
+        ),
         "export OMP_NUM_THREADS=${SLURM_CPUS_PER_TASK:-1}",
         f"exec {shlex.join(words)} --case $SLURM_ARRAY_TASK_ID",
     ]

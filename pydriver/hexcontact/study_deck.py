@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import datetime
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from .validation import Kind, Several, Table, Text, Whole, Word, refuse
+from .validation import Kind, Several, Table, Text, Whole, Word, refuse, refuse_key
 
 MOST_CASES = 100_000
 
@@ -22,6 +24,18 @@ class Anything(Kind):
 
     def _parse(self, value: object) -> object:
         return value
+
+
+@dataclass(frozen=True)
+class VariableName(Text):
+    """A name that a netCDF file can have for a variable."""
+
+    def _expected(self) -> str:
+        return "a name of letters, digits and _"
+
+    def _parse(self, value: object) -> str:
+        name = super()._parse(value)
+        return name if re.fullmatch(r"\w(?:[\w .+-]*[\w.+-])?", name) else refuse(f"expected {self.expected}")
 
 
 @dataclass(frozen=True)
@@ -39,12 +53,40 @@ class Settings(Kind):
         return dict(value)
 
 
+_BATCH_OPTION = re.compile(r"[a-z][a-z0-9_-]*")
+
+
+def batch_text(value: str) -> str | None:
+    """Return text as it stands in a line of options of sbatch, quoted where needed; None if it cannot."""
+    if not value or not value.isprintable() or '"' in value or "\\" in value:
+        return None
+    return f'"{value}"' if re.search(r"[\s'#]", value) else value
+
+
+@dataclass(frozen=True)
+class BatchOptions(Settings):
+    """Options of sbatch, which become lines of a script."""
+
+    def _parse(self, value: object) -> dict[str, Any]:
+        options = super()._parse(value)
+        for key, entry in options.items():
+            if not _BATCH_OPTION.fullmatch(str(key)) or key == "array":
+                refuse_key(str(key), entry, "expected an option of sbatch other than array, such as time")
+            if isinstance(entry, str) and batch_text(entry) is None:
+                refuse_key(key, entry, 'expected text on one line, without " and \\')
+            if not isinstance(entry, str | int | float | datetime.time):
+                refuse_key(key, entry, "expected text, a number, or true or false")
+        return options
+
+
 class Parameter(Table):
     """An entry of [[parameter]]: a key of the deck and the values it takes."""
 
     key: Annotated[str, Text()] = Field(description="dotted key of the deck, such as load.1.normal_load")
-    name: Annotated[str, Text()] | None = Field(
-        None, description="what the result calls it; the key with _ for . if absent"
+    name: Annotated[str, VariableName()] | None = Field(
+        None,
+        description="what the result calls it; the key with _ for . if absent",
+        examples=['"load"'],
     )
     values: Annotated[tuple[Any, ...], Several(Anything(), "values", '["1 N", "2 N"]')] | None = Field(
         None, description="the values"
@@ -118,7 +160,7 @@ class StudyFile(Table):
     )
     parameter: list[Parameter] = Field(min_length=1)
     dask: Dask | None = None
-    slurm: Annotated[dict[str, Any], Settings('{ time = "1:00:00" }')] = Field(
+    slurm: Annotated[dict[str, Any], BatchOptions('{ time = "1:00:00" }')] = Field(
         default_factory=dict, description="options of sbatch for --slurm, such as time and cpus-per-task"
     )
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import operator
 import os
 import re
 import shutil
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import ConvergenceError, DeckError, ResourceError
+from .files import require_ordinary, text_of
 from .lock import Lock
 from .netcdf import flush
 from .study_plan import Plan, PlannedCase, hash_of
@@ -68,6 +70,7 @@ class StudyFolder:
     def __init__(self, output: Path) -> None:
         if output.suffix != ".nc":
             raise DeckError(f"output {output}: expected a netCDF file, such as {output.with_suffix('.nc')}")
+        require_ordinary(output, "a netCDF file")
         if not output.parent.is_dir():
             raise DeckError(f"cannot write {output}: the folder {output.parent} does not exist")
         self.output = output
@@ -86,10 +89,14 @@ class StudyFolder:
 
     def _read(self) -> None:
         path = self.folder / _INDEX
+        content = text_of(path, "the index of a study")
         try:
-            self._entries = json.loads(path.read_bytes())["cases"]
-            self.numbers = {name: int(entry["number"]) for name, entry in self._entries.items()}
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            self._entries = json.loads(content)["cases"]
+            self.numbers = {name: operator.index(entry["number"]) for name, entry in self._entries.items()}
+            numbers = sorted(self.numbers.values())
+            if len(set(numbers)) < len(numbers) or any(not 1 <= n <= 10**9 for n in numbers):
+                raise ValueError("its numbers are not those of cases")
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise DeckError(f"{path} is damaged ({error}); move the folder {self.folder} away") from None
 
     def lock(self) -> Lock:
@@ -138,7 +145,7 @@ class StudyFolder:
         import netCDF4
 
         path = self.path(case)
-        if not path.exists():
+        if not path.is_file():
             return False
         try:
             with netCDF4.Dataset(path) as file:
@@ -148,22 +155,27 @@ class StudyFolder:
 
     def failure(self, case: PlannedCase) -> Outcome | None:
         """Return the failure that is noted of a case."""
-        with contextlib.suppress(FileNotFoundError, ValueError, TypeError):
-            note = json.loads(self.path(case).with_suffix(".json").read_bytes())
-            note.pop("hexcontact_version", None)
+        return self._noted(case)[0]
+
+    def _noted(self, case: PlannedCase) -> tuple[Outcome | None, str]:
+        """Return the failure that is noted of a case, and the version that has written it."""
+        with contextlib.suppress(DeckError, ValueError, TypeError, AttributeError, RecursionError):
+            note = json.loads(text_of(self.path(case).with_suffix(".json"), "a note"))
+            version = str(note.pop("hexcontact_version", ""))
             outcome = Outcome(**note)
-            return outcome if outcome.hash == case.hash else None
-        return None
+            whole = type(outcome.exit_code), type(outcome.message), type(outcome.lasting)
+            if outcome.hash == case.hash and whole == (int, str, bool) and outcome.message.strip():
+                return outcome, version
+        return None, ""
 
     def _is_final(self, case: PlannedCase) -> bool:
         """Tell whether a case has failed for good: by itself, in this version of the program."""
-        from . import __version__
+        from ._version import __version__
 
-        failure = self.failure(case)
+        failure, version = self._noted(case)
         if failure is None or not failure.lasting or failure.exit_code not in _FINAL:
             return False
-        note = json.loads(self.path(case).with_suffix(".json").read_bytes())
-        return bool(note.get("hexcontact_version") == __version__)
+        return version == __version__
 
     def missing(self, cases: Iterable[PlannedCase], retry: bool = False) -> list[PlannedCase]:
         """Return the cases that are to be run; those that failed for good only to `retry`."""
@@ -174,7 +186,7 @@ class StudyFolder:
 
     def note(self, case: PlannedCase, outcome: Outcome) -> None:
         """Write down how a case has ended, and clear away what attempts have left."""
-        from . import __version__
+        from ._version import __version__
 
         path = self.path(case)
         if outcome.exit_code:

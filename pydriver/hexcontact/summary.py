@@ -9,28 +9,28 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .errors import HexcontactError
-from .messages import listed
 from .progress import (
     LOADS_AND_MOTIONS,
-    PREFIXES,
     error_of,
     fitted,
+    halved,
     is_frictional,
     load_or_motion,
-    percent,
-    quantity,
     residuals,
     step_error_share,
     stick_share,
     worth_showing,
 )
+from .text import PREFIXES, percent, quantity, rich_table
 from .variables import VARIABLES
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from .case import Body, Case
+    from .case import Case
+    from .case_settings import Body
+    from .problem import Problem
     from .result import Result
     from .surfaces import Surface
 
@@ -38,7 +38,6 @@ History = Mapping[str, Any]
 Row = tuple[str, ...]
 
 _MOST_ROWS = 24  # steps shown of a long history
-_MOST_NAMED = 8  # load steps named in a remark
 _FURTHER = {  # shown of a load step besides loads and motions
     "max_pressure": "Pa",
     "max_traction": "Pa",
@@ -57,33 +56,15 @@ def console() -> Console:
     return Console(highlight=False, markup=False, emoji=False, width=width)
 
 
-def table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: bool = False) -> Table:
-    """Return a table of numbers; names and labels are text, which may wrap on a narrow terminal."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    shown = Table(
-        title=Text(title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, show_header=any(headers),
-        pad_edge=False, collapse_padding=tight,
-    )  # fmt: skip
-    for header in headers:
-        text = header in ("", "label")
-        shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
-    for row in rows:
-        shown.add_row(*map(Text, row))
-    return shown
-
-
 def pairs(title: str, rows: Iterable[Row]) -> Table:
     """Return a table of names and what belongs to them."""
-    return table(title, ("", ""), rows)
+    return rich_table(title, ("", ""), rows)
 
 
 # --- before the run -------------------------------------------------------------------------------
 
 
-def case_rows(case: Case) -> list[Row]:
+def case_rows(case: Problem) -> list[Row]:
     """Return what would be run."""
     from .estimates import work
 
@@ -112,15 +93,15 @@ def case_rows(case: Case) -> list[Row]:
     ]  # fmt: skip
 
 
-def _memory(case: Case) -> str:
+def _memory(case: Problem) -> str:
     from .refinement import least_and_most
-    from .window import memory_needed
+    from .window import peak_memory
 
     last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
-    return " to ".join(quantity(memory_needed(one, one.lattice), "B", 3) for one in last)
+    return " to ".join(quantity(peak_memory(one, one.lattice), "B", 3) for one in last)
 
 
-def _accuracy(case: Case) -> str:
+def _accuracy(case: Problem) -> str:
     """Say what is to be reached, and between which lattices the refinement will end."""
     from .refinement import least_and_most
 
@@ -133,7 +114,7 @@ def _accuracy(case: Case) -> str:
     )
 
 
-def _friction(case: Case) -> str:
+def _friction(case: Problem) -> str:
     if not case.frictional:
         return "none"
     mu = case.friction_coefficient
@@ -144,7 +125,7 @@ def _friction(case: Case) -> str:
     return f"{law}, {case.solver.algorithm}{entry}{goodman}"
 
 
-def _history(case: Case) -> str:
+def _history(case: Problem) -> str:
     segments = case.load_steps[-1].segment + 1
     if case.adaptive:
         chosen = sum(step.ramp is not None for step in case.load_steps)
@@ -155,7 +136,7 @@ def _history(case: Case) -> str:
     return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "")
 
 
-def _largest(case: Case) -> str:
+def _largest(case: Problem) -> str:
     """Return the largest load along each direction, as far as the deck tells."""
     largest = {}
     for direction in ("z", "x", "y"):
@@ -210,24 +191,11 @@ def step_rows(history: History) -> list[Row]:
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
     if (error := step_error_share(history)) is not None:
-        halved = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
-        words = f"stick area within {100 * error:.1f} % of the contact area, {halved + 0.0:+.2f} % by halving"
+        change = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
+        words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"
         rows.append(("load steps", words))
     found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
     return [*rows, ("residuals", found), ("work", _work(history))]
-
-
-def limited_steps(histories: Sequence[History], tolerance: float) -> str:
-    """Say which adaptive load steps missed their tolerance; empty if none did."""
-    missed = [k for k, history in enumerate(histories, start=1) if history.get("step_limited") == 1]
-    if not missed:
-        return ""
-    named = listed([f"{k}" for k in missed[:_MOST_NAMED]] + ["..."] * (len(missed) > _MOST_NAMED), "and")
-    return (
-        f"{len(missed)} of {len(histories)} load steps change more by halving than solver.step_tolerance = "
-        f"{tolerance:g}, and smaller ones did not help: step{'s' * (len(missed) > 1)} {named}; their "
-        "stick_area_step_error holds"
-    )
 
 
 def _words(name: str) -> str:
@@ -245,10 +213,9 @@ def _stick(history: History) -> str:
 
 
 def _work(history: History) -> str:
-    cuts = history.get("cuts", 0)
-    halved = f"halved {cuts} time{'s' * (cuts > 1)}, " if cuts else ""
+    parts = f"{halved(history)}, " if halved(history) else ""
     return (
-        f"{history['sweeps']} iterations, {halved}{history['operator_applications']:.3g} operator "
+        f"{history['sweeps']} iterations, {parts}{history['operator_applications']:.3g} operator "
         f"applications, {quantity(history['seconds'], 's', 3)}"
     )
 
@@ -266,7 +233,7 @@ def history_table(histories: Sequence[History], console: Console) -> Table:
         for spare in ("", "time", "label", "residual"):
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
-            shown = table("History", ("step", *columns), rows, tight=True)
+            shown = rich_table("History", ("step", *columns), rows, tight=True)
             if console.measure(shown, options=console.options.update_width(1000)).maximum <= console.width:
                 return shown
     return shown
@@ -305,12 +272,12 @@ def _columns(histories: Sequence[History], told: _Told) -> dict[str, Callable[[H
 # --- against Hertz --------------------------------------------------------------------------------
 
 
-def against_hertz(case: Case, history: History) -> list[tuple[str, float, float, str]]:
+def against_hertz(case: Problem, history: History) -> list[tuple[str, float, float, str]]:
     """Compare a load step with Hertz's solution.
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The case.
     history : mapping
         History of one of its steps.
@@ -350,7 +317,7 @@ def against_hertz(case: Case, history: History) -> list[tuple[str, float, float,
     ]
 
 
-def hertz_rows(case: Case, history: History) -> list[Row]:
+def hertz_rows(case: Problem, history: History) -> list[Row]:
     """Return the rows of `against_hertz`: quantity, Hertz, computed, difference."""
     named = {
         "contact_radius_fit": "contact radius (to the edge)",

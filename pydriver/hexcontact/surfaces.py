@@ -265,7 +265,7 @@ SHAPES: dict[str, type[Surface]] = {
 
 _REFUSED = {
     "heights": "this version reads no height maps from files; "
-    "give the gap as an array in Python: hexcontact.Case(gap=..., lattice=...)",
+    "give the gap in Python, as an xarray.DataArray with coordinates x and y: hexcontact.Case(gap=...)",
     "python": "the gap of this case was given in Python and is not in the deck; run the script it came from",
 }
 

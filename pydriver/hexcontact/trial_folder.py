@@ -7,13 +7,15 @@ lattice at work, and of the finest finished one, are in journals of their own be
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import hashlib
 import json
 import os
-import shutil
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,9 +25,10 @@ from .netcdf import flush, reading
 from .result import Metadata, Result
 
 if TYPE_CHECKING:
-    from .store import Journal
+    from .journal import Journal
 
-VERSION = 1
+VERSION = 2  # 1 had no checksum
+_JOURNAL = re.compile(r"\d+_\d+\.nc\.d")
 FOLDER = "lattices"  # in the journal
 
 
@@ -61,10 +64,13 @@ class TrialFolder:
         path = self.ledger
         with reading(path, "a list of finished lattices"):
             about = json.loads(path.read_bytes())
-            if about["trials_version"] != VERSION:
+            if about["trials_version"] not in (1, VERSION):
                 raise DeckError(
                     f"{path} has the layout {about['trials_version']}; this version reads {VERSION}"
                 )
+            digest = about.pop("sha256", "")
+            if about["trials_version"] == VERSION and digest != _digest(about):
+                raise DeckError(f"{path} is damaged: its content is not what was written (SHA-256)")
             found = [
                 Solution(**{**solution, "origin": tuple(solution["origin"])})
                 for solution in about["solutions"]
@@ -79,26 +85,40 @@ class TrialFolder:
             "metadata": dataclasses.asdict(metadata),
             "solutions": [dataclasses.asdict(solution) for solution in solutions],
         }
-        temporary = self.folder / "trials.json.tmp"
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump(about, file, default=np.generic.item)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, self.ledger)
+        about = json.loads(json.dumps(about, default=np.generic.item))  # as it will be read
+        try:
+            with self._temporary.open("w", encoding="utf-8") as file:
+                json.dump({"sha256": _digest(about), **about}, file)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(self._temporary, self.ledger)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                self._temporary.unlink()
+            raise
         flush(self.folder)
 
     def drop(self, level: int, copy: int = 0) -> None:
         """Delete the load steps of a lattice."""
-        from .store import journal_of
+        from .journal import Journal, journal_of
 
-        shutil.rmtree(journal_of(self.path(level, copy)), ignore_errors=True)
+        _clear(Journal(journal_of(self.path(level, copy))))
 
     def _latest(self) -> tuple[int, Journal]:
         """Return the level of the finest finished lattice, else 0, and its load steps."""
-        from .store import Journal, journal_of
+        from .journal import Journal, journal_of
 
-        level = max((solution.level for solution in self.read()[1] if not solution.copy), default=0)
-        return level, Journal(journal_of(self.path(level)))
+        metadata, solutions = self.read()
+        level = max((solution.level for solution in solutions if not solution.copy), default=0)
+        journal = Journal(journal_of(self.path(level)))
+        if journal:
+            self.check(metadata, journal.metadata)
+        return level, journal
+
+    def check(self, metadata: Metadata, of_lattice: Metadata) -> None:
+        """See to it that the load steps of a lattice are of the run of the folder; else DeckError."""
+        if metadata.run != of_lattice.run:
+            raise DeckError(f"{self.folder} holds load steps of another run than {self.ledger}")
 
     @property
     def kept(self) -> str:
@@ -127,6 +147,51 @@ class TrialFolder:
         )
         return result
 
+    @property
+    def is_ours(self) -> bool:
+        """Whether a run has written the list of finished lattices."""
+        with contextlib.suppress(OSError):
+            return b'"trials_version": ' in self.ledger.read_bytes()[:200]
+        return False
+
+    def foreign(self) -> Iterator[Path]:
+        """Go through the files with names of a run's, in a folder with no list of finished lattices."""
+        yield from (path for path in (self.ledger, self._temporary) if path.exists())
+        for journal in self._journals():
+            if (found := journal.foreign()) is not None:
+                yield found
+
+    @property
+    def _temporary(self) -> Path:
+        return self.ledger.with_name(self.ledger.name + ".tmp")
+
+    def _journals(self) -> list[Journal]:
+        """Return the load steps of all lattices."""
+        from .journal import Journal
+
+        names = sorted(os.listdir(self.folder)) if self.folder.is_dir() else []
+        return [Journal(self.folder / name) for name in names if _JOURNAL.fullmatch(name)]
+
     def remove(self) -> None:
-        """Delete everything."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        """Delete what runs have written, and nothing else."""
+        for journal in self._journals():
+            _clear(journal)
+        for path in (self.ledger, self._temporary):
+            path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # there is none, or there are other files in it
+            self.folder.rmdir()
+
+
+def _clear(journal: Journal) -> None:
+    """Delete a journal that no run is writing."""
+    from .journal import names_a_run
+
+    journal.remove()
+    if names_a_run(lock := journal.folder / "lock"):
+        lock.unlink()
+    with contextlib.suppress(OSError):
+        journal.folder.rmdir()
+
+
+def _digest(about: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(about).encode()).hexdigest()

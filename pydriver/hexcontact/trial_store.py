@@ -15,8 +15,9 @@ from .trial_folder import TrialFolder
 
 if TYPE_CHECKING:
     from .accuracy import Solution
-    from .case import Case
-    from .store import Journal, Store
+    from .journal import Journal
+    from .problem import Problem
+    from .store import Store
 
 _SAME = 1e-12  # relative difference of spacings that are the same
 
@@ -41,7 +42,7 @@ class OnDisk(Solver):
         with store.writing("the journal"):
             self._trials.write(store.metadata, self._solutions)
 
-    def solve(self, trial: Trial, case: Case) -> Solution:
+    def solve(self, trial: Trial, case: Problem) -> Solution:
         """Solve the load history on a lattice, or what is missing of it."""
         for solution in self._solutions:
             if (solution.level, solution.copy) == (trial.level, trial.copy):
@@ -60,7 +61,7 @@ class OnDisk(Solver):
                 self._trials.drop(trial.level - 1)
         return solution
 
-    def _solved(self, trial: Trial, case: Case) -> Solution:
+    def _solved(self, trial: Trial, case: Problem) -> Solution:
         from .solve import steps, stops
 
         with self._opened(trial) as (store, last):
@@ -81,11 +82,13 @@ class OnDisk(Solver):
     @contextlib.contextmanager
     def _opened(self, trial: Trial) -> Iterator[tuple[Store, Step | None]]:
         """Open the journal of a lattice; yield its last finished step, too."""
-        from .store import Journal, Store, journal_of
+        from .journal import Journal, journal_of
+        from .store import Store
 
         path, last = self._trials.path(trial.level, trial.copy), None
         if Journal(journal_of(path)):
             store, last = Store.reopened(path)
+            self._trials.check(self._store.metadata, store.metadata)
         else:
             store = Store(path, self._store.metadata, overwrite=True)
         store.interim = False
@@ -97,7 +100,7 @@ class OnDisk(Solver):
     def finish(self, outcome: Outcome) -> None:
         """Put the output in its place and clear the journal away."""
         from .accuracy import finest
-        from .store import Journal, journal_of
+        from .journal import Journal, journal_of
 
         best = finest(outcome.solutions)
         journal = Journal(journal_of(self._trials.path(best.level)))
@@ -117,13 +120,13 @@ class _WithErrors:
 
 
 def record(
-    case: Case, store: Store, shown: Reporter, on_step: Callable[[Step], object] | None = None
+    case: Problem, store: Store, shown: Reporter, on_step: Callable[[Step], object] | None = None
 ) -> None:
     """Solve a case into a store until its accuracy is reached, or a limit; errors as `hexcontact.solve.run`.
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The case, with an accuracy to reach.
     store : Store
         Where the result goes; what it has already of the case is not solved again.

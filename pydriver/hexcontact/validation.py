@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn, Self, TypeGuard
@@ -153,7 +154,7 @@ class Text(Kind):
         return "text in quotes"
 
     def _parse(self, value: object) -> str:
-        if not isinstance(value, str):
+        if not isinstance(value, str) or re.search("[\ud800-\udfff]", value):  # halves of pairs
             refuse(f"expected {self.expected}")
         return value
 

@@ -1,23 +1,23 @@
-"""Compare computed with published, analytic and converged solutions: ``hexcontact verify``.
+"""Compare a few quick contacts with known solutions: ``hexcontact verify`` tests an installation.
 
-The checks themselves are listed in `hexcontact.verify_cases`. Published and converged values come from
-``data/reference.csv``, a copy of tests/reference/benchmarks.csv.
+Decks, quantities, references, tolerances and sources stand in ``data/self_test.toml``. The long comparisons
+with published, analytic and converged solutions are a program of the repository: tests/validation.
 """
 
 from __future__ import annotations
 
-import csv
 import functools
 import importlib.resources
 import math
 import sys
-from collections.abc import Callable, Sequence
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from .errors import DeckError
 
-# display unit -> SI; the units of reference.csv are among them
+# display unit -> SI
 UNITS = {
     "-": 1.0,
     "s": 1.0,
@@ -34,49 +34,13 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Reference:
-    """A row of the reference table in SI; nan where the table has nothing."""
+class Known:
+    """What is known about a quantity, in SI; nan where there is no such value."""
 
-    published: float
-    reference: float
-    uncertainty: float
-    analytic: float
-
-
-@functools.cache
-def _table() -> dict[tuple[str, str], dict[str, str]]:
-    text = importlib.resources.files("hexcontact").joinpath("data/reference.csv").read_text(encoding="utf-8")
-    rows = csv.DictReader(text.splitlines())
-    return {(row["case"], row["quantity"]): row for row in rows}
-
-
-def reference(case: str, quantity: str) -> Reference:
-    """Look up a row of the reference table.
-
-    Parameters
-    ----------
-    case, quantity : str
-        The first two columns.
-
-    Returns
-    -------
-    Reference
-
-    Raises
-    ------
-    KeyError
-        If there is no such row.
-    """
-    row = _table()[case, quantity]
-    factor = UNITS[row["unit"]]
-
-    def number(column: str) -> float:
-        try:
-            return float(row[column]) * factor
-        except ValueError:  # empty, or two values such as 0.511/0.533
-            return math.nan
-
-    return Reference(*(number(column) for column in ("published", "reference", "uncertainty", "analytic")))
+    published: float = math.nan
+    reference: float = math.nan
+    uncertainty: float = math.nan
+    analytic: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -124,7 +88,7 @@ class Comparison:
         unit: str,
         computed: float,
         *,
-        row: Reference | None = None,
+        row: Known | None = None,
         analytic: float = math.nan,
         judge: str = "",
         relative: float = math.nan,
@@ -140,16 +104,16 @@ class Comparison:
             Unit to show it in, a key of `UNITS`.
         computed : float
             The value, SI.
-        row : Reference, optional
-            What the reference table says about it.
+        row : Known, optional
+            What is known about it.
         analytic : float
-            The analytic value, SI, instead of that of the reference table.
+            The analytic value, SI, instead of that of `row`.
         judge : str
             "reference" or "analytic": what the difference is taken from; by default the reference, if any.
         relative, absolute : float
             Bound on the difference, relative or in SI; without one the row is reported, not judged.
         """
-        known = row or Reference(math.nan, math.nan, math.nan, math.nan)
+        known = row or Known()
         by_reference = judge == "reference" or (not judge and not math.isnan(known.reference))
         self.rows.append(
             Row(
@@ -197,7 +161,8 @@ HEADERS = (
 )
 
 
-def _cells(row: Row) -> list[str]:
+def cells_of(row: Row) -> list[str]:
+    """Return a row as texts in the order of `HEADERS`."""
     factor = UNITS[row.unit]
     unit = "" if row.unit == "-" else row.unit.replace("um", "µm")
     known = [value for value in (row.computed, row.reference, row.analytic) if not math.isnan(value)]
@@ -224,45 +189,13 @@ def _cells(row: Row) -> list[str]:
     ]
 
 
-def _judge_column(row: Row) -> int:
-    """Return the position of the value that judges the row among its cells; -1 if it is not judged."""
+def judge_column(row: Row) -> int:
+    """Return the position of the value that judges a row among its cells; -1 if it is not judged."""
     return HEADERS.index(row.judge) if row.passed is not None else -1
 
 
-def markdown(check: Check, comparison: Comparison) -> str:
-    """Return a check as a Markdown section; the value that judges a row is in bold.
-
-    Parameters
-    ----------
-    check : Check
-        The check.
-    comparison : Comparison
-        What it found.
-    """
-    lines = [f"## {check.title}", "", check.text, "", f"`hexcontact verify {check.name}`", ""]
-    lines += ["| " + " | ".join(HEADERS) + " |", "|" + "---|" * 2 + "---:|" * (len(HEADERS) - 3) + "---|"]
-    for row in comparison.rows:
-        cells, judge = [cell.replace("|", "\\|") for cell in _cells(row)], _judge_column(row)
-        if judge >= 0:
-            cells[judge] = f"**{cells[judge]}**"
-        lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", *(f"{note}  ".replace("|", "\\|") for note in comparison.notes)]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-_PREAMBLE = """# Validation
-
-Made by `hexcontact verify --table > docs/validation.md`; do not edit.
-
-*published*: as printed in the dissertation. *reference*: the exact solution of the same discrete problem, or
-a converged solution, from an independent program (`tests/reference/benchmarks.csv`). *analytic*: closed
-solution. The value in bold judges the row; *difference* and *tolerance* are relative to it, or have its unit.
-Rows without a tolerance are reported only. Seconds are those of the machine that made this table, one run
-each, preparing the case included.
-"""
-
-
-def _print(check: Check, comparison: Comparison) -> None:
+def show(check: Check, comparison: Comparison) -> None:
+    """Print a check as a table for terminals."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -278,7 +211,7 @@ def _print(check: Check, comparison: Comparison) -> None:
     style = {True: "green", False: "bold red", None: ""}
     before = ""
     for row in comparison.rows:
-        cells, judge = _cells(row), _judge_column(row)
+        cells, judge = cells_of(row), judge_column(row)
         first, before = cells[0] if cells[0] != before else "", cells[0]
         texts = [
             Text(cell, style="bold" if at == judge else "") for at, cell in enumerate([first, *cells[1:-1]])
@@ -291,15 +224,23 @@ def _print(check: Check, comparison: Comparison) -> None:
     screen.print(f"{check.name}: {sum(judged)} of {len(judged)} comparisons passed\n", soft_wrap=True)
 
 
-def main(names: Sequence[str] = (), *, table: bool = False, listing: bool = False) -> int:
+def main(
+    names: Sequence[str] = (),
+    *,
+    checks: Mapping[str, Check] | None = None,
+    output: Callable[[Check, Comparison], None] = show,
+    listing: bool = False,
+) -> int:
     """Run checks and print what they find.
 
     Parameters
     ----------
     names : sequence of str
         Names of the checks; all of them if empty.
-    table : bool
-        Print Markdown, as in docs/validation.md.
+    checks : mapping of str to Check, optional
+        The checks to choose from; default: those of an installation.
+    output : callable
+        Prints a check with its comparison.
     listing : bool
         Only list the checks.
 
@@ -313,23 +254,16 @@ def main(names: Sequence[str] = (), *, table: bool = False, listing: bool = Fals
     DeckError
         If there is no check of some name.
     """
-    from .verify_cases import CHECKS
-
+    chosen = _chosen(names, checks)
     if listing:
-        width = max(map(len, CHECKS))
-        for check in CHECKS.values():
+        width = max(len(check.name) for check in chosen)
+        for check in chosen:
             print(f"{check.name:<{width}}  {check.title}")
         return 0
-    chosen = _chosen(names)
-    if table:
-        print(_PREAMBLE)
     failed = []
     for check in chosen:
         comparison = check.run()
-        if table:
-            print(markdown(check, comparison))
-        else:
-            _print(check, comparison)
+        output(check, comparison)
         if not comparison.passed:
             failed.append(check.name)
     if failed:
@@ -337,13 +271,12 @@ def main(names: Sequence[str] = (), *, table: bool = False, listing: bool = Fals
     return 1 if failed else 0
 
 
-def _chosen(names: Sequence[str]) -> list[Check]:
+def _chosen(names: Sequence[str], checks: Mapping[str, Check] | None = None) -> list[Check]:
     """Return the checks of these names, all if there are none."""
-    from .verify_cases import CHECKS
-
-    if unknown := [name for name in names if name not in CHECKS]:
-        raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(CHECKS)}")
-    return [CHECKS[name] for name in names] if names else list(CHECKS.values())
+    known = self_test() if checks is None else checks
+    if unknown := [name for name in names if name not in known]:
+        raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(known)}")
+    return [known[name] for name in names] if names else list(known.values())
 
 
 def for_programs(names: Sequence[str] = (), *, listing: bool = False) -> dict[str, Any]:
@@ -356,3 +289,39 @@ def for_programs(names: Sequence[str] = (), *, listing: bool = False) -> dict[st
     found = [of_comparison(check, check.run()) for check in chosen]
     passed = all(check["passed"] for check in found)
     return {"exit_code": int(not passed), "passed": passed, "checks": found}
+
+
+# ------------------------------------------------------------------------------- the self-test
+
+
+@functools.cache
+def self_test() -> dict[str, Check]:
+    """Return the checks of an installation by name, from data/self_test.toml."""
+    text = importlib.resources.files("hexcontact").joinpath("data/self_test.toml").read_text(encoding="utf-8")
+    return {
+        entry["name"]: Check(entry["name"], entry["title"], "", functools.partial(_solve, entry))
+        for entry in tomllib.loads(text)["check"]
+    }
+
+
+def _solve(entry: Mapping[str, Any]) -> Comparison:
+    """Run a deck and compare the history of its result with the values beside it."""
+    from .case import Case
+
+    history = Case.from_text(entry["deck"]).run().dataset
+    found = Comparison()
+    for value in entry["values"]:
+        step = history.isel(step=value["step"] - 1)
+        computed = float(step[value["quantity"]])
+        if over := value.get("over"):
+            computed /= float(step[over])
+        found.add(
+            f"step {value['step']}",
+            f"{value['quantity']}/{over}" if over else value["quantity"],
+            value.get("unit", "-"),
+            computed,
+            row=Known(**{value["source"]: value["value"]}),
+            relative=value["relative"],
+        )
+    found.notes.append(entry["note"])
+    return found

@@ -18,7 +18,6 @@ from . import memory
 from .edges import ContactEdges
 from .errors import DeckError
 from .estimators import area_radius, pressure_center
-from .grid import rim_sides
 from .load_history import MOTIONS
 from .load_series import LOADS
 from .messages import listed
@@ -26,11 +25,11 @@ from .result import Step
 from .variables import FIELDS
 
 if TYPE_CHECKING:
-    from .case import Case
     from .lattice import Lattice
     from .load_history import LoadStep
     from .native import FlexibilityOperator, NormalContact, NormalSolution
     from .native_friction import ContactState
+    from .problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -38,6 +37,8 @@ DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"
 S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
+_WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
+_LEFT = 0.7  # share of what solving takes that the system does not have back by then, as measured
 _COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
 _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
 
@@ -45,26 +46,41 @@ _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when 
 # --- memory ---------------------------------------------------------------------------------------
 
 
-def memory_needed(case: Case, lattice: Lattice) -> int:
-    """Return the memory (bytes) that solving and writing a load step on a window takes."""
+def peak_memory(case: Problem, lattice: Lattice) -> int:
+    """Return the memory (bytes) that a run on a window takes at most, with interpreter and libraries."""
+    return memory.resident() + memory_needed(case, lattice)
+
+
+def memory_needed(case: Problem, lattice: Lattice) -> int:
+    """Return the memory (bytes) that solving and writing load steps on a window takes.
+
+    The contact is taken as large as estimated at the largest load; as the window where there is no estimate.
+    """
     from . import native
 
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
-    operator = native.memory_needed("fft", lattice.n_row, lattice.n_col, operator_only=True)
+    operator, set_up = (
+        native.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
+        for part in ("operator", "set-up of the operator")
+    )
     arrays = kind_of(case).arrays
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         arrays += _ENTRY_ARRAYS
     if case.adaptive:
         arrays += _COMPANION_ARRAYS
-    return case.memory_needed(lattice) + len(bodies) * operator + arrays * _ITEM * lattice.size
+    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size
+    if bodies:
+        # beside a solver with friction, whose vectors are gone by then, the set-up needs nothing more
+        needed += len(bodies) * operator + (0 if case.frictional else set_up)
+    return max(needed, int(_LEFT * needed) + _WRITING)
 
 
-def require_memory(case: Case, lattice: Lattice, steps_held: int = 0) -> None:
+def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
     """Refuse a window that does not fit into memory.
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The problem.
     lattice : Lattice
         The window.
@@ -88,7 +104,7 @@ def require_memory(case: Case, lattice: Lattice, steps_held: int = 0) -> None:
     )
 
 
-def fields_of(case: Case) -> tuple[str, ...]:
+def fields_of(case: Problem) -> tuple[str, ...]:
     """Return the fields that each step of a case has: its whole state, and displacements if asked for."""
     return (*kind_of(case).state, *(name for name in DISPLACEMENTS if name in case.output.fields))
 
@@ -101,7 +117,7 @@ class Window(ABC, Generic[S]):
 
     Parameters
     ----------
-    case : Case
+    case : Problem
         The problem.
     lattice : Lattice
         The window.
@@ -124,7 +140,7 @@ class Window(ABC, Generic[S]):
     state: ClassVar[tuple[str, ...]]  # fields that every step has, all that the next step needs among them
     arrays: ClassVar[int]  # fields that Python holds while a step is solved and written
 
-    def __init__(self, case: Case, lattice: Lattice, steps_held: int = 0) -> None:
+    def __init__(self, case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
         require_memory(case, lattice, steps_held)
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         gap, self.candidate = case.initial_gap(lattice)
@@ -171,8 +187,8 @@ class Window(ABC, Generic[S]):
         """Return what has one value by step beyond load, approach and contact area."""
 
     def outgrown(self, solution: S) -> bool:
-        """Tell whether the contact reaches the rim of the window."""
-        return any(rim_sides(solution.zone > 0))
+        """Tell whether the contact reached the rim of the window, be it in a part of the step only."""
+        return solution.touches_rim
 
     def grown(self, solution: S, target: LoadStep) -> Self:
         """Return a larger window for a contact that reached the rim; this one is of no use any more.
@@ -297,7 +313,7 @@ class NormalWindow(Window["NormalSolution"]):
     """Contact without friction; every step stands for itself."""
 
     state = ("pressure", "gap", "zone")
-    arrays = 24  # of a rough surface, whose edges are everywhere
+    arrays = 8  # initial gap, pressure, gap, zones, on their way through the core
 
     def _set_up(self, gap: Array) -> None:
         from .native import NormalContact
@@ -343,7 +359,7 @@ class NormalWindow(Window["NormalSolution"]):
         }
 
 
-def kind_of(case: Case) -> type[Window[Any]]:
+def kind_of(case: Problem) -> type[Window[Any]]:
     """Return the kind of window that the algorithm of a case needs."""
     if not case.frictional:
         return NormalWindow

@@ -35,7 +35,7 @@ class FrictionWindow(Window["ContactState"]):
         *("relative_displacement_x", "relative_displacement_y"),
         *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
     )
-    arrays = 60  # the states before and after, both once more on their way through the core, or edges
+    arrays = 34  # the state before, itself and on its way through the core both ways; gaps, coordinates
 
     def _set_up(self, gap: Array) -> None:
         from .native_friction import FrictionalContact
@@ -65,13 +65,6 @@ class FrictionWindow(Window["ContactState"]):
             entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
             tolerance=self.case.solver.tolerance,
         )
-
-    def outgrown(self, solution: ContactState) -> bool:
-        """Tell whether the contact reached the rim, be it in a part of the step only.
-
-        Where an attempt that failed puts pressure means nothing.
-        """
-        return solution.converged and solution.touches_rim
 
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
         """Return a state on this window; what the new nodes have been through follows from it."""

@@ -237,7 +237,7 @@ def estimated_memory(name: str, side: int) -> int:
 
     if name == "HERTZ":
         return native.memory_needed("fft", side, side)
-    return native_friction.memory_needed("fft", side, side)
+    return native_friction.memory_needed("fft", side, side, loads=2)
 
 
 def command(*, quick: bool) -> list[Table]:

@@ -11,6 +11,7 @@ program tester
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
   use test_vectors, only: collect_vectors
+  use test_arguments, only: collect_arguments
   use test_contact, only: collect_contact
   use test_normal_contact, only: collect_normal_contact
   use test_friction, only: collect_friction
@@ -31,6 +32,7 @@ program tester
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
     new_suite('vectors', collect_vectors), &
+    new_suite('arguments', collect_arguments), &
     new_suite('contact', collect_contact), &
     new_suite('normal_contact', collect_normal_contact), &
     new_suite('friction', collect_friction), &

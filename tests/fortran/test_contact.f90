@@ -6,7 +6,8 @@ module test_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control, normal
   use hc_contact_residuals, only: normal_residual, force_residual
-  use hc_krylov, only: linear_system_t, projected_cg, precondition_constraints, fulfil
+  use hc_krylov, only: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, solution_accurate, &
+    iterations_used_up, solution_broke_off
   use hc_vectors, only: dot
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
@@ -34,6 +35,8 @@ contains
       new_test('dot', test_dot), &
       new_test('projected_cg', test_projected_cg), &
       new_test('three_constraints', test_three_constraints), &
+      new_test('outcomes', test_outcomes), &
+      new_test('norm_of_gmres', test_norm_of_gmres), &
       new_test('residuals', test_residuals), &
       new_test('hertz', test_hertz), &
       new_test('any_approach', test_any_approach), &
@@ -63,7 +66,7 @@ contains
     type(dense_system_t) :: system
     real(wp) :: x(5), ax(5), multiplier(1), residual, constraint(5, 1)
     real(wp), allocatable :: mb(:, :)
-    integer :: iterations, i
+    integer :: iterations, outcome, i
 
     system%matrix = 1.0_wp
     do i = 1, 5
@@ -75,7 +78,7 @@ contains
     call precondition_constraints(system, constraint(:, 1) > 0.0_wp, constraint, mb, error)
     if (allocated(error)) return
     call projected_cg(system, constraint(:, 1) > 0.0_wp, constraint, mb, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, 9.0_wp], x, ax, &
-                      1.0e-12_wp, 20, multiplier, residual, iterations, error)
+                      1.0e-12_wp, 20, multiplier, residual, iterations, outcome, error)
     if (allocated(error)) return
     ! i x_i + 6 = b_i + m on the active nodes and sum x = 6: m (1 + 1/2 + 1/4) = 6 + sum (6 - b_i)/i
     call check(error, multiplier(1), (6.0_wp + 5.0_wp + 2.0_wp + 0.75_wp)/1.75_wp, 1.0e-11_wp, 'multiplier')
@@ -84,8 +87,67 @@ contains
     if (allocated(error)) return
     call check(error, [sum(x), x(3), x(5)], [6.0_wp, 0.0_wp, 0.0_wp], 1.0e-12_wp, 'constraint and fixed nodes')
     if (allocated(error)) return
-    call check_true(error, iterations <= 3 .and. residual <= 1.0e-12_wp, 'as many iterations as unknowns at most')
+    call check_true(error, iterations <= 2 .and. residual <= 1.0e-12_wp .and. outcome == solution_accurate, &
+                    'three unknowns, one constraint')
   end subroutine test_projected_cg
+
+  !> Conjugate gradients say why they stopped: solved, out of iterations, a matrix that is not positive definite.
+  subroutine test_outcomes(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0)
+    logical, parameter :: active(5) = .true.
+    integer, parameter :: expected(3) = [solution_accurate, iterations_used_up, solution_broke_off], most(3) = [20, 2, 20]
+    integer :: iterations, outcome, i, k
+
+    do k = 1, 3
+      system%matrix = 1.0_wp
+      do i = 1, 5
+        system%matrix(i, i) = 1.0_wp + i
+      end do
+      if (k == 3) system%matrix = -system%matrix
+      x = 0.0_wp
+      ax = 0.0_wp
+      call projected_cg(system, active, none, none, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], x, ax, 1.0e-12_wp, most(k), &
+                        multiplier, residual, iterations, outcome, error)
+      if (allocated(error)) return
+      call check(error, outcome, expected(k), 'outcome')
+      if (allocated(error)) return
+      call check_true(error, (residual <= 1.0e-12_wp) .eqv. outcome == solution_accurate, 'residual')
+      if (allocated(error)) return
+    end do
+  end subroutine test_outcomes
+
+  !> GMRES bounds the Euclidean norm of the weighted residuals, and returns it.
+  subroutine test_norm_of_gmres(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0), left, first
+    real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = [1.0_wp, 2.0_wp, 1.0_wp, 0.5_wp, 1.0_wp]
+    logical, parameter :: active(5) = .true.
+    logical :: independent
+    integer :: iterations, outcome, i, most
+
+    first = norm2(weight*rhs)
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    system%matrix(2, 1) = -3.0_wp
+    do most = 1, 5
+      x = 0.0_wp
+      ax = 0.0_wp
+      call projected_gmres(system, active, none, none, none, weight, rhs, x, ax, 1.0e-10_wp, most, multiplier, independent, &
+                           residual, iterations, outcome, error)
+      if (allocated(error)) return
+      left = norm2(weight*(rhs - matmul(system%matrix, x)))
+      call check(error, residual, left, 1.0e-12_wp*first, 'the norm that is left')
+      if (allocated(error)) return
+      call check(error, outcome, merge(solution_accurate, iterations_used_up, left <= 1.0e-10_wp), 'outcome')
+      if (allocated(error)) return
+    end do
+    call check(error, outcome, solution_accurate, 'as many directions as unknowns are enough')
+  end subroutine test_norm_of_gmres
 
   !> Three constraints on four unknowns: the solution fulfils its own equations; dependent ones are told.
   subroutine test_three_constraints(error)
@@ -96,7 +158,7 @@ contains
     real(wp), parameter :: wanted(3) = [6.0_wp, -1.0_wp, 2.0_wp]
     logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
     logical :: independent
-    integer :: iterations, i
+    integer :: iterations, outcome, i
 
     system%matrix = 1.0_wp
     do i = 1, 5
@@ -117,7 +179,7 @@ contains
     call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
     if (allocated(error)) return
     ax = matmul(system%matrix, x)
-    call projected_cg(system, active, constraint, mb, rhs, x, ax, 1.0e-12_wp, 20, multiplier, residual, iterations, error)
+    call projected_cg(system, active, constraint, mb, rhs, x, ax, 1.0e-12_wp, 20, multiplier, residual, iterations, outcome, error)
     if (allocated(error)) return
     call check(error, matmul(transpose(constraint), x), wanted, 1.0e-12_wp, 'constraints')
     if (allocated(error)) return
@@ -215,9 +277,9 @@ contains
     if (allocated(error)) return
     call check_true(error, state%converged .and. state%residual_normal <= 1.0e-9_wp, 'converged')
     if (allocated(error)) return
-    call check(error, maxval(state%pressure), 2.0_wp/pi, 1.0e-4_wp, 'largest pressure')
+    call check(error, maxval(state%pressure), 2.0_wp/pi, 8.6e-5_wp, 'largest pressure')
     if (allocated(error)) return
-    call check(error, state%motion(normal), 1.0_wp, 2.0e-4_wp, 'approach')
+    call check(error, state%motion(normal), 1.0_wp, 8.6e-5_wp, 'approach')
     if (allocated(error)) return
     ! control of the approach leads to the same solution
     call contact%solve(displacement_control, state%motion(normal), 1.0e-9_wp, 50, again, error)
@@ -247,7 +309,7 @@ contains
       if (allocated(error)) return
       call check_true(error, state%converged .and. state%load(normal) > load, 'converged, and the load rises')
       if (allocated(error)) return
-      call check_true(error, state%operator_applications < 30.0_wp, 'no work wasted')
+      call check_true(error, state%operator_applications < 6.0_wp, 'no work wasted')
       if (allocated(error)) return
       load = state%load(normal)
     end do
@@ -273,7 +335,7 @@ contains
     radius = sqrt(lattice%cell_area()*count(candidate)/pi)
     call check_true(error, state%converged, 'converged')
     if (allocated(error)) return
-    call check(error, 2.0_wp*radius*state%motion(normal), 1.0_wp, 5.0e-3_wp, 'approach')
+    call check(error, 2.0_wp*radius*state%motion(normal), 1.0_wp, 2.4e-3_wp, 'approach')
     if (allocated(error)) return
     call check_true(error, all((state%pressure > 0.0_wp) .eqv. candidate), 'contact on the punch and nowhere else')
   end subroutine test_flat_punch
@@ -385,7 +447,7 @@ contains
     end do
   end subroutine test_nothing_touches
 
-  !> One and three threads end at the same solution, within 100 tolerances.
+  !> One and three threads end at the same bits.
   subroutine test_threads(error)
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
@@ -404,8 +466,13 @@ contains
       call contact%solve(force_control, 1.0_wp, 1.0e-8_wp, 50, state(i), error)
       if (allocated(error)) return
     end do
-    call check(error, reshape(state(2)%pressure, [3721]), reshape(state(1)%pressure, [3721]), &
-               1.0e-6_wp*maxval(state(1)%pressure), 'pressure')
+    call check_true(error, maxval(state(1)%pressure) > 0.0_wp, 'a pressure')
+    if (allocated(error)) return
+    call check(error, reshape(state(2)%pressure, [3721]), reshape(state(1)%pressure, [3721]), 0.0_wp, 'pressure')
+    if (allocated(error)) return
+    call check(error, reshape(state(2)%gap, [3721]), reshape(state(1)%gap, [3721]), 0.0_wp, 'gap')
+    if (allocated(error)) return
+    call check(error, state(2)%motion, state(1)%motion, 0.0_wp, 'approach')
   end subroutine test_threads
 
   !> A solver that is stopped too early says so.

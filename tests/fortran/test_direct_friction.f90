@@ -15,7 +15,7 @@ module test_direct_friction
   use hc_direct_contact, only: direct_contact_t, new_direct_contact, exchange, patience
   use hc_block_solve, only: solve_blocks
   use hc_direct_friction, only: direct_friction_t, new_direct_friction, ring
-  use testing, only: test_t, new_test, check, check_true
+  use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
 
@@ -113,7 +113,7 @@ contains
   !> Largest difference of two sets of tractions, relative to the largest pressure.
   pure real(wp) function difference(a, b)
     type(contact_state_t), intent(in) :: a, b
-    difference = max(maxval(abs(a%pressure - b%pressure)), maxval(abs(a%traction - b%traction)))/maxval(b%pressure)
+    difference = largest([largest(a%pressure - b%pressure), largest(a%traction - b%traction)])/maxval(b%pressure)
   end function difference
 
   !> Radius of stick over that of contact, from the numbers of nodes.
@@ -211,11 +211,21 @@ contains
     first = real(base(:n_1, :n_1), real32)
     call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
     call check_true(error, .not. solved, 'too large for single precision')
+    if (allocated(error)) return
+    matrix(n, n) = -1.0_wp
+    first = real(base(:n_1, :n_1), real32)
+    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call check_true(error, .not. solved, 'second block not positive definite')
+    if (allocated(error)) return
+    matrix(n, n) = base(n, n)
+    first(n_1, n_1) = -1.0_real32
+    call solve_blocks(n, n_1, 3, first, matrix, x, unknown, solved)
+    call check_true(error, .not. solved, 'first block not positive definite')
   end subroutine test_blocks
 
   !> gamma = 0: c/a = (1 - Q/muP)^(1/3), shift = (3 mu P S/16 a) [1 - (1 - Q/muP)^(2/3)], S = 4 for E* = 1.
   !>
-  !> At 12 spacings in the radius the shift is good to 0.2 %, and c/a to a node or two on the circumference.
+  !> At 12 spacings in the radius the shift is good to 2e-4, and c/a to a node or two on the circumference.
   subroutine test_cattaneo_mindlin(error)
     type(error_t), allocatable, intent(out) :: error
     type(friction_problem_t) :: problem
@@ -231,15 +241,15 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call check(error, maxval(abs(state%traction)), 0.0_wp, 1.0e-12_wp, 'no shear under a normal load')
+    call check(error, largest(state%traction), 0.0_wp, 1.0e-12_wp, 'no shear under a normal load')
     if (allocated(error)) return
     full = 0.75_wp*mu*load
     do i = 1, 2
       call step(solver, state, [f, f, f, d], [load, part(i)*mu*load, 0.0_wp, 0.0_wp], error)
       if (allocated(error)) return
-      call check(error, state%motion(along_x)/full, 1.0_wp - (1.0_wp - part(i))**(2.0_wp/3.0_wp), 2.0e-3_wp, 'shift')
+      call check(error, state%motion(along_x)/full, 1.0_wp - (1.0_wp - part(i))**(2.0_wp/3.0_wp), 1.8e-4_wp, 'shift')
       if (allocated(error)) return
-      call check(error, stick_ratio(state), (1.0_wp - part(i))**(1.0_wp/3.0_wp), 0.04_wp, 'stick radius')
+      call check(error, stick_ratio(state), (1.0_wp - part(i))**(1.0_wp/3.0_wp), 0.0216_wp, 'stick radius')
       if (allocated(error)) return
     end do
     ! at constant normal load one step leads to the same state as many
@@ -262,10 +272,10 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, f], [load, 0.0_wp, 0.0_wp, torque], error)
     if (allocated(error)) return
-    ! 0.2 % is the error of a mesh with 12 spacings in the radius
-    call check(error, state%motion(about_z)/twist, 1.0_wp, 2.0e-3_wp, 'twist')
+    ! 5e-4 is the error of a mesh with 12 spacings in the radius
+    call check(error, state%motion(about_z)/twist, 1.0_wp, 5.2e-4_wp, 'twist')
     if (allocated(error)) return
-    call check(error, stick_ratio(state), 0.8_wp, 0.04_wp, 'stick radius')
+    call check(error, stick_ratio(state), 0.8_wp, 0.0238_wp, 'stick radius')
     if (allocated(error)) return
     call step(solver, driven, [f, d, d, d], [load, 0.0_wp, 0.0_wp, state%motion(about_z)], error)
     if (allocated(error)) return
@@ -286,13 +296,13 @@ contains
     if (allocated(error)) return
     call step(solver, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call check(error, maxval(state%pressure)*pi/2.0_wp, 1.0350_wp, 1.0e-3_wp, 'largest pressure')
+    call check(error, maxval(state%pressure)*pi/2.0_wp, 1.0350_wp, 4.6e-4_wp, 'largest pressure')
     if (allocated(error)) return
     call check(error, state%motion(normal), 0.9972_wp, 3.0e-4_wp, 'approach')
     if (allocated(error)) return
-    call check(error, stick_ratio(state), 0.2155_wp, 0.01_wp, 'stick radius')
+    call check(error, stick_ratio(state), 0.2155_wp, 0.003_wp, 'stick radius')
     if (allocated(error)) return
-    call check_true(error, state%sweeps <= 25, 'a sensible number of linear solutions')
+    call check_true(error, state%sweeps <= 14, 'a sensible number of linear solutions')
   end subroutine test_dissimilar
 
   !> Flat punch without slip: P = kappa 2 E* a approach, kappa = atanh(beta)/beta; kappa is the ratio to no friction.
@@ -321,8 +331,8 @@ contains
     end do
     call check_true(error, all(rough%zone /= slip), 'no slip')
     if (allocated(error)) return
-    ! the ratio is off by 2e-3 with 10 spacings in the radius
-    call check(error, rough%load(normal)/smooth%load(normal), atanh(beta)/beta, 3.0e-3_wp, 'stiffness')
+    ! the ratio is off by 7e-4 with 10 spacings in the radius
+    call check(error, rough%load(normal)/smooth%load(normal), atanh(beta)/beta, 8.2e-4_wp, 'stiffness')
   end subroutine test_no_slip_punch
 
   !> mu = 0 is the frictionless method.
@@ -343,9 +353,9 @@ contains
     if (allocated(error)) return
     call smooth%solve(f, load, tight, 40, expected, error)
     if (allocated(error)) return
-    call check(error, maxval(abs(state%pressure - expected%pressure)), 0.0_wp, 1.0e-11_wp, 'pressure')
+    call check(error, largest(state%pressure - expected%pressure), 0.0_wp, 1.0e-11_wp, 'pressure')
     if (allocated(error)) return
-    call check(error, maxval(abs(state%traction)), 0.0_wp, 0.0_wp, 'shear traction')
+    call check(error, largest(state%traction), 0.0_wp, 0.0_wp, 'shear traction')
     if (allocated(error)) return
     ! shifts and twist that nothing determines stay where they are
     call step(solver, state, [f, d, d, d], [load, 0.3_wp, -0.2_wp, 0.1_wp], error)
@@ -373,9 +383,9 @@ contains
     if (allocated(error)) return
     call smooth%solve(f, load, tight, 40, expected, error)
     if (allocated(error)) return
-    call check(error, maxval(abs(state%pressure - expected%pressure)), 0.0_wp, 1.0e-9_wp, 'pressure')
+    call check(error, largest(state%pressure - expected%pressure), 0.0_wp, 1.0e-9_wp, 'pressure')
     if (allocated(error)) return
-    call check_true(error, maxval(abs(state%traction)) > 0.1_wp*maxval(state%pressure), 'shear traction')
+    call check_true(error, largest(state%traction) > 0.1_wp*maxval(state%pressure), 'shear traction')
   end subroutine test_goodman
 
   !> Swap the bodies and reverse the tangential loads: same pressure and approach, shear, shifts and twist reversed.
@@ -528,15 +538,15 @@ contains
     if (allocated(error)) return
     call step(solver, state, [d, d, d, f], [0.5_wp, 1.0_wp, -2.0_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call check(error, norm2(state%load(along_x:along_y))/(0.6_wp*state%load(normal)), 1.0_wp, 5.0e-3_wp, 'full slip')
+    call check(error, norm2(state%load(along_x:along_y))/(0.6_wp*state%load(normal)), 1.0_wp, 9.2e-5_wp, 'full slip')
     if (allocated(error)) return
     ! the same loads again: nothing slips any more
     call step(solver, state, [d, d, d, d], state%motion, error)
     if (allocated(error)) return
-    call check(error, maxval(abs(state%slip_increment)), 0.0_wp, 1.0e-9_wp, 'no motion, no slip')
+    call check(error, largest(state%slip_increment), 0.0_wp, 1.0e-9_wp, 'no motion, no slip')
   end subroutine test_strong_coupling
 
-  !> A history through both methods: tractions to 1e-6 mu p_max, motions likewise.
+  !> A history through both methods, solved to 1e-10: tractions to 1e-9 mu p_max, motions likewise.
   subroutine test_methods_agree(error)
     type(error_t), allocatable, intent(out) :: error
     type(friction_problem_t) :: problem
@@ -563,9 +573,9 @@ contains
       if (allocated(error)) return
       call step(fft, other, [f, f, f, f], value(:, i), error)
       if (allocated(error)) return
-      call check(error, difference(one, other), 0.0_wp, 1.0e-6_wp*mu, 'tractions')
+      call check(error, difference(one, other), 0.0_wp, 1.0e-9_wp*mu, 'tractions')
       if (allocated(error)) return
-      call check(error, one%motion, other%motion, 1.0e-6_wp*mu, 'motions')
+      call check(error, one%motion, other%motion, 1.0e-9_wp*mu, 'motions')
       if (allocated(error)) return
     end do
   end subroutine test_methods_agree
@@ -615,7 +625,7 @@ contains
     if (allocated(error)) return
     call step(solver, state, [d, f, d, d], [-0.1_wp, 0.0_wp, 0.05_wp, 0.0_wp], error)
     if (allocated(error)) return
-    call check(error, [maxval(state%pressure), maxval(abs(state%traction))], [0.0_wp, 0.0_wp], 0.0_wp, 'separated')
+    call check(error, [maxval(state%pressure), largest(state%traction)], [0.0_wp, 0.0_wp], 0.0_wp, 'separated')
     if (allocated(error)) return
     call step(solver, state, [d, f, f, f], [0.3_wp, 0.0_wp, 0.0_wp, 0.0_wp], error)
   end subroutine test_nothing_touches

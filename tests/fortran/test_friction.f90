@@ -17,7 +17,7 @@ module test_friction
   use hc_friction_operators, only: operators_t, new_operators
   use hc_friction_systems, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
-  use testing, only: test_t, new_test, check, check_raised, check_true
+  use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
   private
 
@@ -391,7 +391,7 @@ contains
       m(n + i, n + i) = 1.0_wp
     end do
     scale = maxval(abs(m))
-    call check(error, maxval(abs(m - transpose(m))), 0.0_wp, 1.0e-6_wp*scale, 'asymmetry of the preconditioner')
+    call check(error, largest(m - transpose(m)), 0.0_wp, 1.0e-6_wp*scale, 'asymmetry of the preconditioner')
     if (allocated(error)) return
     call check_true(error, positive_definite(m), 'preconditioner positive definite')
     if (allocated(error)) return
@@ -410,7 +410,7 @@ contains
     real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:), none(:, :)
     logical, allocatable :: active(:)
     real(wp) :: no_multiplier(0), residual
-    integer :: level, side, n, iterations
+    integer :: level, side, n, iterations, outcome
 
     pair = elastic_pair_t(1.0_wp, 0.0_wp, 0.5_wp)
     do level = 1, 2
@@ -433,9 +433,9 @@ contains
       image = 0.0_wp
       rhs = merge(1.0_wp, 0.0_wp, active)
       call projected_cg(system, active, none, none, rhs, unknown, image, 1.0e-6_wp, 100, no_multiplier, residual, &
-                        iterations, error)
+                        iterations, outcome, error)
       if (allocated(error)) return
-      call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 10, 'iterations')
+      call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 9, 'iterations')
       if (allocated(error)) return
     end do
   end subroutine test_slip_preconditioner
@@ -508,7 +508,7 @@ contains
 
   !> Cattaneo-Mindlin (exact for nu = 0): at Q = mu P/2 c/a = 0.5^(1/3), shift (3 mu P S/16 a) (1 - 0.5^(2/3)).
   !>
-  !> At 12 spacings in the radius the shift is good to 0.3 %, c/a to 0.02.
+  !> At 12 spacings in the radius the shift is good to 3e-5, c/a to 0.004.
   subroutine test_cattaneo_mindlin(error)
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
@@ -525,14 +525,14 @@ contains
     call step(contact, state, [f, f, f, d], [load, 0.0_wp, 0.5_wp*mu*load, 0.0_wp], error)
     if (allocated(error)) return
     shift = 3.0_wp*mu*load*4.0_wp/16.0_wp*(1.0_wp - 0.5_wp**(2.0_wp/3.0_wp))
-    call check(error, state%motion(along_y), shift, 3.0e-3_wp*shift, 'shift')
+    call check(error, state%motion(along_y), shift, 3.2e-5_wp*shift, 'shift')
     if (allocated(error)) return
     call check(error, [state%motion(along_x), state%load(along_x)], [0.0_wp, 0.0_wp], 1.0e-8_wp, 'nothing across')
     if (allocated(error)) return
     call check(error, sqrt(real(count(state%zone == stick), wp)/count(state%zone /= separated)), &
-               0.5_wp**(1.0_wp/3.0_wp), 0.02_wp, 'stick radius')
+               0.5_wp**(1.0_wp/3.0_wp), 0.004_wp, 'stick radius')
     if (allocated(error)) return
-    call check(error, state%traction(17, 17, 2), mu*2.0_wp/pi*(1.0_wp - 0.5_wp**(1.0_wp/3.0_wp)), 2.0e-3_wp, &
+    call check(error, state%traction(17, 17, 2), mu*2.0_wp/pi*(1.0_wp - 0.5_wp**(1.0_wp/3.0_wp)), 2.1e-5_wp, &
                'traction in the middle')
     if (allocated(error)) return
     ! control of the shift leads to the same solution from the same start, and holds what it holds
@@ -542,7 +542,7 @@ contains
     call check(error, state%load(along_y), 0.5_wp*mu*load, 1.0e-7_wp, 'load under the shift')
   end subroutine test_cattaneo_mindlin
 
-  !> Torsion of spheres: twist and torque where the stick radius is 0.6 a, for nu > 0, to 1 %.
+  !> Torsion of spheres: twist and torque where the stick radius is 0.6 a, for nu > 0, to 0.07 %.
   subroutine test_lubkin(error)
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
@@ -569,9 +569,9 @@ contains
     state = pressed
     call step(contact, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, twist], error)
     if (allocated(error)) return
-    call check(error, state%load(about_z), torque, 0.01_wp*torque, 'torque')
+    call check(error, state%load(about_z), torque, 6.7e-4_wp*torque, 'torque')
     if (allocated(error)) return
-    call check(error, sqrt(real(count(state%zone == stick), wp)/count(state%zone /= separated)), c, 0.02_wp, 'stick radius')
+    call check(error, sqrt(real(count(state%zone == stick), wp)/count(state%zone /= separated)), c, 0.0037_wp, 'stick radius')
     if (allocated(error)) return
     call check(error, state%motion(along_x:along_y), [0.0_wp, 0.0_wp], 1.0e-8_wp, 'no shift')
     if (allocated(error)) return
@@ -613,7 +613,7 @@ contains
     if (allocated(error)) return
     call step(contact, state, [f, d, d, d], [4.0_wp/3.0_wp, 0.3_wp, -0.1_wp, 0.2_wp], error)
     if (allocated(error)) return
-    call check(error, maxval(abs(state%traction)), 0.0_wp, 0.0_wp, 'shear traction')
+    call check(error, largest(state%traction), 0.0_wp, 0.0_wp, 'shear traction')
     if (allocated(error)) return
     call check(error, maxval(state%pressure), 2.0_wp/pi, 1.0e-3_wp, 'pressure of Hertz')
     if (allocated(error)) return
@@ -647,7 +647,7 @@ contains
     call check(error, reshape(state%traction(:, :, 1), [441]), reshape(mu*state%pressure, [441]), 1.0e-9_wp, 'q = mu p')
   end subroutine test_gross_sliding
 
-  !> One and three threads end at the same solution, within 100 tolerances.
+  !> One and three threads end at the same bits.
   subroutine test_threads(error)
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
@@ -663,8 +663,13 @@ contains
       call step(contact, state(i), [f, f, f, d], [load, 0.2_wp*load, 0.0_wp, 0.0_wp], error, 1.0e-8_wp)
       if (allocated(error)) return
     end do
-    call check(error, reshape(state(2)%traction, [1922]), reshape(state(1)%traction, [1922]), &
-               1.0e-6_wp*0.3_wp*maxval(state(1)%pressure), 'shear traction')
+    call check_true(error, maxval(state(1)%traction) > 0.0_wp, 'a shear traction')
+    if (allocated(error)) return
+    call check(error, largest(state(2)%traction - state(1)%traction), 0.0_wp, 0.0_wp, 'shear traction')
+    if (allocated(error)) return
+    call check(error, largest(state(2)%pressure - state(1)%pressure), 0.0_wp, 0.0_wp, 'pressure')
+    if (allocated(error)) return
+    call check(error, state(2)%motion, state(1)%motion, 0.0_wp, 'motions')
   end subroutine test_threads
 
   subroutine test_bad_input(error)

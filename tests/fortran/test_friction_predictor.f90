@@ -6,10 +6,11 @@ module test_friction_predictor
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t
   use hc_friction_operators, only: operators_t, new_operators
+  use hc_friction_level, only: solve_level
   use hc_friction_predictor, only: predict
   use hc_frictional_contact, only: frictional_contact_t
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_true
+  use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
 
@@ -27,7 +28,9 @@ contains
     tests = [ &
       new_test('nothing_new', test_nothing_new), &
       new_test('change', test_change), &
-      new_test('too_few_nodes', test_too_few_nodes) &
+      new_test('too_few_nodes', test_too_few_nodes), &
+      new_test('astray', test_astray), &
+      new_test('cold_start', test_cold_start) &
     ]
   end subroutine collect_friction_predictor
 
@@ -91,18 +94,18 @@ contains
       if (allocated(error)) return
       call check_true(error, predicted, 'a prediction')
       if (allocated(error)) return
-      call check(error, maxval(abs(guess%pressure - state%pressure)), 0.0_wp, 1.0e-6_wp*p_max, 'pressure')
+      call check(error, largest(guess%pressure - state%pressure), 0.0_wp, 1.0e-12_wp*p_max, 'pressure')
       if (allocated(error)) return
-      call check(error, maxval(abs(guess%traction - state%traction)), 0.0_wp, 1.0e-6_wp*p_max, 'shear traction')
+      call check(error, largest(guess%traction - state%traction), 0.0_wp, 1.0e-12_wp*p_max, 'shear traction')
       if (allocated(error)) return
       call check(error, guess%motion, state%motion, 1.0e-7_wp, 'motions')
       if (allocated(error)) return
-      call check_true(error, work > 0.25_wp .and. work < 5.0_wp, 'work, in applications on the fine lattice')
+      call check_true(error, work > 1.1_wp .and. work < 1.44_wp, 'work, in applications on the fine lattice')
       if (allocated(error)) return
     end do
   end subroutine test_nothing_new
 
-  !> Of the change of a step, mostly that at the fronts is left to be found; of the motions less than a fiftieth.
+  !> Of the change of a step, mostly that at the fronts is left to be found; of the motions less than a hundredth.
   subroutine test_change(error)
     type(error_t), allocatable, intent(out) :: error
     type(frictional_contact_t) :: contact
@@ -128,16 +131,16 @@ contains
       if (allocated(error)) return
       call check_true(error, predicted, 'a prediction')
       if (allocated(error)) return
-      call check_true(error, norm2(guess%traction - after%traction) < 0.6_wp*norm2(state%traction - after%traction), &
+      call check_true(error, norm2(guess%traction - after%traction) < 0.58_wp*norm2(state%traction - after%traction), &
                       'shear traction')
       if (allocated(error)) return
-      call check_true(error, norm2(guess%motion - after%motion) < 0.02_wp*norm2(state%motion - after%motion), 'motions')
+      call check_true(error, norm2(guess%motion - after%motion) < 0.0073_wp*norm2(state%motion - after%motion), 'motions')
       if (allocated(error)) return
       if (i > 1) cycle
       ! where the slip zone only grows
       inside = count(after%zone == slip .and. &
                      hypot(guess%traction(:, :, 1), guess%traction(:, :, 2)) < 0.999_wp*mu*guess%pressure)
-      call check_true(error, inside < 0.05_wp*count(after%zone == slip), 'slip on the cone')
+      call check_true(error, inside < 0.039_wp*count(after%zone == slip), 'slip on the cone')
       if (allocated(error)) return
     end do
   end subroutine test_change
@@ -159,7 +162,63 @@ contains
     if (allocated(error)) return
     call check_true(error, .not. (predicted .or. work > 0.0_wp), 'no prediction')
     if (allocated(error)) return
-    call check(error, maxval(abs(guess%traction - state%traction)), 0.0_wp, 0.0_wp, 'the old state')
+    call check(error, largest(guess%traction - state%traction), 0.0_wp, 0.0_wp, 'the old state')
   end subroutine test_too_few_nodes
+
+  !> A step that does not converge from its prediction starts once more from the old state, and the work counts twice.
+  subroutine test_astray(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: state, next, alone
+    type(friction_problem_t) :: coarse(1)
+    type(operators_t) :: operators(1)
+    type(load_target_t) :: target
+    real(wp), parameter :: unreachable = 1.0e-30_wp
+
+    call set_up(24, contact, state, coarse, operators, error)
+    if (allocated(error)) return
+    target = load_target_t([f, f, f, d], [load, 0.7_wp*mu*load, 0.0_wp, 0.0_wp])
+    call contact%solve_step(state, state%relative_displacement, target, unreachable, 1, next, error)
+    if (allocated(error)) return
+    call new_operators(operators(1), contact%problem%lattice, contact%problem%pair, error, n_threads=1)
+    if (allocated(error)) return
+    call solve_level(contact%problem, operators(1), state, state%relative_displacement, target, unreachable, 1, alone, error)
+    if (allocated(error)) return
+    call check_true(error, .not. next%converged, 'one sweep is not enough')
+    if (allocated(error)) return
+    call check(error, next%sweeps, 2*alone%sweeps, 'sweeps from both starts')
+    if (allocated(error)) return
+    call check_true(error, next%operator_applications > 1.5_wp*alone%operator_applications, 'work from both starts')
+    if (allocated(error)) return
+    call check(error, maxval(abs(next%traction - alone%traction)), 0.0_wp, 0.0_wp, 'the state is that from the old one')
+  end subroutine test_astray
+
+  !> Without an earlier state the coarser lattices, here two, give a start that saves work; the answer is the same.
+  subroutine test_cold_start(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, cold, alone
+    type(operators_t) :: operators
+    type(load_target_t) :: target
+
+    call new_sphere(contact, 40, 0.4_wp, -0.2_wp, coulomb_t(mu), error, n_threads=1)
+    if (allocated(error)) return
+    call new_friction_state(virgin, contact%problem%lattice)
+    target = load_target_t([f, f, f, d], [load, 0.4_wp*mu*load, 0.2_wp*mu*load, 0.0_wp])
+    call contact%solve_step(virgin, virgin%relative_displacement, target, 1.0e-9_wp, 60, cold, error)
+    if (allocated(error)) return
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, error, n_threads=1)
+    if (allocated(error)) return
+    call solve_level(contact%problem, operators, virgin, virgin%relative_displacement, target, 1.0e-9_wp, 60, alone, error)
+    if (allocated(error)) return
+    call check_true(error, cold%converged .and. alone%converged, 'converged')
+    if (allocated(error)) return
+    call check(error, maxval(abs(cold%traction - alone%traction)), 0.0_wp, 1.0e-7_wp*mu, 'same traction')
+    if (allocated(error)) return
+    call check(error, cold%motion, alone%motion, 1.0e-8_wp, 'same motions')
+    if (allocated(error)) return
+    ! measured: 0.60
+    call check_true(error, cold%operator_applications < 0.66_wp*alone%operator_applications, 'less work')
+  end subroutine test_cold_start
 
 end module test_friction_predictor

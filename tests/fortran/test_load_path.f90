@@ -4,16 +4,17 @@ module test_load_path
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
-    normal, along_x, along_y, about_z
+  use hc_contact_residuals, only: tangential_residual
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, rim_reached, &
+    force_control, displacement_control, normal, along_x, along_y, about_z
   use hc_friction_law, only: coulomb_t
   use hc_friction_problem, only: friction_problem_t, friction_solver_t, new_friction_problem
   use hc_frictional_contact, only: frictional_contact_t
   use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction
   use hc_entry_state, only: entry_displacement
-  use hc_load_path, only: advance, touches_rim
+  use hc_load_path, only: advance
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_true
+  use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
 
@@ -23,6 +24,8 @@ module test_load_path
   type, extends(friction_solver_t) :: short_sighted_t
     !> How far load or motion may be from the start's
     real(wp) :: reach = huge(1.0_wp)
+    !> The relative displacement has to be counted from somewhere near, too
+    logical :: only_near = .false.
     !> Pressed harder than this, the rim is in contact
     real(wp) :: rim_load = huge(1.0_wp)
     !> Targets so far, and whether the relative displacement was counted from zero
@@ -42,6 +45,19 @@ module test_load_path
     procedure :: solve_step => record_step
   end type recorder_t
 
+  !> The real method, that does not converge unless it is asked for an accuracy.
+  type, extends(frictional_contact_t) :: demanding_t
+    real(wp) :: loosest = 0.0_wp
+    !> Whatever it finds counts as converged
+    logical :: content = .false.
+    !> Steps that it was asked for, and those that did not converge
+    integer :: calls = 0, failures = 0
+    !> Sweeps of all of them
+    integer :: sweeps = 0
+  contains
+    procedure :: solve_step => accurate_step
+  end type demanding_t
+
   integer, parameter :: f = force_control, d = displacement_control
 
 contains
@@ -53,6 +69,7 @@ contains
     tests = [ &
       new_test('whole', test_whole), &
       new_test('halved', test_halved), &
+      new_test('halved_at_first', test_halved_at_first), &
       new_test('bounded', test_bounded), &
       new_test('static', test_static), &
       new_test('motions', test_motions), &
@@ -62,7 +79,10 @@ contains
       new_test('part_of_window', test_part_of_window), &
       new_test('entry_ring', test_entry_ring), &
       new_test('entry_patch', test_entry_patch), &
-      new_test('entry_oblique', test_entry_oblique) &
+      new_test('entry_rim', test_entry_rim), &
+      new_test('entry_oblique', test_entry_oblique), &
+      new_test('entry_accurate', test_entry_accurate), &
+      new_test('entry_endless', test_entry_endless) &
     ]
   end subroutine collect_load_path
 
@@ -91,6 +111,8 @@ contains
     state%operator_applications = 2.0_wp
     state%residual_normal = maxval(abs(target%value - merge(start%load, start%motion, target%control == f)))
     state%converged = state%residual_normal <= self%reach
+    if (self%only_near) state%converged = state%converged .and. maxval(abs(state%slip_increment)) <= self%reach
+    state%clipped = touches_rim(state)
     if (tolerance < 0.0_wp) allocate (error)
   end subroutine solve_step
 
@@ -159,6 +181,8 @@ contains
 
     call set_up(solver, state, error)
     if (allocated(error)) return
+    ! contact, without any load
+    state%pressure(2, 2) = tiny(1.0_wp)
     solver%reach = 2.5_wp
     call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
     if (allocated(error)) return
@@ -184,6 +208,38 @@ contains
     ! loads 1, 2, 3, 4 over 1 m each
     call check(error, [next%accumulated_slip(2, 2), next%dissipated_energy], [4.0_wp, 10.0_wp], 1.0e-14_wp, 'path and energy')
   end subroutine test_halved
+
+  !> A step that begins without contact is solved as one, its parts are starts; if that fails they are a path.
+  subroutine test_halved_at_first(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(short_sighted_t) :: solver
+    type(contact_state_t) :: state, next
+
+    call set_up(solver, state, error)
+    if (allocated(error)) return
+    state%relative_displacement(:, :, 1) = 1.0_wp
+    state%accumulated_slip = 0.5_wp
+    state%dissipated_energy = 2.0_wp
+    solver%reach = 2.5_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 6, next, error)
+    if (allocated(error)) return
+    call check(error, solver%value(2, :solver%calls), [4.0_wp, 2.0_wp, 1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp], 0.0_wp, 'starts')
+    if (allocated(error)) return
+    ! from 1 m to -4 m under the last load, and not a part of it under each of them
+    call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
+               [-5.0_wp, 5.5_wp, 22.0_wp], 1.0e-14_wp, 'slip, path and energy of one step')
+    if (allocated(error)) return
+    call check(error, next%cuts, 2, 'cuts')
+    if (allocated(error)) return
+    solver%calls = 0
+    solver%only_near = .true.
+    call advance(solver, state, load_target_t(value=[8.0_wp, 4.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 3, next, error)
+    if (allocated(error)) return
+    call check_true(error, next%converged .and. next%cuts == 2, 'a path')
+    if (allocated(error)) return
+    call check(error, [next%slip_increment(2, 2, 1), next%accumulated_slip(2, 2), next%dissipated_energy], &
+               [-5.0_wp, 5.5_wp, 13.0_wp], 1.0e-14_wp, 'slip, path and energy of the parts')
+  end subroutine test_halved_at_first
 
   !> As many cuts as are allowed, then a state that says so; the state handed in is as it was.
   subroutine test_bounded(error)
@@ -273,6 +329,16 @@ contains
     call check_true(error, touches_rim(next) .and. .not. touches_rim(state), 'contact at the rim')
     if (allocated(error)) return
     call check(error, next%load(normal), 4.0_wp, 0.0_wp, 'the first part that reaches the rim is the last')
+    if (allocated(error)) return
+    call check_true(error, next%clipped .and. .not. next%converged .and. next%stopped == rim_reached, 'a part is no solution')
+    if (allocated(error)) return
+    call check(error, next%residual_force, 0.5_wp, 1.0e-15_wp, 'half of the load of the step is missing')
+    if (allocated(error)) return
+    ! an attempt that failed may have pressure anywhere
+    solver%reach = 0.5_wp
+    call advance(solver, state, load_target_t(value=[8.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-8_wp, 40, 0, next, error)
+    if (allocated(error)) return
+    call check_true(error, touches_rim(next) .and. .not. (next%clipped .or. next%converged), 'not clipped, but not converged')
   end subroutine test_rim
 
   !> Too few sweeps for a whole step, but enough for its parts: the solution is that of explicit parts.
@@ -323,10 +389,19 @@ contains
     if (allocated(error)) return
     call check(error, cut%dissipated_energy, parts%dissipated_energy, 1.0e-8_wp*abs(parts%dissipated_energy), 'energy')
     if (allocated(error)) return
+    ! each part fulfils the conditions; the record does not, as one step, and its residual says so
+    associate (problem => contact%problem)
+      call check(error, cut%residual_tangential, &
+                 tangential_residual(cut%traction, cut%slip_increment, cut%pressure, problem%friction, &
+                                     problem%tangential_compliance, 1), 0.0_wp, 'residual of what is recorded')
+    end associate
+    if (allocated(error)) return
+    call check_true(error, cut%converged .and. cut%residual_tangential > 1.0e-3_wp, 'a residual that is not hidden')
+    if (allocated(error)) return
     ! and it is another solution than that of the whole step
     call advance(contact, pressed, target, .false., tolerance, 60, 0, next, error)
     if (allocated(error)) return
-    call check_true(error, maxval(abs(next%traction - parts%traction)) > 1.0e-4_wp*mu, 'the size of a step matters')
+    call check_true(error, largest(next%traction - parts%traction) > 1.0e-4_wp*mu, 'the size of a step matters')
   end subroutine test_half_steps
 
   !> The real method, noting what it has reached.
@@ -376,17 +451,17 @@ contains
     call check(error, reshape(state(2)%slip_increment, [882]), reshape(state(1)%slip_increment, [882]), 1.0e-8_wp, &
                'same slip')
     if (allocated(error)) return
-    call check_true(error, maxval(abs(next%traction - state(1)%traction)) > 0.05_wp*mu, 'another history, another traction')
+    call check_true(error, largest(next%traction - state(1)%traction) > 0.05_wp*mu, 'another history, another traction')
   end subroutine test_any_start
 
   !> A circular contact grows by 4 and by 12 spacings: near its edge s - s_e is linear in the distance d if the
-  !> edge slips, and goes with d^(3/2) if it sticks. Found to 2 and 1 % of the motion outside.
+  !> edge slips, and goes with d^(3/2) if it sticks. Found to 2 and 0.13 % of the motion outside.
   subroutine test_entry_ring(error)
     type(error_t), allocatable, intent(out) :: error
     type(recorder_t) :: solver
     type(contact_state_t) :: before, after
     real(wp), allocatable :: r(:, :), u(:, :, :), expected(:, :, :)
-    real(wp), parameter :: old = 0.4_wp, power(2) = [1.0_wp, 1.5_wp], allowed(2) = [0.025_wp, 0.015_wp]
+    real(wp), parameter :: old = 0.4_wp, power(2) = [1.0_wp, 1.5_wp], allowed(2) = [0.0201_wp, 0.00133_wp]
     real(wp) :: new, scale
     integer :: i, k
 
@@ -464,13 +539,13 @@ contains
     call check_true(error, count(after%pressure > 0.0_wp) > 100, 'many nodes enter')
     if (allocated(error)) return
     do i = 1, 2
-      call check(error, maxval(abs(u(:, :, i) - merge(shift(i)*gap/closing, 0.0_wp, after%pressure > 0.0_wp))), 0.0_wp, &
+      call check(error, largest(u(:, :, i) - merge(shift(i)*gap/closing, 0.0_wp, after%pressure > 0.0_wp)), 0.0_wp, &
                  1.0e-12_wp, 'share of the shift')
       if (allocated(error)) return
     end do
     ! nothing enters: nothing is displaced
     u = entry_displacement(solver%problem, after, after)
-    call check(error, maxval(abs(u)), 0.0_wp, 0.0_wp, 'nothing enters')
+    call check(error, largest(u), 0.0_wp, 0.0_wp, 'nothing enters')
   end subroutine test_entry_patch
 
   !> Oblique load that makes nothing slip, shift 3SQ/16a (exact for nu = 0): after three steps within the mesh error,
@@ -499,7 +574,7 @@ contains
     end do
     call check_true(error, abs(missing(1)) > 0.1_wp, 'slip from the beginning of the step')
     if (allocated(error)) return
-    call check(error, missing(2), 0.0_wp, 3.0e-3_wp, 'slip from the entry')
+    call check(error, missing(2), 0.0_wp, 4.7e-4_wp, 'slip from the entry')
     if (allocated(error)) return
     call check_true(error, state%dissipated_energy <= 1.0e-12_wp .and. all(state%zone /= 2), 'nothing slips')
   end subroutine test_entry_oblique
@@ -534,16 +609,137 @@ contains
       call check_true(error, state%converged .and. expected%converged, 'both converge')
       if (allocated(error)) return
       scale = maxval(expected%pressure)
-      call check(error, maxval(abs(state%pressure - expected%pressure)), 0.0_wp, 1.0e-7_wp*scale, 'pressure')
+      call check(error, largest(state%pressure - expected%pressure), 0.0_wp, 1.0e-7_wp*scale, 'pressure')
       if (allocated(error)) return
-      call check(error, maxval(abs(state%traction - expected%traction)), 0.0_wp, 1.0e-7_wp*scale, 'shear traction')
+      call check(error, largest(state%traction - expected%traction), 0.0_wp, 1.0e-7_wp*scale, 'shear traction')
       if (allocated(error)) return
-      call check(error, maxval(abs(state%relative_displacement - expected%relative_displacement)), 0.0_wp, &
+      call check(error, largest(state%relative_displacement - expected%relative_displacement), 0.0_wp, &
                  1.0e-7_wp*expected%motion(normal), 'relative displacement, outside the part too')
       if (allocated(error)) return
-      if (i == 2) call check_true(error, 2.0_wp*state%operator_applications < expected%operator_applications, 'less work')
+      if (i == 2) call check_true(error, 4.4_wp*state%operator_applications < expected%operator_applications, 'less work')
       if (allocated(error)) return
     end do
   end subroutine test_part_of_window
+
+  !> The real method, not converged if asked for less than it demands.
+  subroutine accurate_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(demanding_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+
+    self%calls = self%calls + 1
+    call self%frictional_contact_t%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
+    if (allocated(error)) return
+    self%sweeps = self%sweeps + state%sweeps
+    state%converged = self%content .or. (state%converged .and. tolerance <= self%loosest)
+    if (.not. state%converged) self%failures = self%failures + 1
+  end subroutine accurate_step
+
+  !> Entry states begin with inaccurate solutions. If one of them fails, the step is solved accurately before it is
+  !> halved, once; if that fails, too, it is halved as often as it may be.
+  subroutine test_entry_accurate(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(demanding_t) :: solver
+    type(frictional_contact_t) :: plain
+    type(contact_state_t) :: virgin, pressed, expected, next
+    type(load_target_t) :: target
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.3_wp, tolerance = 1.0e-8_wp
+    integer :: k
+
+    call new_sphere(plain, 10, 0.3_wp, 0.1_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_sphere(solver%frictional_contact_t, 10, 0.3_wp, 0.1_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, plain%problem%lattice)
+    call advance(plain, virgin, load_target_t(value=[0.4_wp*load, 0.0_wp, 0.0_wp, 0.0_wp]), .false., tolerance, 60, 0, &
+                 pressed, error)
+    if (allocated(error)) return
+    ! under load and under approach: both say whether nodes will enter
+    do k = 1, 2
+      target = load_target_t(value=[load, 0.1_wp*mu*load, 0.0_wp, 0.0_wp])
+      if (k == 2) then
+        target%control(normal) = d
+        target%value(normal) = expected%motion(normal)
+      end if
+      call advance(plain, pressed, target, .false., tolerance, 60, 0, expected, error, interpolated=.true.)
+      if (allocated(error)) return
+      solver%loosest = tolerance
+      solver%failures = 0
+      call advance(solver, pressed, target, .false., tolerance, 60, 0, next, error, interpolated=.true.)
+      if (allocated(error)) return
+      call check_true(error, expected%converged .and. next%converged, 'converged')
+      if (allocated(error)) return
+      call check(error, solver%failures, 1, 'an inaccurate solution is tried once')
+      if (allocated(error)) return
+      call check(error, maxval(abs(next%traction - expected%traction)), 0.0_wp, 1.0e-6_wp*mu, 'same traction')
+      if (allocated(error)) return
+    end do
+
+    solver%loosest = 0.0_wp
+    solver%calls = 0
+    call advance(solver, pressed, target, .false., tolerance, 60, 2, next, error, interpolated=.true.)
+    if (allocated(error)) return
+    call check_true(error, .not. next%converged .and. next%cuts == 2, 'halved in vain')
+    if (allocated(error)) return
+    call check(error, solver%calls, 6, 'each part inaccurately and accurately')
+  end subroutine test_entry_accurate
+
+  !> A patch that enters at a corner of the window has the entry states of one inside; where all nodes of the window
+  !> enter, none is left that moved outside, and nothing is known of their motion.
+  subroutine test_entry_rim(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(recorder_t) :: solver
+    type(contact_state_t) :: before, after
+    real(wp), allocatable :: u(:, :, :), gap(:, :)
+    real(wp), parameter :: closing = 0.3_wp, shift = 2.0_wp
+
+    call new_sphere(solver%frictional_contact_t, 20, 0.0_wp, 0.0_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    associate (x => solver%problem%x, y => solver%problem%y)
+      gap = 0.5_wp*((x - x(1, 1))**2 + (y - y(1, 1))**2)
+    end associate
+    solver%problem%initial_gap = gap
+    call new_friction_state(before, solver%problem%lattice)
+    call new_friction_state(after, solver%problem%lattice)
+    after%relative_displacement(:, :, 1) = shift
+    after%gap = max(gap - closing, 0.0_wp)
+    after%pressure = max(closing - gap, 0.0_wp)
+    u = entry_displacement(solver%problem, before, after)
+    call check_true(error, after%pressure(1, 1) > 0.0_wp .and. count(after%pressure > 0.0_wp) > 50, 'contact at the corner')
+    if (allocated(error)) return
+    call check(error, maxval(abs(u(:, :, 1) - merge(shift*gap/closing, 0.0_wp, after%pressure > 0.0_wp))), 0.0_wp, &
+               1.0e-12_wp, 'share of the shift')
+    if (allocated(error)) return
+    after%gap = 0.0_wp
+    after%pressure = 1.0_wp
+    u = entry_displacement(solver%problem, before, after)
+    call check(error, maxval(abs(u)), 0.0_wp, 0.0_wp, 'all nodes enter')
+  end subroutine test_entry_rim
+
+  !> Entry states that never settle are corrected so many times, and the step has not converged.
+  subroutine test_entry_endless(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(demanding_t) :: solver
+    type(contact_state_t) :: virgin, next
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, unreachable = 1.0e-30_wp
+
+    call new_sphere(solver%frictional_contact_t, 6, 0.3_wp, 0.1_wp, coulomb_t(0.3_wp), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, solver%problem%lattice)
+    solver%content = .true.
+    call advance(solver, virgin, load_target_t(value=[load, 0.1_wp*load, 0.0_wp, 0.0_wp]), .false., unreachable, 3, 0, &
+                 next, error, interpolated=.true.)
+    if (allocated(error)) return
+    call check_true(error, .not. next%converged, 'not converged')
+    if (allocated(error)) return
+    call check(error, solver%calls, 40, 'corrections')
+    if (allocated(error)) return
+    call check(error, next%sweeps, solver%sweeps, 'sweeps of all of them')
+  end subroutine test_entry_endless
 
 end module test_load_path

@@ -16,7 +16,7 @@ module test_normal_contact
   use hc_contact_state, only: contact_state_t, force_control, displacement_control
   use hc_contact_residuals, only: normal_residual, normal_self_compliance
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
-  use testing, only: test_t, new_test, check, check_true
+  use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
 
@@ -66,7 +66,7 @@ contains
         call kernel%row(j, row)
         do i = -11, 11
           all_kernels = pyramid%kernels(i*basis(1, 1) + j*basis(1, 2), i*basis(2, 1) + j*basis(2, 2))
-          worst = max(worst, abs(row(1, i)/all_kernels(k_1) - 1.0_wp))
+          worst = largest([worst, row(1, i)/all_kernels(k_1) - 1.0_wp])
         end do
       end do
       call check(error, worst, 0.0_wp, 1.0e-14_wp, 'kernel')
@@ -86,7 +86,7 @@ contains
     worst = 0.0_wp
     do i = 1, size(f, 2)
       all_symbols = kernel_symbols(equilateral_basis(0.3_wp), length, f(:, i))
-      worst = max(worst, abs(symbol(i)/all_symbols(1) - 1.0_wp))
+      worst = largest([worst, symbol(i)/all_symbols(1) - 1.0_wp])
     end do
     call check(error, worst, 0.0_wp, 1.0e-13_wp, 'symbol of K1')
   end subroutine test_symbols
@@ -107,7 +107,7 @@ contains
     exact = hertz(fine)
     call prolong(coarse, p, fine, plain)
     call prolong_edge(coarse, p, fine, edge)
-    call check_true(error, norm2(edge - exact) < norm2(plain - exact)/8.0_wp, 'the edge is found between nodes')
+    call check_true(error, norm2(edge - exact) < norm2(plain - exact)/8.8_wp, 'the edge is found between nodes')
 
   contains
 
@@ -328,7 +328,7 @@ contains
     call check(error, residual, state%residual_normal, 0.1_wp*tolerance, 'residual')
   end subroutine test_true_residual
 
-  !> At most twelve scalar products, whatever the mesh; corrections in single precision count half.
+  !> At most seven scalar products, whatever the mesh; corrections in single precision count half.
   subroutine test_few_products(error)
     type(error_t), allocatable, intent(out) :: error
     type(normal_contact_t) :: solver
@@ -343,7 +343,7 @@ contains
       if (allocated(error)) return
       call solver%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 60, state, error)
       if (allocated(error)) return
-      call check_true(error, state%converged .and. 3.0_wp*state%operator_applications <= 12.0_wp, 'few products')
+      call check_true(error, state%converged .and. 3.0_wp*state%operator_applications <= 7.06_wp, 'few products')
       if (allocated(error)) return
       n = 2*n
     end do
@@ -369,9 +369,9 @@ contains
     if (allocated(error)) return
     call solver%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 60, state, error)
     if (allocated(error)) return
-    call check_true(error, state%converged .and. 3.0_wp*state%operator_applications < 4.0_wp, 'little work')
+    call check_true(error, state%converged .and. 3.0_wp*state%operator_applications < 2.5_wp, 'little work')
     if (allocated(error)) return
-    call check(error, state%motion(normal), 1.0_wp, 2.0e-4_wp, 'approach of Hertz')
+    call check(error, state%motion(normal), 1.0_wp, 1.2e-4_wp, 'approach of Hertz')
     if (allocated(error)) return
     ! another load, which needs another part, and the first one again
     call solver%solve(force_control, 0.1_wp, 1.0e-8_wp, 60, small, error)

@@ -3,7 +3,7 @@ module test_testing
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use testing, only: test_t, new_test, check, check_true, check_raised, check_succeeded, fail, open_table
+  use testing, only: test_t, new_test, check, check_true, check_raised, check_succeeded, fail, largest, open_table
   implicit none
   private
 
@@ -25,7 +25,8 @@ contains
   subroutine test_values(error)
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: caught
-    logical :: right(8)
+    logical :: right(10)
+    real(wp) :: field(2, 2)
 
     call check(caught, 1.0_wp, 1.0_wp + 1.0e-13_wp, 1.0e-12_wp, 'close')
     right(1) = .not. allocated(caught)
@@ -43,6 +44,13 @@ contains
     right(7) = allocated(caught)
     call check_true(caught, .true., 'right statement')
     right(8) = .not. allocated(caught)
+    ! one value of many that is no number
+    field = 1.0_wp
+    field(2, 1) = ieee_value(1.0_wp, ieee_quiet_nan)
+    call check(caught, largest(field), 1.0_wp, 1.0e-12_wp, 'a NaN in a field')
+    right(9) = allocated(caught)
+    call check(caught, largest([1.0_wp, -3.0_wp]), 3.0_wp, 0.0_wp, 'largest magnitude')
+    right(10) = .not. allocated(caught)
     if (.not. all(right)) call fail(error, 'a check of values does not tell right from wrong')
   end subroutine test_values
 

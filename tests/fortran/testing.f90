@@ -10,7 +10,7 @@
 !>     call check(error, computed, expected, 1.0e-12_wp, 'where in the test')
 !>     if (allocated(error)) return
 module testing
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: output_unit
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -19,7 +19,7 @@ module testing
 
   public :: test_t, suite_t, new_test, new_suite, run_suites
   public :: check, check_true, check_raised, check_succeeded, fail
-  public :: data_file, open_table
+  public :: data_file, largest, open_table
 
   !> A named test.
   type :: test_t
@@ -54,6 +54,11 @@ module testing
     !> Lists the tests
     procedure(collect_interface), pointer, nopass :: collect => null()
   end type suite_t
+
+  !> Largest magnitude of a field; not a number if any of its values is none, which maxval would pass over.
+  interface largest
+    module procedure largest_of_vector, largest_of_field, largest_of_fields
+  end interface largest
 
   !> A value against what is expected.
   interface check
@@ -107,6 +112,7 @@ contains
       call suites(i)%collect(tests)
       do j = 1, size(tests)
         if (test_name /= '' .and. test_name /= tests(j)%name) cycle
+        call seed_random_numbers()
         call tests(j)%run(error)
         if (allocated(error)) then
           n_failed = n_failed + 1
@@ -124,6 +130,44 @@ contains
     end if
     write (output_unit, '(i0,a,i0,a)') n_passed, ' passed, ', n_failed, ' failed'
   end subroutine run_suites
+
+  !> Begin each test with the same random numbers, whichever tests ran before it.
+  subroutine seed_random_numbers()
+    integer, allocatable :: seed(:)
+    integer :: n, i
+
+    call random_seed(size=n)
+    seed = [(104729*i + 7, i=1, n)]
+    call random_seed(put=seed)
+  end subroutine seed_random_numbers
+
+  !> Largest magnitude of a vector.
+  pure real(wp) function largest_of_vector(x) result(value)
+    !> Values
+    real(wp), intent(in) :: x(:)
+
+    if (any(ieee_is_nan(x))) then
+      value = ieee_value(value, ieee_quiet_nan)
+    else
+      value = maxval(abs(x))
+    end if
+  end function largest_of_vector
+
+  !> Largest magnitude of a field.
+  pure real(wp) function largest_of_field(x) result(value)
+    !> Values
+    real(wp), intent(in) :: x(:, :)
+
+    value = largest_of_vector(reshape(x, [size(x)]))
+  end function largest_of_field
+
+  !> Largest magnitude of several fields.
+  pure real(wp) function largest_of_fields(x) result(value)
+    !> Values
+    real(wp), intent(in) :: x(:, :, :)
+
+    value = largest_of_vector(reshape(x, [size(x)]))
+  end function largest_of_fields
 
   !> Compare a real; NaN fails.
   subroutine check_real(error, value, expected, threshold, what)

@@ -18,6 +18,7 @@ LINES = (
     *("tolerance = 1e-14", "coefficient = inf", "coefficient = 1e300", "rigid = true", "\x00", "\ufeff"),
     *("= 1", "a = ", "# é", "\r\r\n", 'include = ["deck.toml"]', "values = [0.1, 0.1, 1]"),
     "[[load]]\npath = [{ normal_load = 1 }]\nrepeat = 50000",
+    *('include = ["/dev/zero"]', '"\\u001b[2J" = 1', 'title = "\\u001b[2J\\u009b2J"'),
 )
 _VALUE = re.compile(r"(?<==)\s*(\"[^\"\n]*\"|[-+\w.]+)")
 _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?")

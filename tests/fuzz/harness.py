@@ -14,6 +14,7 @@ import typer
 
 CLEAN = {0, 2, 3, 4}  # exit codes of the documentation: done, input, no convergence, resources
 LONGEST = 20.0  # s of processor time, of which a command that hangs takes more
+_OBEYED = re.compile("[\0-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e]")
 _MARKED = re.compile(r"hexcontact: |step +\d+/|.*: \d+ load steps?(, after step \d+)?$")
 
 
@@ -72,6 +73,7 @@ def complaints(end: Ending, as_json: bool = True) -> list[str]:
         found.append("an error without a sentence, or a sentence without an error")
     if "Traceback" in end.error:
         found.append("traceback")
+    found += [f"obeyed by a terminal: {word!r}" for word in _OBEYED.findall(end.out + end.error)]
     found += [f"not marked as ours: {line!r}" for line in end.error.splitlines() if not _MARKED.match(line)]
     if as_json:
         try:

@@ -2,7 +2,8 @@
 
 Each run is a fork of this process, which has loaded everything but solved nothing; that takes milliseconds
 where a new process takes a second. ``python killed_runs.py FOLDER COUNT SEED`` prints for each run
-when it was killed, and how many finished steps there were.
+when it was killed, and how many finished steps there were. With ``signals`` behind, it is the command that
+runs, and gets signals instead.
 """
 
 import builtins
@@ -22,7 +23,7 @@ import psutil  # noqa: F401
 import xarray  # noqa: F401
 
 import hexcontact
-from hexcontact import restart, store  # noqa: F401
+from hexcontact import cli, restart, store  # noqa: F401
 from hexcontact.case import Case
 from hexcontact.result import Step
 
@@ -160,5 +161,66 @@ def main(folder: Path, count: int, seed: int) -> None:
     print("kills", kills)
 
 
+def commanded(words: list[str], sent: signal.Signals, delay: float | None = None) -> int:
+    """Run the command in a process of its own, signaled after `delay` seconds; return its exit code."""
+
+    def work() -> None:
+        devnull = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(devnull, 1)
+        os.dup2(devnull, 2)
+        sys.argv = ["hexcontact", *words]
+        try:
+            cli.main()
+        except KeyboardInterrupt:
+            os._exit(130)
+        except SystemExit as ending:
+            time.sleep(0.01)  # for a signal that comes as the process ends
+            os._exit(ending.code if isinstance(ending.code, int) else 1)
+
+    child = os.fork()
+    if child == 0:
+        work()
+        os._exit(0)
+    if delay is not None:
+        time.sleep(delay)
+        os.kill(child, sent)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def signaled(folder: Path, count: int, seed: int) -> None:
+    """Signal `count` runs of the command until they are complete; compare codes with what is there."""
+    rng = random.Random(seed)
+    deck = folder / "deck.toml"
+    deck.write_text(made().deck_text)
+    began = time.monotonic()
+    assert commanded(["run", str(deck), "-o", str(folder / "timed.nc")], signal.SIGTERM) == 0
+    duration = time.monotonic() - began
+    signals = 0
+    for number in range(count):
+        out = folder / f"{number}.nc"
+        story: list[str] = []
+        for attempt in range(MOST_KILLS + 1):
+            there = out.exists() or bool(store.Journal(store.journal_of(out)))
+            words = ["resume", str(out)] if there else ["run", str(deck), "-o", str(out)]
+            sent = rng.choice([signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+            delay = rng.uniform(0.0, duration) if attempt < MOST_KILLS else None
+            code = commanded(words, sent, delay)
+            story += [words[0], sent.name, f"{delay or 0.0:.4f} s", str(code)]
+            signals += delay is not None
+            whole = out.exists() and in_fork(lambda out=out: _assert_complete(out)) == 0  # type: ignore[misc]
+            # before the command has taken the signals over they have their usual effect
+            assert code in ((0,) if whole else (128 + sent, -sent)), f"{out}: {story}"
+            if whole:
+                break
+        print(number, *story, sep=", ", flush=True)
+    print("signals", signals)
+
+
+def _assert_complete(out: Path) -> None:
+    if not store.read_output(out).complete:
+        os._exit(3)
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+    work = signaled if "signals" in sys.argv[4:] else main
+    work(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))

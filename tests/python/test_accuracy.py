@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
+from validation.error_bars import PROBLEMS, estimates_over_errors
 
 import hexcontact
 from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError, accuracy, refinement
 from hexcontact.accuracy import RATIO, SHIFTS
 from hexcontact.cli import app
-from hexcontact.report import report
+from hexcontact.plotting.report import report
 from hexcontact.surfaces import Sphere
 from hexcontact.trial_folder import TrialFolder
 from hexcontact.variables import ESTIMATED, VARIABLES
-from hexcontact.verify_accuracy import PROBLEMS, estimates_over_errors
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SHEARED = {
@@ -47,14 +47,20 @@ def test_true_errors_lie_within_the_estimate(problem: str) -> None:
 
     In the median the estimates are 3 to 23 times the true error; what is twice as wide is of little use.
     """
-    for name, ratios in estimates_over_errors(problem, 100, seed=1).items():
+    found = estimates_over_errors(problem, 100, seed=1)
+    assert len(found) >= 4
+    for name, ratios in found.items():
+        assert len(ratios) >= 100
         assert np.mean(ratios >= 1.0) >= 0.95, name
-        assert 2.0 < np.median(ratios) < 30.0, name
+        assert 2.0 < np.median(ratios) < 25.5, name
 
 
 def test_true_errors_lie_within_the_estimate_on_the_way_to_a_target() -> None:
     """To stop where the estimate happens to be small does not spoil it."""
-    for name, ratios in estimates_over_errors("Hertz", 60, seed=2, target=0.01).items():
+    found = estimates_over_errors("Hertz", 60, seed=2, target=0.01)
+    assert len(found) >= 4
+    for name, ratios in found.items():
+        assert len(ratios) >= 60
         assert np.mean(ratios >= 1.0) >= 0.95, name
         assert np.median(ratios) < 30.0, name
 
@@ -75,13 +81,13 @@ def test_orders_beyond_the_bounds_are_not_believed() -> None:
     values = np.array([1.0, 1.04, 1.44, 1.44, 1.44, 1.44, 1.44])[:, None]
     assert accuracy.limits_of_error(SPACINGS, values)[0] > 0.44 / 3.0
     values = (3.0 + 0.1 * SPACINGS**0.5)[:, None]  # order 1/2 would promise 0.1
-    assert accuracy.limits_of_error(SPACINGS, values)[0] < 0.1
+    assert accuracy.limits_of_error(SPACINGS, values)[0] < 0.059
 
 
 def test_scatter_alone_gives_a_floor() -> None:
     """Where the lattices agree by chance, the shifted copies tell that it was chance."""
     values = np.array([1.0, 1.0, 1.0, 1.02, 0.98, 1.01, 0.99])[:, None]
-    assert 0.005 < accuracy.limits_of_error(SPACINGS, values)[0] < 0.05
+    assert 0.005 < accuracy.limits_of_error(SPACINGS, values)[0] < 0.0332
     assert accuracy.limits_of_error(SPACINGS, np.ones((7, 1)))[0] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -214,9 +220,10 @@ def test_windows_of_finer_and_shifted_lattices_hold_the_contact(grid: dict[str, 
         assert lattice.spacing == pytest.approx(first.spacing / RATIO**trial.level)
         shift = SHIFTS[trial.copy - 1] @ lattice.basis if trial.copy else np.zeros(2)
         assert_allclose(lattice.origin, first.origin + shift, atol=1e-12 * first.spacing)
-        assert (lattice.shape == first.shape) or trial.level + trial.copy > 0
+        if trial == refinement.Trial(0):
+            assert lattice == first
         ratio = lattice.size * lattice.cell_area / (first.size * first.cell_area)
-        assert 0.4 < ratio < 1.3
+        assert 0.4 < ratio < 1.1
         step = next(iter(other.run().dataset.pressure.values))
         assert step.max() > 0.0
         assert not any(step[edge].any() for edge in ((0,), (-1,), (slice(None), 0), (slice(None), -1)))
@@ -364,7 +371,9 @@ def test_terminal_page_and_file_show_the_errors(tmp_path: Path, monkeypatch: pyt
     assert "target 10 % reached" in info
     page = report(hexcontact.open_result("deck.nc"))
     assert "<caption>Accuracy</caption>" in page
-    assert " \\u00b1 " in page or " ± " in page
+    assert re.search(
+        r'"approach", ?"\d\.\d+ µm ± \d\S* %"', page.replace("\\u00b5", "µ").replace("\\u00b1", "±")
+    )
     with netCDF4.Dataset("deck.nc") as file:
         assert file["max_pressure"].ancillary_variables == "max_pressure_error"
         assert file["trial_max_pressure"].dimensions == ("trial", "step")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from hexcontact import Case, ConvergenceError, DeckError, adaptive_steps, estimates, summary
+from hexcontact import Case, ConvergenceError, DeckError, adaptive_steps, estimates, remarks, summary
 from hexcontact.progress import Lines, describe
 from hexcontact.restart import resume
 from hexcontact.result import Result, Step
@@ -67,7 +67,7 @@ def errors(result: Result, reference: Result) -> tuple[np.ndarray, np.ndarray]:
     """Return the errors of the stick area and their bounds, as shares of the largest contact area."""
     there = reference.dataset.isel(step=slice(FINER - 1, None, FINER))
     assert there.sizes["step"] == len(result)
-    np.testing.assert_allclose(there.normal_load, result.normal_load, rtol=1e-3)
+    np.testing.assert_allclose(there.normal_load, result.normal_load, rtol=3e-5)
     area = float(there.contact_area_fit.max())
     error = np.abs(result.stick_area_fit.values - there.stick_area_fit.values) / area
     return error, result.stick_area_step_error.values / area
@@ -109,7 +109,7 @@ def test_a_smaller_tolerance_makes_a_smaller_error() -> None:
     assert abs(float(fine.shift_x[-1]) - end) < 0.5 * abs(float(coarse.shift_x[-1]) - end)
     area = float(exact.contact_area_fit.max())
     off = [abs(float(r.stick_area_fit[-1] - exact.stick_area_fit[-1])) / area for r in (coarse, fine)]
-    assert off[1] < 0.01
+    assert off[1] < 0.00183
     assert off[1] <= off[0]
     assert float(fine.stick_area_step_error[-1]) < float(coarse.stick_area_step_error[-1])
     assert float(fine.traction_step_change[-1]) < 0.5 * float(coarse.traction_step_change[-1])
@@ -134,7 +134,7 @@ def test_what_halving_changes_is_what_halving_changes() -> None:
     np.testing.assert_allclose(changed, float(halves.stick_area_fit - whole.stick_area_fit))
     dx, dy = whole.traction_x - halves.traction_x, whole.traction_y - halves.traction_y
     share = float(np.hypot(dx, dy).sum() / (0.1 * halves.pressure.sum()))
-    np.testing.assert_allclose(float(last.traction_step_change), share, rtol=0.1)  # of the largest contact
+    np.testing.assert_allclose(float(last.traction_step_change), share, rtol=0.039)  # of the largest contact
     assert 2 * abs(changed) < float(last.stick_area_step_error) <= float(last.contact_area_fit)
     assert float(last.dissipated_energy_step) == float(halves.dissipated_energy)
     assert float(last.operator_applications) == pytest.approx(work(one) + work(two), rel=1e-14)
@@ -227,7 +227,7 @@ def test_given_and_chosen_steps_may_follow_each_other() -> None:
     assert result["step"].values.tolist() == list(range(1, len(result) + 1))
     let_go = result.dataset.isel(step=result.segment.values == 3)
     assert abs(float(let_go.tangential_load_x[-1])) < 1e-9
-    assert float(let_go.tangential_load_x[0]) > 0.0 or let_go.sizes["step"] == 1
+    assert float(let_go.tangential_load_x[0]) > 0.0
 
 
 def test_rows_of_a_series_are_segments() -> None:
@@ -268,11 +268,11 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
         case.run(on_step=on_step)
     last, number = histories[-1], len(histories)
     assert last["stick_area_step_error"] > 1e-4 * last["contact_area_fit"]
-    assert summary.limited_steps(histories, 1e-4) == (
+    assert remarks.limited_steps(histories, 1e-4) == (
         f"1 of {number} load steps change more by halving than solver.step_tolerance = 0.0001, and smaller "
         f"ones did not help: step {number}; their stick_area_step_error holds"
     )
-    assert summary.limited_steps(histories[:-1], 1e-4) == ""
+    assert remarks.limited_steps(histories[:-1], 1e-4) == ""
 
 
 def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -336,7 +336,7 @@ def test_an_unfinished_run_does_not_name_a_number(tmp_path: Path) -> None:
     assert "1 load step is finished and kept in" in error.value.__notes__[0]
     part = open_result(out)
     assert not part.complete
-    assert "1 load step of an open number of (unfinished run)" in repr(part) or "1 load step" in repr(part)
+    assert repr(part).splitlines()[1].startswith("  1 load step (unfinished run), ")
     assert ("load steps", "1 (unfinished, their number was open)") in summary.file_rows(part)
     journal = Journal(journal_of(out))
     assert not journal.complete

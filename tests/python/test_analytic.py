@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from hexcontact import analytic, analytic_friction
+from hexcontact import analytic
+from hexcontact.analytic import friction as analytic_friction
 
 TABLE = Path(__file__).parents[1] / "reference" / "benchmarks.csv"
 with TABLE.open(newline="") as stream:

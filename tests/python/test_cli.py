@@ -11,13 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import drawn
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import native
+from hexcontact import native, plotting
 from hexcontact.cli import app
 from hexcontact.store import journal_of, open_result
 
@@ -110,7 +110,9 @@ def test_run_writes_result_and_picture_and_compares_with_hertz(solved: Path) -> 
     result = open_result(solved / "sphere.nc")
     assert result.complete
     assert len(result) == 2
-    assert (solved / "sphere.png").read_bytes().startswith(b"\x89PNG")
+    np.testing.assert_array_equal(
+        drawn.pixels(solved / "sphere.png"), drawn.pixels(plotting.overview(result))
+    )
     out = (solved / "stdout").read_text()
     assert "Against Hertz" in out
     row = re.search(r"max pressure +([\d.]+) MPa +([\d.]+) MPa +([+-][\d.]+) %", out)
@@ -276,6 +278,7 @@ def test_signals_that_follow_do_not_disturb_the_leaving(deck: Path, sent: tuple[
     assert f"stopped interrupted ({signal.Signals(sent[0]).name})" in told
 
 
+@pytest.mark.alone
 def test_a_long_step_can_be_interrupted(deck: Path) -> None:
     process = start(
         deck.parent, "run", "sphere.toml", "--set", "grid.nodes_in_radius=1000", "--set", "load.1.steps=1"
@@ -314,10 +317,14 @@ def test_plot_draws_what_is_asked(solved: Path) -> None:
     done = inside(solved, "plot", "sphere.nc", "--what", "all", "--step", "1")
     assert done.returncode == 0, done.stderr
     pictures = re.findall(r"written: (.*\.png)", done.stdout)
-    assert len(pictures) >= 4
-    assert all((solved / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
+    names = ["overview", "pressure", "section", "boundary", "history"]
+    assert [Path(picture).stem for picture in pictures] == [f"sphere_{name}" for name in names]
+    result = open_result(solved / "sphere.nc")
+    for name, picture in zip(names, pictures, strict=True):
+        expected = plotting.FIGURES[name](result, *([1] if name != "history" else []))
+        np.testing.assert_array_equal(drawn.pixels(solved / picture), drawn.pixels(expected))
     assert inside(solved, "plot", "sphere.nc", "-w", "section", "-o", "cut.pdf").returncode == 0
-    assert (solved / "cut.pdf").read_bytes().startswith(b"%PDF")
+    assert drawn.strokes((solved / "cut.pdf").read_bytes(), "pdf") > 100
     refused(
         inside(solved, "plot", "sphere.nc", "-w", "sektion"),
         2,
@@ -394,9 +401,9 @@ def test_check_says_what_would_be_run(deck: Path) -> None:
         "beta = ",
         "grows",
         "100.0 N",
-        "B",
     ):
         assert words in done.stdout
+    assert re.search(r"^ memory +\d\S* [kM]B *$", done.stdout, re.MULTILINE)
     assert sorted(p.name for p in deck.parent.iterdir()) == ["sphere.toml"]
 
 
@@ -416,14 +423,16 @@ def test_a_plain_ascii_terminal_is_enough(solved: Path) -> None:
     assert "Against Hertz" in done.stdout
 
 
-def test_help_is_quick(tmp_path: Path) -> None:
-    """The target is 0.3 s; the bound leaves room for a busy machine."""
-    times = []
-    for _ in range(3):
-        began = time.perf_counter()
-        hexcontact_(tmp_path, "--help")
-        times.append(time.perf_counter() - began)
-    assert min(times) < 1.0
+def test_help_is_quick() -> None:
+    """What takes long is to import packages: help does without those that compute, read files and draw."""
+    heavy = {"matplotlib", "xarray", "pandas", "scipy", "netCDF4", "pint", "pydantic", "hexcontact._core"}
+    program = (
+        "import sys\nfrom hexcontact.cli import main\nsys.argv = ['hexcontact', '--help']\n"
+        f"try:\n    main()\nexcept SystemExit:\n    pass\nprint(sorted({heavy} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True)
+    assert "Usage" in done.stdout
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
 
 
 def test_names_of_the_package_are_there() -> None:
@@ -432,11 +441,6 @@ def test_names_of_the_package_are_there() -> None:
         assert name in dir(hexcontact)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = hexcontact.nothing
-
-
-def test_the_picture_shows_the_same_numbers_as_the_file(solved: Path) -> None:
-    result = open_result(solved / "sphere.nc")
-    assert_array_equal(np.asarray(result.step(-1)["pressure"]) > 0, np.asarray(result.step(-1)["zone"]) > 0)
 
 
 def test_overwrite_replaces_results_only(deck: Path) -> None:

@@ -97,7 +97,7 @@ def test_similar_bodies_sheared_have_cattaneo_and_mindlin() -> None:
     assert whose["approach"] == "Hertz"
     assert "elastic_energy" not in whose  # shear stores energy, too
     for entry in result.compare():
-        assert abs(entry.error) < 0.03, entry
+        assert abs(entry.error) < 0.0154, entry
     # Q / (mu P) = 19/30, c/a = (1 - Q/(mu P))^(1/3)
     comparison = result.compare()
     ratio = comparison["stick_radius_fit"].exact / comparison["contact_radius_fit"].exact
@@ -110,15 +110,15 @@ def test_after_a_reversal_it_is_mindlin_and_deresiewicz() -> None:
     result = sheared(loads=[{"normal_load": 100.0}, *({"tangential_load_x": q} for q in (20.0, -5.0))])
     comparison = result.compare()
     assert comparison["shift_x"].solution == "Mindlin–Deresiewicz"
-    assert abs(comparison["shift_x"].error) < 3e-3
-    assert abs(comparison["traction_x"].error) < 0.03
+    assert abs(comparison["shift_x"].error) < 9.5e-4
+    assert abs(comparison["traction_x"].error) < 0.028
 
 
 def test_torsion_has_lubkin() -> None:
     result = sheared(loads=[{"normal_load": 100.0}, {"torque": 2e-3, "steps": 2}])
     assert result.compare()["twist"].solution == "Lubkin"
     for step in (2, 3):
-        assert abs(result.compare(step=step)["twist"].error) < 2e-3
+        assert abs(result.compare(step=step)["twist"].error) < 1.05e-3
     assert "twist" not in found(result, step=1)
     both = sheared(loads=[{"normal_load": 100.0}, {"torque": 2e-3}, {"tangential_load_x": 9.0}])
     assert "twist" in found(both, step=2)
@@ -133,7 +133,7 @@ def test_dissimilar_bodies_have_what_goodman_and_spence_know() -> None:
     given: dict[str, Any] = {"body_2": SOFT, "nodes_in_radius": 16, "friction_coefficient": 0.05}
     goodman = run(**given, coupling="goodman", loads=loads)
     assert goodman.compare()["stick_radius_fit"].solution == "Goodman, Spence"
-    assert abs(goodman.compare()["stick_radius_fit"].error) < 0.05
+    assert abs(goodman.compare()["stick_radius_fit"].error) < 0.0103
     assert goodman.compare()["max_pressure"].solution == "Hertz"
     full = run(**given, loads=loads).compare()
     assert len(full) == 0
@@ -152,10 +152,10 @@ def test_bodies_that_cannot_slip_have_mossakovskii_and_spence() -> None:
     assert {entry.quantity for entry in comparison} == {"approach", "contact_radius"}
     assert {entry.solution for entry in comparison} == {"Mossakovskii, Spence"}
     for entry in comparison:
-        assert abs(entry.error) < 0.015, entry
+        assert abs(entry.error) < 0.004, entry
     punch = run(Punch(radius=0.2e-3), **given).compare()
     assert [entry.solution for entry in punch] == ["Mossakovskii"]
-    assert abs(punch["approach"].error) < 0.02
+    assert abs(punch["approach"].error) < 0.0156
     # a sphere in one step is another problem
     assert len(run(**given, algorithm="static").compare()) == 0
 
@@ -179,7 +179,10 @@ def test_where_nothing_is_known_it_says_so(arguments: dict[str, Any]) -> None:
 
 
 def test_a_quadratic_gap_of_python_has_hertz() -> None:
-    assert set(found(run(body_1=STEEL, gap=lambda x, y: x**2 / 0.02 + y**2 / 0.03)).values()) == {"Hertz"}
+    by_function = run(body_1=STEEL, gap=lambda x, y: x**2 / 0.02 + y**2 / 0.03)
+    assert set(found(by_function).values()) == {"Hertz"}
+    note = "the gap was given in Python; the solutions are those of its values at the nodes"
+    assert by_function.compare().note.endswith(f" spacings in the contact radius; {note}")
     crossed = run(
         body_1={**STEEL, "surface": Cylinder(radius=10e-3)},
         body_2={**STEEL, "surface": Cylinder(radius=10e-3, angle="90 deg")},
@@ -209,7 +212,7 @@ def test_a_solution_of_ones_own() -> None:
         "max_pressure",
         "contact_radius",
     }
-    assert abs(hertz["approach"].error) < 1e-3
+    assert abs(hertz["approach"].error) < 6e-4
     with pytest.raises(KeyError, match="did you mean approach"):
         result.compare({"aproach": 1.0})
     with pytest.raises(DeckError, match="pressure: expected a quantity with one value by step"):

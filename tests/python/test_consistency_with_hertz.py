@@ -41,10 +41,10 @@ def test_sphere_of_any_materials(first: dict, second: dict, method: str) -> None
     x, y, p, step = last(case)
     # the errors of the discrete problem at a/l_e = 14 (reference table): 3.9e-4, -2.6e-4, 0.0137, 0.0037
     assert p.max() / hertz.max_pressure - 1 == pytest.approx(3.916e-4, abs=1e-6)
-    assert float(step["approach"]) / hertz.approach - 1 == pytest.approx(-2.557e-4, abs=1e-6)
+    assert float(step["approach"]) / hertz.approach - 1 == pytest.approx(-2.557e-4, abs=6e-8)
     exact = hertz.pressure(np.hypot(x, y))
-    assert np.linalg.norm(p - exact) / np.linalg.norm(exact) == pytest.approx(0.01373, abs=1e-4)
-    assert estimators.edge_radius(x, y, p, 1e-3 / 14) == pytest.approx(1.0037e-3, rel=1e-4)
+    assert np.linalg.norm(p - exact) / np.linalg.norm(exact) == pytest.approx(0.01373, abs=1e-6)
+    assert estimators.edge_radius(x, y, p, 1e-3 / 14) == pytest.approx(1.0037e-3, rel=1.4e-6)
     # the load is the sum of the nodal pressures over their cells
     assert p.sum() * np.sqrt(0.75) * (1e-3 / 14) ** 2 == pytest.approx(hertz.normal_load, rel=1e-8)
 
@@ -60,8 +60,8 @@ def test_load_scales_as_the_power_two_thirds(loads: float) -> None:
         normal_load=loads,
     )
     _, _, p, step = last(case)
-    assert p.max() == pytest.approx(hertz.max_pressure, rel=1e-3)
-    assert float(step["approach"]) == pytest.approx(hertz.approach, rel=1e-3)
+    assert p.max() == pytest.approx(hertz.max_pressure, rel=4.1e-4)
+    assert float(step["approach"]) == pytest.approx(hertz.approach, rel=3.4e-4)
 
 
 def test_sphere_anywhere_on_the_lattice() -> None:
@@ -78,12 +78,12 @@ def test_sphere_anywhere_on_the_lattice() -> None:
         )
         x, y, p, step = last(case)
         exact = hertz.pressure(np.hypot(x - center[0], y - center[1]))
-        assert np.linalg.norm(p - exact) < 0.02 * np.linalg.norm(exact)
-        assert float(step["approach"]) == pytest.approx(hertz.approach, rel=5e-4)
-        assert estimators.edge_radius(x, y, p, 1e-3 / 20, center) == pytest.approx(1e-3, rel=5e-3)
+        assert np.linalg.norm(p - exact) / np.linalg.norm(exact) < 0.0105
+        assert float(step["approach"]) == pytest.approx(hertz.approach, rel=1.8e-4)
+        assert estimators.edge_radius(x, y, p, 1e-3 / 20, center) == pytest.approx(1e-3, rel=2.1e-3)
         # the pressure is centered where the sphere is
-        assert (p * x).sum() / p.sum() == pytest.approx(center[0], abs=1e-6)
-        assert (p * y).sum() / p.sum() == pytest.approx(center[1], abs=1e-6)
+        assert (p * x).sum() / p.sum() == pytest.approx(center[0], abs=3.5e-8)
+        assert (p * y).sum() / p.sum() == pytest.approx(center[1], abs=3.5e-8)
 
 
 @pytest.mark.parametrize("angle", [0, 17, 45, 90, 120])
@@ -103,15 +103,15 @@ def test_paraboloid_at_any_angle(radii: tuple[float, float], angle: int) -> None
     )
     x, y, p, step = last(case)
     exact = ellipse.pressure(x, y)
-    assert p.max() == pytest.approx(ellipse.max_pressure, rel=1e-3)
-    assert float(step["approach"]) == pytest.approx(ellipse.approach, rel=1e-3)
-    assert np.linalg.norm(p - exact) < 0.02 * np.linalg.norm(exact)
+    assert p.max() == pytest.approx(ellipse.max_pressure, rel=2.5e-4)
+    assert float(step["approach"]) == pytest.approx(ellipse.approach, rel=3e-4)
+    assert np.linalg.norm(p - exact) / np.linalg.norm(exact) < 0.0131
     fit = estimators.edge_ellipse(x, y, p, ellipse.semi_minor / 16)
-    assert fit.semi_major == pytest.approx(ellipse.semi_major, rel=6e-3)
-    assert fit.semi_minor == pytest.approx(ellipse.semi_minor, rel=6e-3)
+    assert fit.semi_major == pytest.approx(ellipse.semi_major, rel=2.6e-3)
+    assert fit.semi_minor == pytest.approx(ellipse.semi_minor, rel=2.6e-3)
     if radii[0] != radii[1]:
         apart = (fit.angle - ellipse.angle + np.pi / 2) % np.pi - np.pi / 2
-        assert np.degrees(apart) == pytest.approx(0.0, abs=0.2)
+        assert np.degrees(apart) == pytest.approx(0.0, abs=0.0037)
 
 
 def test_two_cylinders_are_one_paraboloid() -> None:
@@ -148,7 +148,7 @@ def test_prescribed_approach() -> None:
     dataset = case.run().dataset
     fractions = np.array([1, 2, 3]) / 3
     np.testing.assert_allclose(dataset["approach"], 3e-5 * fractions, rtol=1e-12)
-    np.testing.assert_allclose(dataset["normal_load"], hertz.normal_load * fractions**1.5, rtol=2e-3)
+    np.testing.assert_allclose(dataset["normal_load"], hertz.normal_load * fractions**1.5, rtol=8.1e-4)
 
 
 @pytest.mark.parametrize(
@@ -168,10 +168,10 @@ def test_other_profiles(surface, exact) -> None:
         normal_load=20.0,
     )
     x, y, p, step = last(case)
-    assert float(step["approach"]) == pytest.approx(solution.approach, rel=1e-3)
+    assert float(step["approach"]) == pytest.approx(solution.approach, rel=1.7e-4)
     r = np.hypot(x, y)
     part = (r > 0.2 * solution.contact_radius) & (r < 0.8 * solution.contact_radius)
-    np.testing.assert_allclose(p[part], solution.pressure(r[part]), rtol=0.02)
+    np.testing.assert_allclose(p[part], solution.pressure(r[part]), rtol=1e-3)
     assert (p[r > 1.1 * solution.contact_radius] == 0).all()
 
 
@@ -182,7 +182,7 @@ def test_flat_punch() -> None:
     x, y, p, step = last(case)
     radius = estimators.area_radius(p > 0, np.sqrt(0.75) * (1e-3 / 30.25) ** 2)
     punch = analytic.flat_punch(modulus(CORK), radius, normal_load=5.0)
-    assert float(step["approach"]) == pytest.approx(punch.approach, rel=3e-3)
+    assert float(step["approach"]) == pytest.approx(punch.approach, rel=2.1e-3)
     r = np.hypot(x, y)
     part = r < 0.8 * radius
     np.testing.assert_allclose(p[part], punch.pressure(r[part]), rtol=0.01)
@@ -202,5 +202,5 @@ def test_the_error_of_the_approach_is_known(ratio: float) -> None:
         case = Case(body_1={**STEEL, "surface": surface}, body_2=RIGID, spacing=spacing, normal_load=50.0)
         error = float(case.run().step(-1).approach) - hertz.approach
         found.append(32 * error / (spacing**2 * (1 / ratio + 1) / 0.02))
-    assert np.mean(found) == pytest.approx(-0.96, abs=0.08)
-    assert np.std(found) < 0.1
+    assert np.mean(found) == pytest.approx(-0.96, abs=0.046)
+    assert np.std(found) < 0.087

@@ -15,10 +15,10 @@ from PIL import Image
 from rich.console import Console
 
 from hexcontact import Case, Result
-from hexcontact.display import html_table, text_table
-from hexcontact.report_fields import Plane
+from hexcontact.plotting.report_fields import Plane
 from hexcontact.step_view import StepView
 from hexcontact.surfaces import Sphere
+from hexcontact.text import html_table, text_table
 from hexcontact.variables import VARIABLES
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

@@ -63,10 +63,10 @@ def test_a_ring() -> None:
     p, gap = np.sqrt(np.maximum(inside, 0.0)), 3.0 * np.maximum(-inside, 0.0) ** 1.5
     edges = ContactEdges(p, gap, p > 0.0, p >= 0.0, lattice.basis, (lattice.x[0, 0], lattice.y[0, 0]))
     area = np.pi * ((30.7 + 0.04) ** 2 - (10.2 - 0.04) ** 2)
-    assert edges.contact().area == pytest.approx(area, abs=0.01 * 2.0 * np.pi * 41)
-    assert edges.contact().length == pytest.approx(2.0 * np.pi * 40.9, rel=2e-3)
+    assert edges.contact().area == pytest.approx(area, abs=1e-4 * 2.0 * np.pi * 41)
+    assert edges.contact().length == pytest.approx(2.0 * np.pi * 40.9, rel=1.3e-4)
     away = np.hypot(*np.moveaxis(edges.contact().segments, 2, 0))
-    assert np.minimum(abs(away - 30.7), abs(away - 10.2)).max() < 0.08
+    assert np.minimum(abs(away - 30.7), abs(away - 10.2)).max() < 0.052
 
 
 # --- contacts without friction --------------------------------------------------------------------
@@ -137,7 +137,7 @@ def test_the_patches_of_a_rough_surface() -> None:
             area += [(edge.area, (s.zone > 0).sum() * lattice.cell_area)]
         found.append(area[1][0] / area[0][0] - 1.0)
         counted.append(area[1][1] / area[0][0] - 1.0)
-    assert np.abs(found).max() < 0.01
+    assert np.abs(found).max() < 0.0063
     assert np.linalg.norm(found) < 0.5 * np.linalg.norm(counted)
 
 
@@ -235,9 +235,9 @@ def test_stick_of_cattaneo_and_mindlin(steps: int) -> None:
         edge = edges_of(lattice, state).stick(stick, reserve)
         found.append((edge.radius - ratio) / spacing)
         counted.append((np.sqrt(stick.sum() * lattice.cell_area / np.pi) - ratio) / spacing)
-        assert edge.length == pytest.approx(2.0 * np.pi * ratio, abs=0.6 * spacing)
+        assert edge.length == pytest.approx(2.0 * np.pi * ratio, abs=0.29 * spacing)
         # the edge of the contact is where it was
-        assert edges_of(lattice, state).contact().radius == pytest.approx(1.0, abs=0.03 * spacing)
+        assert edges_of(lattice, state).contact().radius == pytest.approx(1.0, abs=0.011 * spacing)
     assert np.abs(found).max() < 0.05
     assert np.abs(found).mean() < 0.5 * np.abs(counted).mean()
 
@@ -254,7 +254,7 @@ def test_small_stick_areas() -> None:
         everywhere = np.ones(lattice.shape, dtype=bool)
         edges = ContactEdges(0.0 * gap + 1.0, 0.0 * gap, everywhere, everywhere, lattice.basis)
         edge = edges.stick(solution.zone > 0, solution.pressure)
-        assert edge.radius == pytest.approx(1.0, abs=0.045 * spacing)
+        assert edge.radius == pytest.approx(1.0, abs=0.027 * spacing)
 
 
 def test_reserve_with_another_power() -> None:
@@ -266,7 +266,7 @@ def test_reserve_with_another_power() -> None:
         r = np.hypot(lattice.x, lattice.y)
         stick, reserve = r < c, np.maximum(c - r, 0.0) ** 1.5
         by_nodes = np.sqrt(stick.sum() * lattice.cell_area / np.pi)
-        assert edges.stick(stick, reserve).radius == pytest.approx(by_nodes, abs=0.06)
+        assert edges.stick(stick, reserve).radius == pytest.approx(by_nodes, abs=0.006)
 
 
 def test_stick_up_to_the_edge_of_the_contact() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from validation.runs import shear_compliance
 
 import hexcontact
 from hexcontact import Case
@@ -16,7 +17,6 @@ from hexcontact.lattice import Lattice
 from hexcontact.native import ElasticPair, FlexibilityOperator
 from hexcontact.native_friction import ContactState, Entry, FrictionalContact
 from hexcontact.surfaces import Sphere
-from hexcontact.verify_runs import shear_compliance
 
 FORCES = ("force", "force", "force", "displacement")
 RADIUS = 1.0  # of the contact at the end
@@ -65,7 +65,7 @@ def test_oblique_load_needs_few_steps() -> None:
     assert 0.06 < implicit[0] < 0.12
     assert 1.6 < implicit[0] / implicit[1] < 2.4
     interpolated = oblique_errors("interpolated", (3, 5, 10))
-    assert max(abs(error) for error in interpolated) < 2e-3
+    assert max(abs(error) for error in interpolated) < 3.5e-4
 
 
 def test_oblique_load_makes_nothing_slip() -> None:
@@ -90,7 +90,7 @@ def test_dissimilar_spheres_stick_after_few_steps() -> None:
         return float(np.hypot(state.traction_x, state.traction_y).sum() / state.pressure.sum())
 
     limit = shear(40, "interpolated")
-    assert abs(shear(5, "interpolated") / limit - 1.0) < 0.03
+    assert abs(shear(5, "interpolated") / limit - 1.0) < 1.7e-3
     few, many = shear(5, "implicit") / limit - 1.0, shear(20, "implicit") / limit - 1.0
     assert few > 0.15
     assert 0.02 < many < 0.5 * few  # from the same side, and slowly

@@ -1,5 +1,6 @@
 """Runs with friction: what a step holds, control and ramps, windows that grow, what stops a run."""
 
+import html
 import io
 import itertools
 import math
@@ -14,14 +15,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 from typer.testing import CliRunner
 
-from hexcontact import memory, native, native_friction, solve, summary
+from hexcontact import influence, json_output, memory, native, native_friction, remarks, solve, summary
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.cli import app
-from hexcontact.errors import ConvergenceError, DeckError, ResourceError
+from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
 from hexcontact.estimators import area_radius
+from hexcontact.lattice import Lattice
 from hexcontact.load_history import LoadStep, Target
 from hexcontact.native_friction import ContactState, FrictionalContact
+from hexcontact.plotting import report
 from hexcontact.progress import Lines, describe
 from hexcontact.result import Result, Step
 from hexcontact.store import Journal, journal_of, open_result
@@ -76,7 +79,9 @@ def slide(step: Step, axis: str) -> np.ndarray:
 @pytest.mark.parametrize("coupling", ["full", "goodman"])
 def test_displacements_of_the_bodies_make_up_the_relative_displacement(coupling: str) -> None:
     case = sphere(offset=(1e-5, -2e-5), loads=MIXED, coupling=coupling, fields=["pressure", *DISPLACEMENTS])
-    for step in solve.steps(case):
+    steps = list(solve.steps(case))
+    assert len(steps) == 14
+    for step in steps:
         u, history = step.fields, step.history
         size = np.abs(u["displacement_2_z"]).max()
         for axis in "xy":
@@ -93,6 +98,7 @@ def test_the_balance_of_energy_closes() -> None:
          + sum A_p (q before + after)/2 . ds + sum A_p (p before x g after - p after x g before)/2
     """
     steps = list(solve.steps(windowed(sphere(offset=(1e-5, -2e-5), loads=MIXED), 25)))
+    assert len(steps) == 14
     pairs = {"normal_load": "approach", "tangential_load_x": "shift_x", "tangential_load_y": "shift_y",
              "torque": "twist"}  # fmt: skip
     for old, new in itertools.pairwise(steps):
@@ -314,13 +320,25 @@ def test_a_fixed_window_does_not_grow() -> None:
 
 def test_memory_is_that_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     case, plain = sphere(), sphere(friction_coefficient=None, loads=[{"normal_load": 31.5}])
-    rows, cols = case.lattice.shape
-    assert case.memory_needed(case.lattice) == native_friction.memory_needed("fft", rows, cols)
-    assert plain.memory_needed(case.lattice) == native.memory_needed("fft", rows, cols)
-    assert memory_needed(case, case.lattice) > memory_needed(plain, case.lattice)
-    # Python holds the state at both ends of a step, and each again on its way into the core and out of it
-    in_python = memory_needed(case, case.lattice) - case.memory_needed(case.lattice)
-    assert in_python >= 4 * 8 * len(FrictionWindow.state) * case.lattice.size
+    lattice, radius = case.lattice, float(sphere().run().dataset["contact_radius"].values[-1])
+    threads = memory.threads()
+    core = case.memory_needed(lattice)
+    assert plain.memory_needed(lattice) < native.memory_needed("fft", *lattice.shape, threads=threads) + 1
+    assert core < native_friction.memory_needed("fft", *lattice.shape, threads=threads)
+    contact = int(np.pi * radius**2 / lattice.cell_area)
+    loads = sum(target.control == "force" for target in case.load_steps[-1].targets)
+    near = [
+        native_friction.memory_needed(
+            "fft", *lattice.shape, contact=int(factor * contact), loads=loads, threads=threads
+        )
+        for factor in (0.8, 1.2)
+    ]
+    assert near[0] < core < near[1]
+    assert memory_needed(case, lattice) > memory_needed(plain, lattice)
+    # Python holds the state before a step, which is also on its way into the core and out of it
+    large = case.on_lattice(lattice.spacing / 100, lattice.origin)
+    in_python = memory_needed(large, large.lattice) - large.memory_needed(large.lattice)
+    assert in_python >= 3 * 8 * len(FrictionWindow.state) * large.lattice.size
     monkeypatch.setattr(memory, "available", lambda: 1000)
     monkeypatch.setattr("hexcontact.native_friction.FrictionalContact", None)  # must not be reached
     with pytest.raises(ResourceError, match="a window of .* needs .* GB of memory"):
@@ -497,6 +515,82 @@ def test_a_step_that_was_halved_is_one_step(monkeypatch: pytest.MonkeyPatch) -> 
     spent = halved.history["dissipated_energy"] - before.history["dissipated_energy"]
     assert halved.history["dissipated_energy_step"] == pytest.approx(spent, rel=1e-12)
     assert f"halved {halved.history['cuts']} time" in dict(summary.step_rows(halved.history))["work"]
+    # the residual is that of what is recorded: of one step with the slip of all parts
+    assert float(whole.history["residual_tangential"]) <= 1e-8 < 1e-3 < residual_of(halved, 0.1)
+    assert halved.history["residual_tangential"] == pytest.approx(residual_of(halved, 0.1), rel=1e-9)
+
+
+def residual_of(step: Step, mu: float) -> float:
+    """Return R_t from the fields of a step: max |q - P(q - ds/d_t)|/(mu p_max), P the cut to the cone."""
+    pair, field = sphere().pair, step.fields
+    kernels = influence.pyramid_kernels(0.0, 0.0)
+    compliance = (
+        pair.lambda_1 * float(kernels.K1) + pair.lambda_5 * float(kernels.Kxx)
+    ) * step.lattice.spacing
+    q = np.stack([field["traction_x"], field["traction_y"]])
+    trial = q - np.stack([field["slip_increment_x"], field["slip_increment_y"]]) / compliance
+    share = np.minimum(1.0, mu * field["pressure"] / np.maximum(np.hypot(*trial), 1e-300))
+    wrong = np.where(field["pressure"] > 0, np.hypot(*(q - share * trial)), 0.0)
+    return float(wrong.max() / (mu * field["pressure"].max()))
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "in_parts"), [("incremental", True), ("incremental", False), ("static", False)]
+)
+def test_a_first_step_in_parts_is_warned_of_and_named(
+    algorithm: str, in_parts: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = FrictionalContact.advance
+
+    def advance(self: FrictionalContact, state: ContactState, *arguments: Any, **keys: Any) -> ContactState:
+        reached = original(self, state, *arguments, **keys)
+        residual = 0.047 if in_parts else reached.residual_tangential
+        cold = not (state.pressure > 0).any()
+        return replace(reached, cuts=2, residual_tangential=residual) if cold else reached
+
+    monkeypatch.setattr(FrictionalContact, "advance", advance)
+    file = tmp_path / "out.nc"
+    case = sphere(algorithm=algorithm, loads=[{"normal_load": 31.5}, {"normal_load": 40.0}])
+    # one warning: the second load begins in contact, and converges as a whole
+    with pytest.warns(PathWarning) as warned:
+        result = case.run(file)
+    assert result.dataset["cuts"].values.tolist() == [2, 0]
+    [warning] = warned.list
+    expected = "contact and did not converge as a whole" if in_parts else "solutions for smaller loads"
+    assert str(warning.message).startswith("step 1 ") and expected in str(warning.message)
+    told = remarks.remarks(result.history.reset_index().to_dict("records"), result.dataset.attrs)
+    assert told[0] == str(warning.message)
+    assert told[1].startswith("1 of 2 load steps did not converge at once: step 1 (halved 2 times); ")
+    assert told[1].endswith("up to 4.7e-02" if in_parts else "fulfil the conditions all the same")
+    assert "halved 2 times" in describe(result.history.iloc[0].to_dict())
+    page = report.report(result)
+    assert all(html.escape(sentence) in page for sentence in told)
+    shown = CliRunner().invoke(app, ["info", str(file)]).output
+    assert all(f"note: {sentence}" in shown for sentence in told)
+    assert json_output.of_result(result)["warnings"] == told
+
+
+def test_a_first_step_does_not_depend_on_the_window() -> None:
+    """On the wide window it is found from smaller loads; taken as a path, these dissipated half as much."""
+    pair = native.ElasticPair.from_materials(None, None, 1e9, 0.1)
+    load = 4.0 / 3.0 * pair.effective_modulus
+    found = []
+    for side in (16, 54):
+        lattice = Lattice(1 / 12, -side, -side, 2 * side + 1, 2 * side + 1)
+        gap = 0.5 * (lattice.x**2 + lattice.y**2)
+        contact = FrictionalContact(lattice, pair, gap, friction_coefficient=1.0)
+        found.append(contact.advance(contact.virgin(), ["force"] * 4, [load, 0.0, 0.0, 0.0]))
+    small, large = found
+    assert small.converged and large.converged
+    assert max(state.residual_tangential for state in found) <= 1e-8
+    assert large.dissipated_energy == pytest.approx(small.dissipated_energy, rel=1e-7)
+    assert (small.zone == 1).sum() == (large.zone == 1).sum()
+
+
+def test_steps_that_were_not_halved_are_not_mentioned() -> None:
+    result = sphere().run()
+    assert remarks.remarks(result.history.to_dict("records"), result.dataset.attrs) == []
+    assert "halved" not in describe(result.history.iloc[0].to_dict())
 
 
 # --- what is shown --------------------------------------------------------------------------------

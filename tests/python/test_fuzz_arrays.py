@@ -21,6 +21,7 @@ from hexcontact import (
     Study,
     analytic,
     influence,
+    native,
 )
 
 LATTICE = Lattice(spacing=1e-4, row_first=-4, col_first=-4, n_row=9, n_col=9)
@@ -89,7 +90,7 @@ def case(**keys: Any) -> Case:
 
 
 def flat(gap: Any) -> Case:
-    return case(body_1=ELASTIC, gap=gap, nodes_in_radius=None, spacing=1e-4, window=(9, 9))
+    return case(body_1=ELASTIC, gap=gap, nodes_in_radius=None, lattice=LATTICE)
 
 
 def friction(**changed: Any) -> ContactState:
@@ -101,6 +102,15 @@ def friction(**changed: Any) -> ContactState:
 def advanced(control: Any, value: Any) -> ContactState:
     contact = FrictionalContact(LATTICE, PAIR, GAP, friction_coefficient=0.3)
     return contact.advance(contact.virgin(), control, value)
+
+
+def solved(**arguments: Any) -> object:
+    return NormalContact(LATTICE, PAIR, GAP).solve(normal_load=10.0, **arguments)
+
+
+def stepped(**arguments: Any) -> ContactState:
+    contact = FrictionalContact(LATTICE, PAIR, GAP, friction_coefficient=0.3)
+    return contact.advance(contact.virgin(), FORCES, [10.0, 1.0, 0.0, 0.0], **arguments)
 
 
 def study(values: Any) -> Study:
@@ -150,10 +160,111 @@ TAKERS: dict[str, Callable[[Any], object]] = {
     "lattice, rows": lambda a: (
         Lattice(spacing=1.0, row_first=0, col_first=0, n_row=a, n_col=3).x if a is not True else 0
     ),
+    "lattice, origin": lambda a: Lattice(spacing=1.0, row_first=0, col_first=0, n_row=3, n_col=3, origin=a).x,
     "pair": lambda a: ElasticPair.from_materials(a, 0.3, 1e9, 0.3),
+    "lambda_1": lambda a: contact_of(ElasticPair(a, 0.0, 0.0)),
+    "lambda_2": lambda a: contact_of(ElasticPair(1e-11, a, 0.0)),
+    "lambda_5": lambda a: contact_of(ElasticPair(1e-11, 0.0, a)),
+    "sweeps of a contact": lambda a: solved(max_sweeps=a),
+    "sweeps of a step": lambda a: stepped(max_sweeps=a),
+    "cuts of a step": lambda a: stepped(max_cuts=a),
+    "tolerance of a step": lambda a: stepped(tolerance=a),
+    "entry of a step": lambda a: stepped(entry=a),
+    "number of a state": lambda a: friction(shift_x=a),
+    "method": lambda a: NormalContact(LATTICE, PAIR, GAP, method=a),
+    "coupling": lambda a: FrictionalContact(LATTICE, PAIR, GAP, friction_coefficient=0.3, coupling=a),
+    "threads": lambda a: NormalContact(LATTICE, PAIR, GAP, threads=a),
+    "threads with friction": lambda a: FrictionalContact(
+        LATTICE, PAIR, GAP, friction_coefficient=0.3, threads=a
+    ),
+    "threads of an operator": lambda a: FlexibilityOperator(LATTICE, PAIR, threads=a),
+    "rows of a memory": lambda a: native.memory_needed("fft", a, 9),
     "study": study,
 }
+# No solver may believe what is no number of a sensible size, and none may iterate for ever.
+REFUSED: dict[str, tuple[Any, ...]] = {
+    "lambda_1": (np.nan, np.inf, -np.inf, 0.0, -1e-11),
+    "lambda_2": (np.nan, np.inf, 1e-11, -2e-11),
+    "lambda_5": (np.nan, -np.inf, np.inf, -1e-11),
+    "pair": (np.nan, np.inf, 0.0, -210e9),
+    "gap of a contact": (ODD["a NaN"], ODD["inf"], ODD["-inf"]),
+    "gap with friction": (ODD["a NaN"], ODD["inf"], ODD["-inf"]),
+    "load of a contact": (np.nan, np.inf, -1.0),
+    "approach of a contact": (np.nan, np.inf, -np.inf),
+    "tolerance of a contact": (np.nan, 0.0, -1e-8, 1.0, np.inf),
+    "tolerance of a step": (np.nan, 0.0, -1e-8, 1.0, np.inf),
+    "mu with friction": (np.nan, -0.1),
+    "sweeps of a contact": (0, -1, 2**31, 1.5, np.nan),
+    "sweeps of a step": (0, -1, 2**31),
+    "cuts of a step": (-1, 2**31),
+    "number of a state": (np.nan, np.inf),
+    "values of an advance": ([np.nan, 0, 0, 0], [1, np.inf, 0, 0], [-1, 0, 0, 0]),
+    "threads": (-1, 1025, 10**6, 10**12, 1.5),
+    "threads with friction": (-1, 1025, 10**6, 10**12, 1.5),
+    "threads of an operator": (-1, 10**6),
+    "lattice, origin": ((np.nan, 0.0), (0.0, np.inf), (0.0,), (0.0, 0.0, 0.0)),
+    "lattice, spacing": (np.nan, np.inf, 0.0, -1.0),
+    "control of an advance": ([["force"]] * 4, ["force"] * 3, ["force", "force", "force", "torque"]),
+    "method": ("lapack", ["fft"], 1),
+}
 DOCUMENTED = {"Hertz, tensor": ValueError, "Hertz, load": ValueError}  # of the closed solutions
+
+
+def contact_of(pair: ElasticPair) -> object:
+    return NormalContact(LATTICE, pair, GAP).solve(normal_load=10.0)
+
+
+@pytest.mark.parametrize("taker", REFUSED)
+def test_what_means_nothing_is_refused(taker: str) -> None:
+    for value in REFUSED[taker]:
+        with time_limit(), pytest.raises(DeckError, match="expected|not finite numbers"):
+            TAKERS[taker](value)
+
+
+def test_products_out_of_range_are_no_solution() -> None:
+    for gap, load in ((GAP * 1e150, 1e300), (GAP + 1e300, 1e-300), (GAP * 1e-300, 1e300)):
+        for method in ("fft", "direct"):
+            contact = NormalContact(LATTICE, ElasticPair(1e150, 0.0, 0.0), gap, method=method)
+            try:
+                with time_limit():
+                    solution = contact.solve(normal_load=load)
+            except HexcontactError as error:
+                assert "not finite" in str(error) or "positive definite" in str(error)
+            else:
+                finite = np.isfinite(solution.pressure).all() and np.isfinite(solution.gap).all()
+                assert finite or not solution.converged
+
+
+def test_a_tolerance_below_rounding_errors_ends() -> None:
+    """Without a bound the pressure of a few pillars was fitted to the load again and again."""
+    pillars = np.zeros((13, 13), dtype=bool)
+    for k in range(5):
+        pillars[7 * k * k % 13, 5 * k % 13] = True
+    lattice = Lattice(spacing=1 / 6, row_first=-6, col_first=-6, n_row=13, n_col=13)
+    contact = NormalContact(lattice, ElasticPair(1.0, 0.1, 0.4), np.zeros((13, 13)), pillars)
+    for k in range(1, 61):
+        with time_limit():
+            solution = contact.solve(normal_load=0.05 * 1.37**k, tolerance=5e-16)
+        assert max(solution.residual_normal, solution.residual_force) < 1e-14
+
+
+def test_solvers_say_why_they_stopped() -> None:
+    contact = NormalContact(LATTICE, PAIR, GAP)
+    assert contact.solve(normal_load=10.0).stopped == ""
+    few = contact.solve(normal_load=10.0, tolerance=1e-12, max_sweeps=1)
+    assert (few.converged, few.stopped) == (False, "all iterations that are allowed were made")
+    few_steps = stepped(max_sweeps=1, max_cuts=0)
+    assert (few_steps.converged, few_steps.stopped) == (False, "all iterations that are allowed were made")
+    slipping = advanced(FORCES, [10.0, 4.0, 0.0, 0.0])
+    assert slipping.sliding and slipping.stopped == "no node sticks, and a load cannot be carried"
+
+
+def test_contact_at_the_rim_is_flagged() -> None:
+    small, large = (NormalContact(LATTICE, PAIR, GAP).solve(normal_load=load) for load in (10.0, 1e5))
+    assert (small.converged, small.touches_rim) == (True, False)
+    assert (large.converged, large.touches_rim) == (True, True)
+    step = advanced(FORCES, [1e5, 0.0, 0.0, 0.0])
+    assert (step.converged, step.touches_rim) == (True, True)
 
 
 def made(name: str, value: Any) -> Any:
@@ -196,7 +307,7 @@ def pressure(result: Any) -> np.ndarray:
 def bad() -> Iterator[tuple[str, str, str]]:
     yield "gap", "complex", "gap: an array of real numbers expected"
     yield "gap", "masked", "gap: an array without masked values expected"
-    yield "gap", "a row less", r"gap: expected an array of shape \(9, 9\)"
+    yield "gap", "a row less", r"gap: an array of shape \(8, 9\), expected \(9, 9\)"
     yield "gap", "huge", r"gap: expected lengths of at most 1e\+30 m"
     yield "gap of a function", "words", "gap: an array of real numbers expected"
     yield (

@@ -1,16 +1,21 @@
 """The command ``hexcontact plot``: its options, its help, and what it says to what cannot be drawn."""
 
 import inspect
+import io
 import re
 from pathlib import Path
+from typing import Any
 
+import drawn
+import matplotlib
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from hexcontact import Case, plot_choices, plot_command, plotting, plotting_influence
+from hexcontact import Case, open_result, plot_choices, plot_command, plotting
 from hexcontact.cli import app
 from hexcontact.errors import DeckError
+from hexcontact.plotting import influence as plotting_influence
 
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 
@@ -41,39 +46,56 @@ def plot(*words: str | Path) -> tuple[int, str, str]:
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "arguments"),
     [
-        ["--what", "zones", "--step", "1,2,3,5"],
-        ["-w", "zones", "--arrows", "traction"],
-        ["-w", "tractions", "-s", "2,3,5"],
-        ["-w", "tractions", "--angle", "30", "--through", "10um,0um"],
-        ["-w", "section", "--angle", "0.5rad", "--step", "-1"],
-        ["-w", "traction", "-s", "2,3"],
-        ["-w", "history", "--over", "tangential_load_x"],
-        ["-w", "outlines", "-s", "2,3"],
-        ["-w", "loop"],
-        [],
+        (["--what", "zones", "--step", "1,2,3,5"], {"steps": [1, 2, 3, 5]}),
+        (["-w", "zones", "--arrows", "traction"], {"arrows": "traction"}),
+        (["-w", "tractions", "-s", "2,3,5"], {"steps": [2, 3, 5]}),
+        (
+            ["-w", "tractions", "--angle", "30", "--through", "10um,0um"],
+            {"angle": np.pi / 6, "through": (1e-5, 0.0)},
+        ),
+        (["-w", "section", "--angle", "0.5rad", "--step", "-1"], {"angle": 0.5}),
+        (["-w", "traction", "-s", "2,3"], {"steps": [2, 3]}),
+        (["-w", "history", "--over", "tangential_load_x"], {"over": "tangential_load_x"}),
+        (["-w", "outlines", "-s", "2,3"], {"steps": [2, 3]}),
+        (["-w", "loop"], {}),
+        ([], {}),
     ],
 )
-def test_a_picture_is_written(folder: Path, tmp_path: Path, words: list[str]) -> None:
+def test_the_picture_is_the_one_that_the_options_choose(
+    folder: Path, tmp_path: Path, words: list[str], arguments: dict[str, Any]
+) -> None:
     picture = tmp_path / "picture.png"
     code, out, err = plot(folder / "sheared.nc", *words, "-o", picture)
     assert (code, err) == (0, "")
     assert out == f"written: {picture}\n"
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    draw = plotting.FIGURES[words[1] if words else "overview"]
+    found, result = drawn.pixels(picture), open_result(folder / "sheared.nc")
+    np.testing.assert_array_equal(found, drawn.pixels(draw(result, **arguments)))
+    if arguments:
+        plain = drawn.pixels(draw(result))
+        assert plain.shape != found.shape or (plain != found).any()
 
 
 @pytest.mark.parametrize("kind", ["pdf", "svg"])
-def test_pictures_for_a_paper(folder: Path, tmp_path: Path, kind: str) -> None:
-    picture = tmp_path / f"loop.{kind}"
-    assert plot(folder / "sheared.nc", "-w", "loop", "-o", picture)[0] == 0
-    assert picture.read_bytes().startswith(b"%PDF" if kind == "pdf" else b"<?xml")
+def test_pictures_for_a_paper(
+    folder: Path, tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")  # no time in the file
+    picture, expected = tmp_path / f"loop.{kind}", io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "names"}):
+        assert plot(folder / "sheared.nc", "-w", "loop", "-o", picture)[0] == 0
+        plotting.loop(open_result(folder / "sheared.nc")).savefig(expected, format=kind, dpi=200)
+    assert picture.read_bytes() == expected.getvalue()
 
 
 def test_several_files(folder: Path, tmp_path: Path) -> None:
     picture = tmp_path / "zones.png"
     twice = folder / "sheared.nc", folder / "sheared.nc"
     assert plot(*twice, "-w", "zones", "-s", "2,3", "-o", picture)[0] == 0
+    expected = plotting.zones([open_result(path) for path in twice], [2, 3])
+    np.testing.assert_array_equal(drawn.pixels(picture), drawn.pixels(expected))
     code, _, err = plot(*twice, "-w", "loop")
     assert code == 2
     assert "--what loop shows one result; expected one FILE, not 2" in err
@@ -151,6 +173,7 @@ def test_all_draws_what_there_is(folder: Path, tmp_path: Path) -> None:
     assert code == 0
     written = {path.stem for path in tmp_path.iterdir()}
     assert written == {"p_overview", "p_pressure", "p_section", "p_boundary", "p_history"}
+    assert all(drawn.strokes(path.read_bytes(), "pdf") > 100 for path in tmp_path.iterdir())
     assert "left out: zones (a contact without friction has no stick and slip zones)" in out
     code, out, _ = plot(folder / "sheared.nc", "-w", "all", "--step", "3", "-o", tmp_path / "s.png")
     assert code == 0
@@ -158,6 +181,10 @@ def test_all_draws_what_there_is(folder: Path, tmp_path: Path) -> None:
     assert left_out == ["torsion"]
     written = {path.stem[2:] for path in tmp_path.glob("s_*")}
     assert written == set(plotting.FIGURES) - {"torsion", "compliance"}
+    result = open_result(folder / "sheared.nc")
+    for name in ("pressure", "section", "zones"):
+        found, expected = drawn.pixels(tmp_path / f"s_{name}.png"), plotting.FIGURES[name](result, 3)
+        np.testing.assert_array_equal(found, drawn.pixels(expected))
     code, _, err = plot(folder / "sheared.nc", "-w", "all", "--step", "9")
     assert code == 2
     assert "there is no step 9" in err
@@ -192,6 +219,9 @@ def test_kind_of_picture_by_option_and_by_name(folder: Path, tmp_path: Path, kin
     target = folder / f"pressed_pressure.{kind}"
     assert (code, out, err) == (0, f"written: {target}\n", "")
     assert target.read_bytes().startswith(start)
+    if kind == "png":
+        expected = plotting.pressure_field(open_result(folder / "pressed.nc"))
+        np.testing.assert_array_equal(drawn.pixels(target), drawn.pixels(expected))
     named = tmp_path / f"own.{kind}"
     assert plot(folder / "pressed.nc", "-w", "section", "-o", named)[0] == 0
     assert named.read_bytes().startswith(start)
@@ -200,7 +230,8 @@ def test_kind_of_picture_by_option_and_by_name(folder: Path, tmp_path: Path, kin
 def test_all_pictures_have_the_kind_asked_for(folder: Path) -> None:
     code, out, _ = plot(folder / "pressed.nc", "--what", "all", "-f", "svg")
     names = re.findall(r"written: (.*)", out)
-    assert code == 0 and len(names) > 2 and all(name.endswith(".svg") for name in names)
+    assert code == 0 and len(names) == 5 and all(name.endswith(".svg") for name in names)
+    assert all(drawn.strokes(Path(name).read_bytes(), "svg") > 100 for name in names)
 
 
 def test_name_and_kind_of_a_picture_are_not_both_given(folder: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import base64
 import fcntl
 import hashlib
+import html
 import html.parser
 import io
 import json
@@ -22,12 +23,13 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from hexcontact import Case, open_result
+from hexcontact import Case, analytic, open_result
 from hexcontact.cli import app
-from hexcontact.report import report, write_report
-from hexcontact.report_fields import MOST_STEPS, Plane, kept_steps
+from hexcontact.plotting.report import report, write_report
+from hexcontact.plotting.report_fields import MOST_STEPS, Plane, kept_steps
 from hexcontact.result import Result, Step
 from hexcontact.step_view import StepView
+from hexcontact.text import quantity
 
 DECK = """\
 title = "Sheared <script>alert('1 & 2')</script> {{data}}"
@@ -85,6 +87,23 @@ def data_of(page: str) -> dict[str, Any]:
     assert found
     data: dict[str, Any] = json.loads(found.group(1))
     return data
+
+
+FACTOR = {  # from the units of the page to SI
+    **{"": 1.0, "N": 1.0, "GPa": 1e9, "MPa": 1e6, "µm": 1e-6, "nm": 1e-9},
+    **{"mJ": 1e-3, "µJ": 1e-6, "mm²": 1e-6, "µm²": 1e-12},
+}
+MAPPED = (
+    ("pressure",),
+    ("traction_x", "traction_y"),
+    ("slip_increment_x", "slip_increment_y"),
+    ("accumulated_slip",),
+)
+
+
+def picture(data: str) -> np.ndarray:
+    """Return the shades of a picture of the page."""
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
 
 
 class Reader(html.parser.HTMLParser):
@@ -154,10 +173,35 @@ def test_inputs_loads_and_residuals_are_in_tables(folder: Path) -> None:
     page = (folder / "sheared.html").read_text(encoding="utf-8")
     assert "sphere, radius 10.00 mm" in page and "coefficient 0.5, incremental" in page
     history = open_result(folder / "sheared.nc").history
+    assert len(history) == 6
+    residuals = [f"residual_{name}" for name in ("normal", "tangential", "force", "shear_force", "torque")]
     for number, row in history.iterrows():
         (line,) = re.findall(rf'<tr id="row-{number}">.*?</tr>', page)
-        assert f"<td>{row['residual_normal']:.1e}</td><td>{row['residual_tangential']:.1e}</td>" in line
-    assert '<th scope="row">2</th><td class="text">shear &lt;/script&gt;</td><td>3 to 6</td>' in page
+        cells = [html.unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", line)]
+        assert cells[:-1] == [
+            row["label"],
+            *(f"{row[name]:.1e}" for name in residuals),
+            str(row["sweeps"]),
+            str(row["cuts"]),
+            f"{row['operator_applications']:.3g}",
+        ]
+        assert cells[-1] == quantity(row["seconds"], "s", 3)
+    (table,) = re.findall(r"<caption>Load history: the end of each segment</caption>.*?</table>", page)
+    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in re.findall(r"<tr>.*?</tr>", table)]
+    ends = history.loc[[2, 6]]
+    assert [row[:3] for row in rows] == [
+        ["segment", "label", "steps"],
+        ["1", "press", "1 to 2"],
+        ["2", "shear &lt;/script&gt;", "3 to 6"],
+    ]
+    for sign, name, unit in (
+        ("P", "normal_load", "N"),
+        ("approach", "approach", "m"),
+        ("Qx", "tangential_load_x", "N"),
+    ):
+        column = rows[0].index(sign)
+        shown = [quantity(value if abs(value) > 1e-6 else 0.0, unit) for value in ends[name]]
+        assert [row[column] for row in rows[1:]] == shown
 
 
 def test_maps_are_the_fields(folder: Path) -> None:
@@ -165,18 +209,30 @@ def test_maps_are_the_fields(folder: Path) -> None:
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
     assert [m["name"] for m in fields["maps"]] == ["pressure", "traction", "slip", "accumulated_slip"]
     assert fields["length"] == "µm"
-    pressure = fields["maps"][0]
-    assert pressure["unit"] == "MPa" or pressure["unit"] == "GPa"
-    unit = {"MPa": 1e6, "GPa": 1e9}[pressure["unit"]]
-    for k, number in enumerate(fields["steps"]):
-        view = StepView.of(result, number)
-        assert pressure["max"][k] * unit == pytest.approx(view.pressure.max(), rel=1e-3)
-        gray = np.asarray(Image.open(io.BytesIO(base64.b64decode(pressure["images"][k]))))
-        plane = Plane(tuple(1e-6 * v for v in fields["limits"]), max(gray.shape))
-        assert plane.shape == gray.shape
-        expected = view.at(*plane.points)
-        read = np.where(gray > 0, (gray - 1.0) / 254.0, 0.0) * view.pressure.max()
-        np.testing.assert_allclose(read, expected, atol=view.pressure.max() * (0.5 / 254 + 1e-5))
+    assert fields["steps"] == [1, 2, 3, 4, 5, 6]
+    assert [m["unit"] for m in fields["maps"]] == ["MPa", "MPa", "nm", "nm"]
+    for shown, names in zip(fields["maps"], MAPPED, strict=True):
+        assert len(shown["images"]) == len(shown["max"]) == 6
+        for k, number in enumerate(fields["steps"]):
+            view = StepView.of(result, number)
+            parts = [view.data[name].values for name in names]
+            largest = np.sqrt(sum(part**2 for part in parts))[view.contact].max()
+            if "slip" in shown["name"] and largest < 1e-7 * float(result.approach.max()):
+                largest = 0.0  # rounding
+            assert shown["max"][k] * FACTOR[shown["unit"]] == pytest.approx(largest, rel=1e-3)
+            gray = picture(shown["images"][k])
+            plane = Plane(tuple(1e-6 * v for v in fields["limits"]), max(gray.shape))
+            assert plane.shape == gray.shape
+            expected = np.sqrt(sum(view.at(*plane.points, part) ** 2 for part in parts))
+            inside = view.at(*plane.points) > 0.0
+            np.testing.assert_array_equal(gray > 0, inside)
+            if "slip" in shown["name"]:  # between nodes in contact: what is beyond the edge has no say
+                inside &= view.at(*plane.points, view.contact.astype(float)) > 1.0 - 1e-9
+            assert inside.sum() > 1000
+            read = (gray - 1.0) / 254.0 * largest
+            np.testing.assert_allclose(
+                read[inside], expected[inside] if largest else 0.0, atol=largest * 0.505 / 254
+            )
 
 
 def test_pictures_begin_at_the_upper_left() -> None:
@@ -188,26 +244,37 @@ def test_pictures_begin_at_the_upper_left() -> None:
 def test_zone_map_shows_the_zone_of_the_next_node(folder: Path) -> None:
     result = open_result(folder / "sheared.nc")
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
-    gray = np.asarray(Image.open(io.BytesIO(base64.b64decode(fields["zones"][-1]))))
-    plane, view = Plane(tuple(1e-6 * v for v in fields["limits"]), max(gray.shape)), StepView.of(result, -1)
-    x, y = plane.points
-    for row, col in np.random.default_rng(3).integers(0, gray.shape, (200, 2)):
-        away = np.hypot(view.x - x[row, col], view.y - y[row, col])
-        if np.partition(away.ravel(), 1)[1] - away.min() > 1e-3 * view.spacing:  # not between two nodes
-            assert gray[row, col] == view.data["zone"].values.ravel()[away.argmin()]
-    share = (gray == 1).sum() / (gray > 0).sum()
-    assert share == pytest.approx(float(view.data["stick_area"] / view.data["contact_area"]), abs=0.01)
+    assert len(fields["zones"]) == 6
+    for number, zones in enumerate(fields["zones"], start=1):
+        gray, view = picture(zones), StepView.of(result, number)
+        plane = Plane(tuple(1e-6 * v for v in fields["limits"]), max(gray.shape))
+        x, y = plane.points
+        judged = 0
+        for row, col in np.random.default_rng(number).integers(0, gray.shape, (200, 2)):
+            away = np.hypot(view.x - x[row, col], view.y - y[row, col])
+            if np.partition(away.ravel(), 1)[1] - away.min() > 1e-3 * view.spacing:  # not between two nodes
+                assert gray[row, col] == view.data["zone"].values.ravel()[away.argmin()]
+                judged += 1
+        assert judged > 190
+        share = (gray == 1).sum() / (gray > 0).sum()
+        assert share == pytest.approx(float(view.data["stick_area"] / view.data["contact_area"]), abs=0.01)
 
 
 def test_arrows_point_along_the_traction_where_there_is_slip(folder: Path) -> None:
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
-    (traction,) = [m for m in fields["maps"] if m["name"] == "traction"]
-    x, y, u, _ = np.reshape(traction["arrows"][-1], (-1, 4)).T
-    assert len(x) > 50 and x.min() > 0 and x.max() < 1000 and y.min() > 0 and y.max() < 1000
-    assert np.mean(u > 0) > 0.8  # the load on body 1 is along +x
-    (slip,) = [m for m in fields["maps"] if m["name"] == "slip"]
-    _, _, u, _ = np.reshape(slip["arrows"][-1], (-1, 4)).T
-    assert np.mean(u < 0) > 0.8  # and opposed to its slip
+    view = StepView.of(open_result(folder / "sheared.nc"), -1)
+    x_min, x_max, y_min, y_max = (1e-6 * v for v in fields["limits"])
+    for name, many, sign in (("traction", 50, 1), ("slip", 20, -1)):  # the load on body 1 is along +x
+        (shown,) = [m for m in fields["maps"] if m["name"] == name]
+        x, y, u, v = np.reshape(shown["arrows"][-1], (-1, 4)).T
+        assert len(x) > many and x.min() > 0 and x.max() < 1000 and y.min() > 0 and y.max() < 1000
+        assert np.mean(sign * u > 0) > 0.8
+        at = x_min + (x_max - x_min) * x / 1000.0, y_max - (y_max - y_min) * y / 1000.0
+        largest = shown["max"][-1] * FACTOR[shown["unit"]]
+        for drawn, axis in ((u, "x"), (v, "y")):
+            part = view.data[f"{'slip_increment' if name == 'slip' else name}_{axis}"].values
+            # places are rounded to a thousandth of the map, values to a percent of the largest
+            np.testing.assert_allclose(drawn, 100.0 * view.at(*at, part) / largest, atol=1.5)
 
 
 def test_slip_that_is_only_noise_is_not_shown() -> None:
@@ -220,25 +287,71 @@ def test_slip_that_is_only_noise_is_not_shown() -> None:
 
 def test_sections_hold_pressure_and_bounds(folder: Path) -> None:
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
+    result = open_result(folder / "sheared.nc")
     pressure, shear = fields["sections"]["panels"]
     assert list(pressure["curves"]) == ["p"] and list(shear["curves"]) == ["q_x", "μp"]
-    for bound, traction in zip(shear["curves"]["μp"], shear["curves"]["q_x"], strict=True):
-        assert (np.abs(traction) <= np.array(bound) * 1.001 + 1e-3 * max(bound)).all()
+    assert (pressure["unit"], shear["unit"]) == ("MPa", "MPa")
+    x = 1e-6 * np.array(fields["sections"]["x"])
+    assert (len(x), x[0], x[-1]) == (201, *(pytest.approx(1e-6 * v, rel=5e-5) for v in fields["limits"][:2]))
+    middle = 0.5e-6 * sum(fields["limits"][2:])
+    for panel, name, field, factor in (
+        (pressure, "p", "pressure", 1.0),
+        (shear, "q_x", "traction_x", 1.0),
+        (shear, "μp", "pressure", 0.5),
+    ):
+        assert len(panel["curves"][name]) == len(fields["steps"]) == 6
+        for number, curve in zip(fields["steps"], panel["curves"][name], strict=True):
+            view = StepView.of(result, number)
+            expected = factor * view.at(x, np.full(x.size, middle), view.data[field].values)
+            found = FACTOR[panel["unit"]] * np.array(curve)
+            np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max() + 1.0)
     pressed = data_of((folder / "pressed.html").read_text(encoding="utf-8"))
-    assert [list(p["curves"]) for p in pressed["fields"]["sections"]["panels"]] == [["p", "p (Hertz)"]]
+    (panel,) = pressed["fields"]["sections"]["panels"]
+    assert list(panel["curves"]) == ["p", "p (Hertz)"]
+    x = 1e-6 * np.array(pressed["fields"]["sections"]["x"])
+    hertz = analytic.hertz_sphere(0.5 * 210e9 / 0.91, 0.01, normal_load=100.0)
+    found = [FACTOR[panel["unit"]] * np.array(*curves) for curves in panel["curves"].values()]
+    assert np.count_nonzero(found[1]) > 100
+    np.testing.assert_allclose(found[1], hertz.pressure(x), rtol=0, atol=4e-4 * hertz.max_pressure)
+    view = StepView.of(open_result(folder / "pressed.nc"), -1)
+    np.testing.assert_allclose(found[0], view.at(x, 0.0 * x), rtol=0, atol=4e-4 * hertz.max_pressure)
     assert pressed["charts"] == [] and pressed["fields"]["zones"] == []
 
 
 def test_curves_are_the_history(folder: Path) -> None:
     charts = {c["title"]: c for c in data_of((folder / "sheared.html").read_text(encoding="utf-8"))["charts"]}
     history = open_result(folder / "sheared.nc").history
-    load = charts["Tangential load"]
-    assert load["unit"] == "N"
-    np.testing.assert_allclose(load["curves"]["Q_x"], history["tangential_load_x"], rtol=1e-4, atol=1e-6)
-    loop = charts["Tangential load over shift, x"]
-    assert "µm" in loop["xlabel"]
-    np.testing.assert_allclose(1e-6 * np.array(loop["x"]), history["shift_x"], rtol=1e-4, atol=1e-12)
-    assert charts["Residuals"]["log"] and "Torque" not in charts
+    expected = {
+        "Normal load": {"": "normal_load"},
+        "Approach": {"": "approach"},
+        "Tangential load": {"Q_x": "tangential_load_x"},
+        "Shift": {"x": "shift_x"},
+        "Contact and stick area": {"contact": "contact_area_fit", "stick": "stick_area_fit"},
+        "Largest pressure": {"": "max_pressure"},
+        "Largest shear traction": {"": "max_traction"},
+        "Elastic energy": {"": "elastic_energy"},
+        "Dissipated energy": {"": "dissipated_energy"},
+        "Tangential load over shift, x": {"": "tangential_load_x"},
+        "Residuals": {
+            "R_n": "residual_normal",
+            "R_t": "residual_tangential",
+            "R_P": "residual_force",
+            "R_Q": "residual_shear_force",
+        },
+    }
+    assert list(charts) == list(expected)
+    for title, curves in expected.items():
+        chart = charts[title]
+        assert list(chart["curves"]) == list(curves)
+        over, factor = (
+            ("shift_x", FACTOR[chart["xlabel"].partition("[")[2][:-1]]) if "over" in title else (None, 1.0)
+        )
+        xs = history[over] if over else history.index
+        np.testing.assert_allclose(factor * np.array(chart["x"]), xs, rtol=1e-4, atol=1e-14, err_msg=title)
+        for sign, name in curves.items():
+            values = FACTOR[chart["unit"]] * np.array(chart["curves"][sign])
+            np.testing.assert_allclose(values, history[name], rtol=1e-4, atol=1e-18, err_msg=name)
+    assert charts["Residuals"]["log"]
 
 
 def test_long_histories_show_some_steps_as_maps(folder: Path) -> None:
@@ -401,7 +514,7 @@ def hrefs(browser: Browser) -> list[str]:
 def test_page_opens_at_the_last_step(browser: Browser, folder: Path) -> None:
     browser.open(folder / "sheared.html")
     assert state(browser) == ("5", "step 6 of 6, shear </script>", "6", "row-6")
-    assert browser.value("document.querySelectorAll('#charts figure').length") >= 8
+    assert browser.value("document.querySelectorAll('#charts figure').length") == 11
     assert len(hrefs(browser)) == 5 and all(h.startswith("data:image/png") for h in hrefs(browser))
     assert browser.faults() == []
 

@@ -65,11 +65,9 @@ ONLY_CHECK = re.compile("|".join(map(re.escape, BEYOND)))
 )
 def test_the_schema_refuses_what_the_program_refuses(old: str, new: str, sentence: str) -> None:
     text = GOOD.replace(old, new, 1)
-    if ONLY_CHECK.search(sentence):
+    if ONLY_CHECK.search(sentence) or new in ("nan", "inf", "coefficient = nan"):  # JSON has neither of these
         with pytest.raises(ValueError, match=re.escape(sentence[:20])):
             Deck.parse(tomllib.loads(text), Source("deck", text))
-    elif new in ("nan", "inf", "coefficient = nan"):
-        assert "nan" in text or "inf" in text  # JSON has neither
     else:
         assert faults(text)
 

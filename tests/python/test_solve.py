@@ -16,10 +16,11 @@ from hexcontact import memory, native, solve
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.errors import ConvergenceError, DeckError, ResourceError
-from hexcontact.progress import Lines, Reporter, quantity, reporter
+from hexcontact.progress import Lines, Reporter, reporter
 from hexcontact.result import Step
 from hexcontact.store import journal_of, open_result
 from hexcontact.surfaces import Punch, Sphere
+from hexcontact.text import quantity
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 ALUMINIUM = {"young_modulus": 70e9, "poisson_ratio": 0.33}
@@ -46,12 +47,12 @@ def test_a_step_holds_what_the_solution_says() -> None:
     history, fields, lattice = step.history, step.fields, step.lattice
     hertz = hertz_sphere(case.pair.effective_modulus, 10e-3, normal_load=100.0)
     # bounds: discretization at 12 spacings (theory: p_max and approach second order, a_A within 0.2 spacings)
-    assert history["max_pressure"] == pytest.approx(hertz.max_pressure, rel=2e-3)
-    assert history["approach"] == pytest.approx(hertz.approach, rel=1e-3)
-    assert history["contact_radius"] == pytest.approx(hertz.contact_radius, abs=0.5 * lattice.spacing)
-    assert history["contact_radius_fit"] == pytest.approx(hertz.contact_radius, abs=0.03 * lattice.spacing)
+    assert history["max_pressure"] == pytest.approx(hertz.max_pressure, rel=6.3e-4)
+    assert history["approach"] == pytest.approx(hertz.approach, rel=3.5e-4)
+    assert history["contact_radius"] == pytest.approx(hertz.contact_radius, abs=0.072 * lattice.spacing)
+    assert history["contact_radius_fit"] == pytest.approx(hertz.contact_radius, abs=0.014 * lattice.spacing)
     # U = integral of P d(approach) = (2/5) P approach for a sphere
-    assert history["elastic_energy"] == pytest.approx(0.4 * 100.0 * float(history["approach"]), rel=5e-3)
+    assert history["elastic_energy"] == pytest.approx(0.4 * 100.0 * float(history["approach"]), rel=6.3e-4)
     # ... and exactly half the work of the pressure on the elastic closing, gap - initial gap + approach
     closing = fields["gap"] - fields["initial_gap"] + history["approach"]
     work = 0.5 * lattice.cell_area * float((fields["pressure"] * closing).sum())
@@ -368,6 +369,5 @@ def test_two_cases_run_in_two_threads() -> None:
     with ThreadPoolExecutor(2) as pool:
         together = list(pool.map(lambda _: sphere().run(), range(4)))
     for result in together:
-        assert_allclose(
-            result.pressure.values, alone.pressure.values, rtol=0, atol=1e-9 * float(alone.max_pressure[0])
-        )
+        for name in set(alone.dataset.data_vars) - {"seconds"}:
+            assert_array_equal(result[str(name)].values, alone[str(name)].values, err_msg=str(name))

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import socket
@@ -17,45 +18,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import netCDF4
-import numpy as np
 import pytest
 import xarray
+from fuzz.file_made import WINDOW, made_step, written
 from numpy.testing import assert_array_equal
 
+from hexcontact import journal as journal_module
 from hexcontact import lock as lock_module
 from hexcontact import store as store_module
 from hexcontact.errors import DeckError, ResourceError
-from hexcontact.lattice import Lattice
 from hexcontact.lock import Lock
 from hexcontact.record import read_record
 from hexcontact.result import Metadata, Step, assemble
 from hexcontact.store import Journal, Store, journal_of, open_result
-
-WINDOW = Lattice(spacing=1e-4, row_first=-4, col_first=-5, n_row=9, n_col=10)
-
-
-def made_step(index: int, lattice: Lattice = WINDOW) -> Step:
-    """Return a step with numbers of its own."""
-    rng = np.random.default_rng(index)
-    fields = {
-        "initial_gap": 1e-6 * (lattice.rows[:, None] ** 2 + lattice.cols[None, :] ** 2),
-        "pressure": rng.random(lattice.shape),
-        "gap": rng.random(lattice.shape),
-        "zone": rng.integers(0, 3, lattice.shape).astype("i1"),
-    }
-    history = {"normal_load": 10.0 * (index + 1), "seconds": 0.5, "label": f"pressé {index}", "segment": 1}
-    return Step(index, lattice, fields, history)
-
-
-def written(path: Path, count: int = 3, planned: int = 3, **metadata: object) -> Metadata:
-    """Write `count` steps; finish if all are there."""
-    described = Metadata(title="a case", deck="deck = 1", planned_steps=planned, **metadata)  # type: ignore[arg-type]
-    with Store(path, described) as store:
-        for index in range(count):
-            store.append(made_step(index))
-        if count == planned:
-            store.finish()
-    return described
 
 
 def content(path: Path) -> dict[str, bytes]:
@@ -189,14 +164,14 @@ def test_the_journal_of_another_run_does_not_mix_in(out: Path) -> None:
 def test_interim_outputs_cost_linear_time(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store_module, "PUBLISH_INTERVAL", 0.0)
     reads = 0
-    original = store_module.read_record
+    original = journal_module.read_record
 
     def counted(path: Path) -> tuple[Metadata, Step]:
         nonlocal reads
         reads += 1
         return original(path)
 
-    monkeypatch.setattr(store_module, "read_record", counted)
+    monkeypatch.setattr(journal_module, "read_record", counted)
     written(out, count=33, planned=34)
     assert reads == 1 + 2 + 4 + 8 + 16 + 32
 
@@ -258,9 +233,80 @@ def test_overwriting_an_abandoned_overwrite_keeps_the_first_output(out: Path) ->
         assert open_result(out).case_title == "a case"
 
 
+FOREIGN = {
+    "a record": "000001.npz",
+    "a temporary record": "000002.npz.tmp",
+    "a temporary output": "out.nc.tmp",
+    "a reason": "stopped.txt",
+    "a list of lattices": "lattices/trials.json",
+    "a step of a lattice": "lattices/1_0.nc.d/000001.npz",
+}
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("name", FOREIGN.values(), ids=FOREIGN)
+def test_a_folder_that_no_run_has_written_to_is_refused(out: Path, name: str, overwrite: bool) -> None:
+    theirs = journal_of(out) / name
+    theirs.parent.mkdir(parents=True)
+    theirs.write_bytes(b"measured for a year")
+    before = content(out.parent)
+    with pytest.raises(DeckError, match=rf"{re.escape(str(theirs))} may not be of hexcontact.*move "):
+        Store(out, Metadata(), overwrite)
+    assert content(out.parent) == before
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_other_files_in_the_folder_stay(out: Path, overwrite: bool) -> None:
+    """Names of their own do no harm, in the folder of an unfinished run too."""
+    theirs = ["a.tmp", "1.npz", "lattices/notes.txt", "lattices/a/000001.npz", "other.nc.tmp"]
+    for name in theirs:
+        file = journal_of(out) / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(b"measured for a year")
+    before = content(out.parent)
+    for planned, replaced in ((5, overwrite), (2, True)):
+        with Store(out, Metadata(planned_steps=planned), replaced) as store:
+            store.append(made_step(0))
+            store.append(made_step(1))
+            if planned == 2:
+                store.finish()
+    assert len(before) == len(theirs)
+    assert content(out.parent) == before | {"out.nc": out.read_bytes()}
+
+
+def test_what_a_killed_run_left_before_its_first_step_is_taken_over(out: Path) -> None:
+    journal_of(out).mkdir()
+    (journal_of(out) / "000001.npz.tmp").write_bytes(b"PK")
+    lock = {"process": 1, "host": socket.gethostname(), "since": "2030-01-01 00:00:00", "time": 0.0}
+    (journal_of(out) / "lock").write_text(json.dumps(lock))
+    written(out)
+    assert [p.name for p in out.parent.iterdir()] == ["out.nc"]
+
+
+def test_only_results_are_overwritten(out: Path) -> None:
+    written(out)
+    kept = out.read_bytes()
+    sealed = len(kept) - 48  # bytes of HDF5
+    ours = {"as written": kept, "damaged": kept[:3000] + bytes(999) + kept[3999:], "empty": b""}
+    ours["of an earlier version"] = kept[:sealed]
+    xarray.Dataset({"a": ("x", [1.0])}).to_netcdf(out)
+    theirs = {"netCDF": out.read_bytes(), "classic": b"CDF\x01measured", "HDF5": b"\x89HDF\r\n\x1a\nmeasured"}
+    for what, data in theirs.items():
+        out.write_bytes(data)
+        with pytest.raises(DeckError, match=r"out\.nc is not a result of hexcontact that can be read, so it"):
+            Store(out, Metadata(), overwrite=True)
+        assert content(out.parent) == {"out.nc": data}, what
+    for what, data in ours.items():
+        out.write_bytes(data)
+        with Store(out, Metadata(title=what, planned_steps=1), overwrite=True) as store:
+            store.append(made_step(0))
+            store.finish()
+        assert open_result(out).case_title == what
+
+
 def test_a_link_is_followed(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
-    (tmp_path / "disk" / "real.nc").write_bytes(b"CDF\x01old")
+    written(tmp_path / "disk" / "real.nc")
     (tmp_path / "out.nc").symlink_to(tmp_path / "disk" / "real.nc")
     with Store(tmp_path / "out.nc", Metadata(planned_steps=1), overwrite=True) as store:
         store.append(made_step(0))
@@ -526,9 +572,17 @@ def test_the_lock_of_another_host_holds(out: Path) -> None:
         pass
 
 
-def test_a_lock_of_rubbish_is_taken_over(out: Path) -> None:
+def test_a_file_in_the_place_of_the_lock_stays_as_it_is(out: Path) -> None:
     journal_of(out).mkdir()
     (journal_of(out) / "lock").write_text("[1, 2")
+    with pytest.raises(DeckError, match="lock"), Store(out, Metadata()):
+        pass
+    assert (journal_of(out) / "lock").read_text() == "[1, 2"
+
+
+def test_a_lock_that_was_cut_short_is_taken_over(out: Path) -> None:
+    journal_of(out).mkdir()
+    (journal_of(out) / "lock").write_text('{"process": 1, "ho')
     with Store(out, Metadata()):
         pass
 
@@ -568,102 +622,3 @@ def test_two_threads_write_two_files(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert failed == []
-
-
-# --- damaged and foreign files --------------------------------------------------------------------
-
-
-def test_files_that_are_no_results(tmp_path: Path) -> None:
-    (tmp_path / "text.nc").write_text("no netCDF")
-    (tmp_path / "empty.nc").touch()
-    (tmp_path / "folder").mkdir()
-    xarray.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "foreign.nc")
-    for name, message in {
-        "text.nc": r"text\.nc is damaged or not a netCDF file",
-        "empty.nc": r"empty\.nc is damaged or not a netCDF file",
-        "foreign.nc": r"foreign\.nc was not written by hexcontact",
-        "missing.nc": r"there is no file .*missing\.nc",
-        "folder": "folder is a folder without finished steps",
-    }.items():
-        with pytest.raises(DeckError, match=message):
-            open_result(tmp_path / name)
-
-
-def test_another_layout_is_refused_with_its_number(out: Path) -> None:
-    written(out)
-    with netCDF4.Dataset(out, "a") as file:
-        file.schema_version = np.int32(99)
-        file.hexcontact_version = "7.0"
-    message = r"has the file layout 99 of hexcontact 7\.0; this version reads layout 1"
-    with pytest.raises(DeckError, match=message):
-        open_result(out)
-
-
-def test_a_truncated_file_is_damaged_not_a_crash(out: Path) -> None:
-    written(out)
-    whole = out.read_bytes()
-    for part in np.linspace(0, len(whole) - 1, 40).astype(int):
-        out.write_bytes(whole[:part])
-        with pytest.raises(DeckError, match="is damaged"):
-            open_result(out)
-
-
-def test_flipped_bytes_in_a_field_are_noticed(out: Path) -> None:
-    """Checksums: a field that can be read is the field that was written."""
-    written(out, 1, planned=1)
-    whole = out.read_bytes()
-    expected = made_step(0).fields["pressure"]
-    noticed = 0
-    for at in range(0, len(whole), 211):
-        out.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
-        try:
-            values = open_result(out).pressure.values
-        except (DeckError, RuntimeError):
-            noticed += 1
-        else:
-            assert_array_equal(values[0], expected)
-    assert noticed > 3
-
-
-def test_flipped_bytes_in_a_record_are_noticed(out: Path) -> None:
-    """A record that can be read is the record that was written, its history included."""
-    described = written(out, 1, planned=2)
-    record = journal_of(out) / "000001.npz"
-    whole = record.read_bytes()
-    expected = assemble(described, [made_step(0)], complete=False)
-    noticed, places = 0, range(0, len(whole), 11)
-    for at in places:
-        record.write_bytes(whole[:at] + bytes([255 - whole[at]]) + whole[at + 1 :])
-        try:
-            read = open_result(out).dataset
-        except DeckError as error:
-            assert "000001.npz is damaged" in str(error)
-            noticed += 1
-        else:
-            assert read.identical(expected)
-    assert noticed > 0.9 * len(places)
-
-
-def test_a_record_of_another_version_is_refused(out: Path) -> None:
-    written(out, 1, planned=2)
-    record = journal_of(out) / "000001.npz"
-    with np.load(record) as file:
-        arrays = dict(file)
-    text = arrays["about"].tobytes().replace(b'"journal_version": 1', b'"journal_version": 9')
-    np.savez(record, **(arrays | {"about": np.frombuffer(text, "u1")}))
-    with pytest.raises(DeckError, match=r"000001\.npz was kept by hexcontact .*layout 9; .* reads layout 1"):
-        open_result(out)
-
-
-def test_a_gap_or_a_damaged_record_in_the_journal_is_named(out: Path) -> None:
-    written(out, count=3, planned=9)
-    record = journal_of(out) / "000002.npz"
-    kept = record.read_bytes()
-    record.write_bytes(kept[: len(kept) // 2])
-    with pytest.raises(DeckError, match=r"000002\.npz is damaged"):
-        open_result(out)
-    record.unlink()
-    with pytest.raises(DeckError, match=r"lacks the record of step 2, 000002\.npz"):
-        open_result(out)
-    with Store(out, Metadata(planned_steps=1), overwrite=True):  # nothing stands in the way of a new run
-        pass

@@ -380,6 +380,72 @@ def test_job_array_runs_case_by_case(folder: Path) -> None:
         assert_array_equal(dataset.status, [[2, 0, 0], [2, 2, 2]])
 
 
+def test_no_text_of_a_study_becomes_a_line_of_its_script(folder: Path) -> None:
+    text = (folder / "study.toml").read_text()
+    told = 'title = "a\\ntouch PWN\\n# "\n' + text
+    options = """[slurm]
+comment = "it's mine # and long"
+time = 01:30:00
+nice = 10
+exclusive = true
+requeue = false
+nodelist = "n[1-3],m7"
+"""
+    (folder / "study.toml").write_text(told + options)
+    (folder / "study.toml").rename("my study; touch PWN.toml")
+    script = command("my study; touch PWN.toml", "--slurm", "--output", "50% $(touch PWN).nc").stdout
+    lines = script.splitlines()
+    assert [line for line in lines if not line.startswith("#")] == [lines[-2], lines[-1]]
+    assert lines[-2].startswith("export OMP_NUM_THREADS=")
+    assert "PWN" in lines[-1]
+    found = {line.removeprefix("#SBATCH --") for line in lines if line.startswith("#SBATCH --")}
+    assert found == {
+        "array=1-6",
+        'job-name="50% $(touch PWN)"',
+        'output="50%% $(touch PWN)/slurm-%A_%a.log"',
+        "signal=B:USR1@60",
+        'comment="it\'s mine # and long"',
+        "time=01:30:00",
+        "nice=10",
+        "exclusive",
+        "nodelist=n[1-3],m7",
+    }
+    words = lines[-1].replace("exec hexcontact", f"exec {sys.executable} -m hexcontact")
+    environment = ENVIRONMENT | {"SLURM_ARRAY_TASK_ID": "3"}
+    run = "\n".join([*lines[:-1], words])
+    assert subprocess.run(["sh"], input=run, text=True, env=environment).returncode == 0
+    assert not Path("PWN").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (r'time = "1:00:00\ntouch PWN"', "slurm.time = "),
+        (r'time = "1:00\rtouch PWN"', "slurm.time = "),
+        (r'comment = "a\u2028b"', "slurm.comment = "),
+        (r'comment = "a\" --wrap=x"', 'slurm.comment = "a\\" --wrap=x": expected text on one line'),
+        (r'"time=1\ntouch PWN" = 1', "expected an option of sbatch"),
+        ('"time = 1" = 1', "expected an option of sbatch"),
+        ('array = "1-9"', "slurm.array = "),
+        ("time = [1, 2]", "slurm.time = [1, 2]: expected text, a number, or true or false"),
+        ('comment = ""', "slurm.comment = "),
+    ],
+)
+def test_options_of_a_script_are_checked(folder: Path, options: str, sentence: str) -> None:
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(f"{text}[slurm]\n{options}\n")
+    done = command("study.toml", "--slurm")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert sentence in done.stderr, done.stderr
+
+
+def test_a_script_needs_a_name_on_one_line(folder: Path) -> None:
+    done = command("study.toml", "--slurm", "--output", "a\ntouch PWN.nc")
+    assert done.returncode == 2
+    assert "a script needs a name on one line" in done.stderr
+
+
 def test_a_task_of_a_job_array_heeds_what_slurm_sends(folder: Path) -> None:
     (folder / "deck.toml").write_text(LONG)
     (folder / "study.toml").write_text(

@@ -56,6 +56,7 @@ CASES: dict[str, Callable[[], Case]] = {
 
 def assert_same(one: Result, other: Result) -> None:
     """See to it that two results are the same to the bit, but for the times they took."""
+    assert set(one.dataset.data_vars) == set(other.dataset.data_vars)
     for name in set(one.dataset.data_vars) - {"seconds"}:
         assert_array_equal(one[str(name)].values, other[str(name)].values, err_msg=str(name))
 
@@ -78,6 +79,7 @@ def test_cases_in_threads_have_the_answers_of_cases_in_turn(tmp_path: Path) -> N
         for found in pool.map(together, range(2)):
             for name, result in found:
                 assert_same(result, serial[name])
+            assert [name for name, _ in found] in ([*cases], [*cases][::-1])
 
 
 def test_two_sessions_in_two_threads_do_not_feel_each_other() -> None:
@@ -152,6 +154,7 @@ class Timed:
         return timed
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("work", [lambda: press("fft"), lambda: press("direct"), shear, apply])
 def test_python_goes_on_while_the_core_works(
     ticks: list[float], work: Callable[[], Callable[[], object]], monkeypatch: pytest.MonkeyPatch

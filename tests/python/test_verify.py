@@ -1,17 +1,21 @@
-"""The machinery of ``hexcontact verify``, and its checks at a size that is quick."""
+"""``hexcontact verify``, and the frictionless checks of tests/validation at a size that is quick."""
 
 import csv
 import math
+import tomllib
 from importlib import resources
-from pathlib import Path
 
 import pytest
+from validation import checks, normal, runs
+from validation import reference as table_of_references
+from validation.reference import TABLE, reference
+from validation.run import markdown
 
-from hexcontact import verify, verify_cases, verify_normal
+from hexcontact import verify
+from hexcontact.analytic.friction import MindlinContact
 from hexcontact.errors import DeckError
-from hexcontact.verify import Check, Comparison, reference
-
-TABLE = Path(__file__).parents[1] / "reference" / "benchmarks.csv"
+from hexcontact.native import ElasticPair
+from hexcontact.verify import Check, Comparison
 
 
 def failures(comparison: Comparison) -> list[str]:
@@ -21,11 +25,6 @@ def failures(comparison: Comparison) -> list[str]:
 
 
 # ----------------------------------------------------------------------------------- reference table
-
-
-def test_the_shipped_table_is_the_one_of_the_tests() -> None:
-    shipped = resources.files("hexcontact").joinpath("data/reference.csv").read_bytes()
-    assert shipped == TABLE.read_bytes()
 
 
 def test_every_row_of_the_table_can_be_read() -> None:
@@ -104,21 +103,18 @@ def made_up(computed: float) -> dict[str, Check]:
 
 
 @pytest.mark.parametrize(("computed", "code"), [(2.001, 0), (2.1, 1)])
-def test_exit_code(monkeypatch, capsys, computed: float, code: int) -> None:
-    monkeypatch.setattr(verify_cases, "CHECKS", made_up(computed))
-    assert verify.main([]) == code
+def test_exit_code(capsys, computed: float, code: int) -> None:
+    assert verify.main([], checks=made_up(computed)) == code
     printed = capsys.readouterr()
     assert ("FAIL" in printed.out) == bool(code)
     assert ("verify failed: made-up" in printed.err) == bool(code)
     assert f"made-up: {1 if code else 2} of 2 comparisons passed" in printed.out
 
 
-def test_markdown(monkeypatch, capsys) -> None:
-    monkeypatch.setattr(verify_cases, "CHECKS", made_up(2.1))
-    assert verify.main(["made-up"], table=True) == 1
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "# Validation"
-    assert "## Made up" in lines
+def test_markdown() -> None:
+    check = made_up(2.1)["made-up"]
+    lines = markdown(check, check.run()).splitlines()
+    assert lines[0] == "## Made up"
     assert "| one | length (µm) |  |  | **2** | 2.1 | +1.0e-01 µm | 1e-02 µm | FAIL |" in lines
     assert "| one | time (s) |  |  |  | 0.5 |  |  |  |" in lines
     assert "| one | max \\|p - q\\| |  |  | **0** | 1.000000e-09 | +1.0e-09 | 1e-08 | ok |" in lines
@@ -127,34 +123,59 @@ def test_markdown(monkeypatch, capsys) -> None:
 
 
 def test_list_and_unknown_names(capsys) -> None:
-    assert verify.main([], listing=True) == 0
+    assert verify.main([], checks=checks.CHECKS, listing=True) == 0
     listed = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    assert listed == list(verify_cases.CHECKS)
-    with pytest.raises(DeckError, match=r"no check 'table-9\.1'; expected one of kernels, "):
+    assert listed == list(checks.CHECKS)
+    with pytest.raises(DeckError, match=r"no check 'table-9\.1'; expected one of spheres, "):
         verify.main(["table-9.1"])
+
+
+def test_an_installation_is_tested_by_known_solutions() -> None:
+    for check in verify.self_test().values():
+        comparison = check.run()
+        assert failures(comparison) == []
+        assert all(row.passed for row in comparison.rows)
+    assert list(verify.self_test()) == ["spheres", "spheres-direct", "shear", "fretting"]
+
+
+def test_values_of_the_self_test_are_those_of_the_references() -> None:
+    text = (resources.files("hexcontact") / "data/self_test.toml").read_text()
+    values = [value for entry in tomllib.loads(text)["check"] for value in entry["values"]]
+    with TABLE.open(newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["unit"] in verify.UNITS]
+    known = [reference(row["case"], row["quantity"]).reference for row in rows] + [1000.0]  # N, given
+    found = [value["value"] for value in values if value["source"] == "reference"]
+    assert len(found) == 10
+    assert all(any(math.isclose(value, row, rel_tol=1e-12) for row in known) for value in found)
+    pair = ElasticPair.from_materials(71.1e9, 0.0, 71.1e9, 0.0)
+    hertz = runs.hertz_of(pair, 4000.0, 12.5e-3)
+    exact = MindlinContact(0.3, 4000.0, hertz.contact_radius, runs.shear_compliance(pair))
+    closed = [value["value"] for value in values if value["source"] == "analytic"]
+    solution = [hertz.max_pressure, float(exact.shift(600.0)), math.cbrt(0.5)]
+    assert closed == pytest.approx(solution, rel=1e-8)
 
 
 # ----------------------------------------------------------------------------------- the checks
 
 
 def test_kernels_and_materials() -> None:
-    for check in (verify_cases.kernels, verify_cases.materials):
+    for check in (checks.kernels, checks.materials):
         comparison = check()
         assert failures(comparison) == []
         assert all(row.passed for row in comparison.rows)
 
 
 def test_a_wrong_reference_value_is_a_failure(monkeypatch) -> None:
-    table = dict(verify._table())
+    table = dict(table_of_references._table())
     key = ("kernel at index difference (1,1)", "Kx/le")
     table[key] = {**table[key], "reference": "0.432823068373"}  # 0.4328230683709 in truth
-    monkeypatch.setattr(verify, "_table", lambda: table)
-    [failure] = failures(verify_cases.kernels())
+    monkeypatch.setattr(table_of_references, "_table", lambda: table)
+    [failure] = failures(checks.kernels())
     assert failure.startswith("(1,1), Kx/l_e: -2.1")
 
 
 def test_table_9_2() -> None:
-    comparison = verify_normal.table_9_2(("11x11 le=0.2 mm", "21x21 le=0.1 mm", "31x31 le=0.075 mm"))
+    comparison = normal.table_9_2(("11x11 le=0.2 mm", "21x21 le=0.1 mm", "31x31 le=0.075 mm"))
     assert failures(comparison) == []
     assert sum(row.passed is True for row in comparison.rows) == 3 + 3 * 8
     # published values stand beside p_max and a
@@ -162,24 +183,24 @@ def test_table_9_2() -> None:
 
 
 def test_convergence() -> None:
-    comparison = verify_normal.convergence((5, 7, 10, 14, 20, 28, 40))
+    comparison = normal.convergence((5, 7, 10, 14, 20, 28, 40))
     assert failures(comparison) == []
     assert sum(row.passed is True for row in comparison.rows) == 7 * 5 + 3
 
 
 def test_crossed_cylinders() -> None:
-    comparison = verify_normal.crossed_cylinders((90, 30))
+    comparison = normal.crossed_cylinders((90, 30))
     assert failures(comparison) == []
     assert sum(row.passed is True for row in comparison.rows) == 2 * 7
 
 
 def test_profiles() -> None:
-    comparison = verify_normal.profiles()
+    comparison = normal.profiles()
     assert failures(comparison) == []
     assert sum(row.passed is True for row in comparison.rows) == 3 * 3 + 2 + 2
 
 
 def test_control() -> None:
-    comparison = verify_normal.control()
+    comparison = normal.control()
     assert failures(comparison) == []
     assert sum(row.passed is True for row in comparison.rows) == 2 * 4 * 3

@@ -1,0 +1,124 @@
+"""Build what is distributed, and use it where nothing else is: ``make package``.
+
+The source archive holds every file of the last commit; the wheel is built from it in isolation, installed
+into an empty environment and used by its command in a folder outside the checkout. Then the same with
+``pip install .``. Run by an interpreter that has meson-python; archive and wheel go to build/dist.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tarfile
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+DIST = ROOT / "build/dist"
+
+# A user's shell: no tools of .venv, nothing that points to this checkout.
+ENVIRONMENT = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
+ENVIRONMENT["PATH"] = os.pathsep.join(
+    folder for folder in os.environ["PATH"].split(os.pathsep) if not Path(folder).is_relative_to(ROOT)
+)
+
+SESSION = [  # words of the command, and a file that it leaves
+    (["new", "sphere", "-o", "sphere.toml"], "sphere.toml"),
+    (["run", "sphere.toml"], "sphere.nc"),
+    (["info", "sphere.nc"], None),
+    (["plot", "sphere.nc"], "sphere_overview.png"),
+    (["report", "sphere.nc"], "sphere.html"),
+    (["new", "fretting", "-o", "fretting.toml"], "fretting.toml"),
+    (["run", "fretting.toml", "--quiet"], "fretting.nc"),
+    (["verify", "kernels", "materials", "table-9.2"], None),
+]
+
+
+def run(*words: str | Path, folder: Path = ROOT, environment: Mapping[str, str] = ENVIRONMENT) -> str:
+    """Run a command and return what it prints; end with its output where it fails."""
+    line = " ".join(str(word) for word in words)
+    print("$", line, flush=True)
+    done = subprocess.run(
+        words, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
+    )
+    if done.returncode != 0:
+        sys.exit(f"{done.stdout}{done.stderr}\n{line}: exit code {done.returncode}")
+    return done.stdout
+
+
+def compare(what: str, found: set[str], expected: set[str]) -> None:
+    """End with the differences of two lists of files, if there are any."""
+    missing, surplus = sorted(expected - found), sorted(found - expected)
+    if missing or surplus:
+        sys.exit(f"{what}: missing {missing}, not expected {surplus}")
+    print(f"{what}: {len(found)} files, none missing")
+
+
+def source_archive() -> Path:
+    """Return the source archive of the last commit."""
+    if run("git", "status", "--porcelain"):
+        print("Changes that are not committed are not in the archive.")
+    build = f"import mesonpy; mesonpy.build_sdist({str(DIST)!r})"
+    run(sys.executable, "-c", build, environment=os.environ)  # the tools of .venv
+    [path] = DIST.glob("*.tar.gz")
+    tracked = set(run("git", "ls-tree", "-r", "--name-only", "HEAD").splitlines())
+    with tarfile.open(path) as archive:
+        files = {name.partition("/")[2] for name in archive.getnames() if not archive.getmember(name).isdir()}
+    compare(path.name, files, tracked | {"PKG-INFO"})
+    return path
+
+
+def wheel_from(archive: Path) -> Path:
+    """Return the wheel that pip builds from a source archive in isolation."""
+    for old in DIST.glob("*.whl"):
+        old.unlink()
+    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", DIST, archive)
+    [path] = DIST.glob("*.whl")
+    tracked = run("git", "ls-tree", "-r", "--name-only", "HEAD", "pydriver/hexcontact").splitlines()
+    with zipfile.ZipFile(path) as wheel:
+        names = [name for name in wheel.namelist() if ".dist-info/" not in name and not name.endswith("/")]
+    extensions = {name for name in names if name.startswith("hexcontact/_core.") and name.endswith(".so")}
+    if len(extensions) != 1:
+        sys.exit(f"{path.name}: one compiled module was expected, found {sorted(extensions)}")
+    compare(path.name, set(names) - extensions, {name.removeprefix("pydriver/") for name in tracked})
+    return path
+
+
+def use(requirement: Path, scratch: Path) -> None:
+    """Install into an empty environment and use the command in a folder of its own."""
+    environment, folder = scratch / "venv", scratch / "work"
+    folder.mkdir(parents=True)
+    run(sys.executable, "-m", "venv", environment)
+    bin_ = environment / "bin"
+    run(bin_ / "python", "-m", "pip", "install", "--quiet", requirement)
+    run(bin_ / "python", "-m", "pip", "check")
+    version = run(bin_ / "hexcontact", "--version", folder=folder).split()[-1]
+    place = run(bin_ / "python", "-c", "import hexcontact; print(hexcontact.__file__)", folder=folder).strip()
+    if not Path(place).is_relative_to(environment):
+        sys.exit(f"hexcontact was imported from {place}, not from {environment}")
+    archives = [path.name for path in DIST.glob("*.tar.gz")]
+    if f"hexcontact-{version}.tar.gz" not in archives:
+        sys.exit(f"hexcontact --version says {version}; the archives are {archives}")
+    for words, left in SESSION:
+        run(bin_ / "hexcontact", *words, folder=folder)
+        if left and not (folder / left).is_file():
+            sys.exit(f"hexcontact {' '.join(words)} left no {left}")
+
+
+def main() -> None:
+    """Build and use the distributions."""
+    DIST.mkdir(parents=True, exist_ok=True)
+    for old in DIST.glob("*.tar.gz"):
+        old.unlink()
+    wheel = wheel_from(source_archive())
+    with tempfile.TemporaryDirectory(prefix="hexcontact-") as scratch:
+        use(wheel, Path(scratch, "wheel"))
+        use(ROOT, Path(scratch, "checkout"))
+    print(f"{wheel.name} works outside the checkout, and so does pip install .")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,218 @@
+!> How well a state fulfils the contact conditions; dimensionless.
+module hc_contact_residuals
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use hc_precision, only: wp
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_error, only: error_t, status, raise
+  use hc_contact_state, only: contact_state_t, touches_rim, force_control, normal, separated, slip, within_tolerance, &
+    not_finite
+  use hc_friction_law, only: coulomb_t
+  use hc_friction_rows, only: residual_row
+  implicit none
+  private
+
+  public :: normal_self_compliance, tangential_self_compliance
+  public :: normal_residual, tangential_residual, tangential_scale, largest_pressure, force_residual, conclude, &
+            least_traction
+
+  !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
+  real(wp), parameter :: least_traction = 1.0e-3_wp
+
+contains
+
+  !> Closing of the gap at a node under its own pyramid of unit pressure, lambda_1 K1(0) [m/Pa].
+  pure real(wp) function normal_self_compliance(lattice, pair)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    type(pyramid_t) :: pyramid
+    real(wp) :: k(5)
+
+    call new_pyramid(pyramid, lattice%basis)
+    k = pyramid%kernels(0.0_wp, 0.0_wp)
+    normal_self_compliance = pair%lambda_1*k(k_1)
+  end function normal_self_compliance
+
+  !> Tangential displacement of a node under its own pyramid of unit traction [m/Pa].
+  !>
+  !> (lambda_1 + lambda_5/2) K1(0) on the equilateral lattice, where K_xx(0) = K1(0)/2.
+  pure real(wp) function tangential_self_compliance(lattice, pair)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    type(pyramid_t) :: pyramid
+    real(wp) :: k(5)
+
+    call new_pyramid(pyramid, lattice%basis)
+    k = pyramid%kernels(0.0_wp, 0.0_wp)
+    tangential_self_compliance = pair%lambda_1*k(k_1) + pair%lambda_5*k(k_xx)
+  end function tangential_self_compliance
+
+  !> R_n = max |p - max(0, p - g/d_n)|/p_max over all candidate nodes.
+  !>
+  !> Bounds tension, penetration and pressure across a gap at once. Without
+  !> pressure anywhere the penetration is all there can be: it is 0 if the gap is nowhere
+  !> negative, and else infinite; so it is where a number is not finite, which a maximum would hide.
+  real(wp) function normal_residual(pressure, gap, candidate, compliance, n_threads)
+    !> Pressure [Pa] and gap [m]
+    real(wp), intent(in) :: pressure(:, :), gap(:, :)
+    !> Nodes that may come into contact
+    logical, intent(in) :: candidate(:, :)
+    !> Self-compliance d_n [m/Pa]
+    real(wp), intent(in) :: compliance
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    real(wp) :: p_max, worst, p, g
+    integer :: col, row, n_wrong
+
+    p_max = 0.0_wp
+    worst = 0.0_wp
+    n_wrong = 0
+    !$omp parallel do schedule(static) num_threads(n_threads) private(col, p, g) reduction(max: p_max, worst) &
+    !$omp& reduction(+: n_wrong)
+    do row = 1, size(pressure, 2)
+      !$omp simd private(p, g) reduction(max: p_max, worst) reduction(+: n_wrong)
+      do col = 1, size(pressure, 1)
+        ! a comparison with NaN may be trapped
+        p = merge(pressure(col, row), 0.0_wp, ieee_is_finite(pressure(col, row)))
+        g = merge(gap(col, row), 0.0_wp, ieee_is_finite(gap(col, row)))
+        p_max = max(p_max, p)
+        worst = max(worst, merge(abs(min(p, g/compliance)), 0.0_wp, candidate(col, row)))
+        n_wrong = n_wrong + merge(0, 1, ieee_is_finite(pressure(col, row)) .and. &
+                                  (ieee_is_finite(gap(col, row)) .or. .not. candidate(col, row)))
+      end do
+    end do
+    !$omp end parallel do
+    if (n_wrong > 0) then
+      normal_residual = huge(1.0_wp)
+    else if (p_max > 0.0_wp) then
+      normal_residual = worst/p_max
+    else
+      normal_residual = merge(0.0_wp, huge(1.0_wp), worst <= 0.0_wp)
+    end if
+  end function normal_residual
+
+  !> R_t = max |q - P(q - ds/d_t)|/tau over the nodes in contact, P the projection on the cone.
+  !>
+  !> Bounds tractions outside of the cone, slip in stick and a wrong direction
+  !> of slip at once. The scale tau is mu p_max; the largest traction, but
+  !> not less than a thousandth of p_max, without slip; without friction there is nothing to fulfil.
+  real(wp) function tangential_residual(traction, slip_increment, pressure, friction, compliance, n_threads)
+    !> Traction (n_col, n_row, 2) [Pa] and slip of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in), contiguous :: traction(:, :, :), slip_increment(:, :, :)
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in), contiguous :: pressure(:, :)
+    !> Law of friction
+    type(coulomb_t), intent(in) :: friction
+    !> Self-compliance d_t [m/Pa]
+    real(wp), intent(in) :: compliance
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    real(wp) :: p_max, slope, largest, worst
+    integer :: row
+
+    tangential_residual = 0.0_wp
+    p_max = largest_pressure(pressure, n_threads)
+    if (.not. (p_max > 0.0_wp .and. friction%resists())) return
+    slope = friction%slope()
+    largest = 0.0_wp
+    worst = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(n_threads) reduction(max: largest, worst)
+    do row = 1, size(pressure, 2)
+      call residual_row(size(pressure, 1), 1.0_wp/p_max, slope, 1.0_wp/compliance, pressure(:, row), traction(:, row, 1), &
+                        traction(:, row, 2), slip_increment(:, row, 1), slip_increment(:, row, 2), largest, worst)
+    end do
+    !$omp end parallel do
+    tangential_residual = sqrt(worst)/tangential_scale(friction, largest)
+  end function tangential_residual
+
+  !> The scale tau of R_t over p_max.
+  elemental real(wp) function tangential_scale(friction, largest)
+    !> Law of friction
+    class(coulomb_t), intent(in) :: friction
+    !> Square of the largest traction over p_max
+    real(wp), intent(in) :: largest
+
+    tangential_scale = friction%coefficient
+    if (friction%no_slip) tangential_scale = max(sqrt(largest), least_traction)
+  end function tangential_scale
+
+  !> p_max, 0 without pressure [Pa].
+  real(wp) function largest_pressure(pressure, n_threads)
+    !> Pressure (n_col, n_row) [Pa]
+    real(wp), intent(in), contiguous :: pressure(:, :)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    integer :: col, row
+
+    largest_pressure = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(n_threads) private(col) reduction(max: largest_pressure)
+    do row = 1, size(pressure, 2)
+      !$omp simd reduction(max: largest_pressure)
+      do col = 1, size(pressure, 1)
+        largest_pressure = max(largest_pressure, pressure(col, row))
+      end do
+    end do
+    !$omp end parallel do
+  end function largest_pressure
+
+  !> R_P = |sum A_p p - P|/P; without a load any pressure at all is as wrong as a load that is not carried.
+  elemental real(wp) function force_residual(carried, load)
+    !> Load carried by the pressure, and prescribed load [N]
+    real(wp), intent(in) :: carried, load
+
+    if (load > 0.0_wp) then
+      force_residual = abs(carried - load)/load
+    else
+      force_residual = merge(1.0_wp, 0.0_wp, abs(carried) > 0.0_wp)
+    end if
+  end function force_residual
+
+  !> Zones, load and residuals of a state whose pressure and gap are known.
+  subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance, n_threads, error)
+    !> State to be completed
+    type(contact_state_t), intent(inout) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes that may come into contact
+    logical, intent(in) :: candidate(:, :)
+    !> Self-compliance d_n [m/Pa]
+    real(wp), intent(in) :: compliance
+    !> force_control or displacement_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m] that was prescribed
+    real(wp), intent(in) :: target
+    !> Bound of the residuals
+    real(wp), intent(in) :: tolerance
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    !> Allocated on failure: a pressure or a gap that is not a finite number
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: row_sum(size(state%pressure, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(n_threads)
+    do row = 1, size(row_sum)
+      state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
+      row_sum(row) = sum(state%pressure(:, row))
+    end do
+    !$omp end parallel do
+    state%load(normal) = lattice%cell_area()*sum(row_sum)
+    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, n_threads)
+    state%residual_force = 0.0_wp
+    if (control == force_control) state%residual_force = force_residual(state%load(normal), target)
+    ! one by one: the largest of several numbers hides one that is not a number
+    state%converged = state%residual_normal <= tolerance .and. state%residual_force <= tolerance
+    state%clipped = touches_rim(state)
+    if (state%converged) state%stopped = within_tolerance
+    if (ieee_is_finite(state%load(normal)) .and. state%residual_normal < huge(1.0_wp)) return
+    ! penetration without any pressure is infinite as well, but a state that can be shown
+    if (all(ieee_is_finite(state%pressure)) .and. all(ieee_is_finite(state%gap) .or. .not. candidate)) return
+    call raise(error, status%no_convergence, not_finite)
+  end subroutine conclude
+
+end module hc_contact_residuals

@@ -1,0 +1,264 @@
+!> The state of a contact: tractions, gap, zones, loads and rigid motions over a window.
+module hc_contact_state
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: check_operator, normal, along_x, along_y
+  implicit none
+  private
+
+  public :: contact_state_t, new_contact_state, new_friction_state, take_tractions, touches_rim
+  public :: check_problem, check_target, check_state
+  public :: not_finite
+  public :: not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, out_of_range
+  public :: separated, stick, slip
+  public :: load_target_t, force_control, displacement_control
+  public :: normal, along_x, along_y, about_z, n_motion
+
+  !> Zone of a node; without friction every node in contact slips.
+  integer, parameter :: separated = 0, stick = 1, slip = 2
+
+  !> The rigid motions: approach, shift along x and along y, and twist about z.
+  !> `normal`, `along_x` and `along_y` are those of the tractions.
+  integer, parameter :: about_z = 4, n_motion = 4
+
+  !> What is prescribed of a motion: its load, or itself.
+  integer, parameter :: force_control = 1, displacement_control = 2
+
+  !> Why a solver stopped: nothing was solved yet; all residuals are within the tolerance; all sweeps allowed were
+  !> made; linear solutions broke off, and sweeps do not help; no node sticks and a load cannot be carried; a part of
+  !> the step reached the rim of the window; numbers are not finite.
+  integer, parameter :: not_solved = 0, within_tolerance = 1, sweeps_used_up = 2, no_progress = 3, loads_not_carried = 4, &
+                        rim_reached = 5, out_of_range = 6
+
+  character(len=*), parameter :: not_finite = 'pressure or gap are not finite numbers: expected a gap, loads and elastic '// &
+                                              'constants whose products are neither zero nor infinite'
+
+  !> What the bodies are driven to, motion by motion.
+  type :: load_target_t
+    !> force_control or displacement_control
+    integer :: control(n_motion) = [force_control, force_control, force_control, displacement_control]
+    !> Load [N], torque [N m]; or approach, shift [m], twist [rad]
+    real(wp) :: value(n_motion) = 0.0_wp
+  end type load_target_t
+
+  !> A solution and how well it fulfils the contact conditions.
+  type :: contact_state_t
+    !> Pressure and gap (n_col, n_row) [Pa], [m]
+    real(wp), allocatable :: pressure(:, :), gap(:, :)
+    !> Zone of each node (n_col, n_row)
+    integer, allocatable :: zone(:, :)
+    !> With friction: shear traction on body 1 (n_col, n_row, 2) [Pa]
+    real(wp), allocatable :: traction(:, :, :)
+    !> With friction: relative displacement s = (u1 - u2) - shift - twist x r (n_col, n_row, 2) [m]
+    real(wp), allocatable :: relative_displacement(:, :, :)
+    !> With friction: change of s during the step, all its parts, on the nodes in contact (n_col, n_row, 2) [m]
+    real(wp), allocatable :: slip_increment(:, :, :)
+    !> With friction: length of the slip path so far (n_col, n_row) [m]
+    real(wp), allocatable :: accumulated_slip(:, :)
+    !> Normal load, tangential loads on body 1 [N] and torque [N m]: resultants of the tractions
+    real(wp) :: load(n_motion) = 0.0_wp
+    !> Approach, shifts [m] and twist [rad] of the remote parts
+    real(wp) :: motion(n_motion) = 0.0_wp
+    !> Energy dissipated by friction so far [J]
+    real(wp) :: dissipated_energy = 0.0_wp
+    !> Residual of the contact conditions along the normal
+    real(wp) :: residual_normal = huge(1.0_wp)
+    !> Residual of the friction conditions, with the slip increment that is recorded; of a load step that was halved it may
+    !> exceed the tolerance, which each part meets by itself
+    real(wp) :: residual_tangential = 0.0_wp
+    !> Residual of the normal load; 0 where the approach is prescribed
+    real(wp) :: residual_force = huge(1.0_wp)
+    !> Residual of the tangential loads, of those that are prescribed
+    real(wp) :: residual_shear_force = 0.0_wp
+    !> Residual of the torque; 0 where the twist is prescribed
+    real(wp) :: residual_torque = 0.0_wp
+    !> All residuals are within the tolerance, in each part of the step
+    logical :: converged = .false.
+    !> Why the solver stopped: within_tolerance, sweeps_used_up, ...
+    integer :: stopped = not_solved
+    !> There is contact at the rim of the window: a larger window would have another solution, unless nothing can touch there
+    logical :: clipped = .false.
+    !> The tangential loads are more than full sliding carries
+    logical :: sliding = .false.
+    !> Active sets that were tried on the finest lattice
+    integer :: sweeps = 0
+    !> Times that the load step was halved
+    integer :: cuts = 0
+    !> Work, in applications of the full operator on the finest lattice
+    real(wp) :: operator_applications = 0.0_wp
+  end type contact_state_t
+
+contains
+
+  !> A state without contact.
+  subroutine new_contact_state(state, lattice, n_threads)
+    !> State to be set up
+    type(contact_state_t), intent(out) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    integer :: row, threads
+
+    threads = 1
+    if (present(n_threads)) threads = n_threads
+    associate (n => lattice%extent)
+      allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)))
+    end associate
+    !$omp parallel do schedule(static) num_threads(threads)
+    do row = 1, lattice%extent(2)
+      state%pressure(:, row) = 0.0_wp
+      state%gap(:, row) = 0.0_wp
+      state%zone(:, row) = separated
+    end do
+    !$omp end parallel do
+  end subroutine new_contact_state
+
+  !> A state with friction before the first load: no contact, nothing displaced.
+  subroutine new_friction_state(state, lattice, n_threads)
+    !> State to be set up
+    type(contact_state_t), intent(out) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    integer :: row, threads
+
+    threads = 1
+    if (present(n_threads)) threads = n_threads
+    call new_contact_state(state, lattice, threads)
+    associate (n => lattice%extent)
+      allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2), &
+                state%accumulated_slip(n(1), n(2)))
+    end associate
+    !$omp parallel do schedule(static) num_threads(threads)
+    do row = 1, lattice%extent(2)
+      state%traction(:, row, :) = 0.0_wp
+      state%relative_displacement(:, row, :) = 0.0_wp
+      state%slip_increment(:, row, :) = 0.0_wp
+      state%accumulated_slip(:, row) = 0.0_wp
+    end do
+    !$omp end parallel do
+  end subroutine new_friction_state
+
+  !> Tractions and motions of a state, and nothing else: what an iteration starts from.
+  subroutine take_tractions(state, start, n_threads)
+    !> State they come from
+    type(contact_state_t), intent(in) :: state
+    !> State to be set up
+    type(contact_state_t), intent(out) :: start
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    integer :: row
+
+    allocate (start%pressure, mold=state%pressure)
+    allocate (start%traction, mold=state%traction)
+    !$omp parallel do schedule(static) num_threads(n_threads)
+    do row = 1, size(state%pressure, 2)
+      start%pressure(:, row) = state%pressure(:, row)
+      start%traction(:, row, :) = state%traction(:, row, :)
+    end do
+    !$omp end parallel do
+    start%motion = state%motion
+    start%load = state%load
+  end subroutine take_tractions
+
+  !> Is there contact at the rim of the window?
+  pure logical function touches_rim(state)
+    !> State
+    type(contact_state_t), intent(in) :: state
+
+    associate (p => state%pressure)
+      touches_rim = any(p(1, :) > 0.0_wp) .or. any(p(size(p, 1), :) > 0.0_wp) .or. &
+                    any(p(:, 1) > 0.0_wp) .or. any(p(:, size(p, 2)) > 0.0_wp)
+    end associate
+  end function touches_rim
+
+  !> Does a problem make sense?
+  pure subroutine check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Initial gap (n_col, n_row) [m]; any value at all where nothing can touch
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads to use; 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+
+    call check_operator(lattice, pair, error, n_threads)
+    if (allocated(error)) return
+    if (any(shape(initial_gap) /= lattice%extent) .or. any(shape(candidate) /= lattice%extent)) then
+      call raise(error, status%invalid_input, 'the initial gap does not have the shape of the lattice window')
+    else if (.not. any(candidate)) then
+      call raise(error, status%invalid_input, 'no node of the window may come into contact')
+    else if (any(candidate .and. .not. ieee_is_finite(initial_gap))) then
+      call raise(error, status%invalid_input, 'the initial gap of nodes that may come into contact: finite numbers expected')
+    end if
+  end subroutine check_problem
+
+  !> Can loads or motions be solved for, to this tolerance, in so many sweeps?
+  pure subroutine check_target(control, value, tolerance, max_sweeps, error)
+    !> How motions are driven, the normal one first: force_control or displacement_control
+    integer, intent(in) :: control(:)
+    !> Loads [N], [N m] or motions [m], [rad]
+    real(wp), intent(in) :: value(:)
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    if (any(control /= force_control .and. control /= displacement_control)) then
+      call raise(error, status%invalid_input, 'the control of a motion: force_control or displacement_control expected')
+    else if (.not. all(ieee_is_finite(value))) then
+      call raise(error, status%invalid_input, 'loads and motions: finite numbers expected')
+    else if (control(normal) == force_control .and. value(normal) < 0.0_wp) then
+      call raise(error, status%invalid_input, 'the normal load: a number not below zero expected')
+    else if (.not. ieee_is_finite(tolerance)) then
+      call raise(error, status%invalid_input, 'the tolerance: a number between 0 and 1 expected')
+    else if (tolerance <= 0.0_wp .or. tolerance >= 1.0_wp) then
+      call raise(error, status%invalid_input, 'the tolerance: a number between 0 and 1 expected')
+    else if (max_sweeps < 1) then
+      call raise(error, status%invalid_input, 'the sweeps that may be made: at least one expected')
+    end if
+  end subroutine check_target
+
+  !> Can a load step with friction start from a state?
+  pure subroutine check_state(state, lattice, error)
+    !> State
+    type(contact_state_t), intent(in) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Allocated on failure: fields that are missing or of another window, numbers that are not finite
+    type(error_t), allocatable, intent(out) :: error
+    logical :: fits
+    integer :: row
+
+    fits = allocated(state%pressure) .and. allocated(state%gap) .and. allocated(state%traction) .and. &
+           allocated(state%relative_displacement) .and. allocated(state%accumulated_slip)
+    if (fits) fits = all([shape(state%pressure), shape(state%gap), shape(state%accumulated_slip)] == [lattice%extent, &
+                                                                                    lattice%extent, lattice%extent])
+    if (fits) fits = all(shape(state%traction) == [lattice%extent, 2]) .and. &
+                     all(shape(state%relative_displacement) == [lattice%extent, 2])
+    if (.not. fits) then
+      call raise(error, status%invalid_input, 'the state to go on from does not have the shape of the lattice window')
+      return
+    end if
+    fits = all(ieee_is_finite([state%load, state%motion, state%dissipated_energy]))
+    do row = 1, lattice%extent(2)
+      fits = fits .and. all(ieee_is_finite(state%pressure(:, row))) .and. all(ieee_is_finite(state%traction(:, row, :))) &
+             .and. all(ieee_is_finite(state%relative_displacement(:, row, :))) &
+             .and. all(ieee_is_finite(state%accumulated_slip(:, row)))
+    end do
+    if (.not. fits) call raise(error, status%invalid_input, 'the state to go on from: finite numbers expected')
+  end subroutine check_state
+
+end module hc_contact_state

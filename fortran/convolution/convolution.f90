@@ -1,0 +1,515 @@
+!> Convolutions over a window of the lattice by FFT.
+!>
+!> A product takes three stages, each cut into independent 1-D transforms, so that the
+!> result does not depend on the number of threads: transforms along the rows of the window
+!> (padding rows are never touched), two real rows as the two parts of a complex one;
+!> transforms along the columns in blocks that stay in cache, there multiplication with the
+!> spectra and transforms back at once; transforms of the rows back. The way back is the
+!> forward transform of the conjugate, so that two plans are enough.
+!>
+!> Every kernel is even or odd, so that its spectrum is real, or i times real.
+module hc_convolution
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
+  use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, release
+  use hc_kernel_cache, only: kernel_cache_t
+  use hc_row_pairs, only: split_rows, join_rows
+  use hc_column_blocks, only: gather_columns, scatter_columns
+  use hc_spectral_product, only: multiply, multiply_one
+  !$ use omp_lib, only: omp_get_thread_num, omp_get_max_threads
+  implicit none
+  private
+
+  public :: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t, threads_for
+
+  !> Bytes that one component of a column block should take, so that blocks stay in cache.
+  integer, parameter :: block_bytes = 32768
+  !> Smaller windows are left to one thread: starting the others takes longer than they save.
+  integer, parameter :: worth_sharing = 16384
+
+  !> Plans, spectra and scratch space.
+  type :: convolution_t
+    !> Spectra (frequency, block, kernel), normalised; those of odd kernels are divided by i.
+    !> `frequencies` tells which frequency stands where. Other convolutions may share them.
+    real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
+    !> What the results are multiplied with
+    real(wp) :: factor = 1.0_wp
+    !> Threads that share the work
+    integer :: n_threads = 1
+    !> Transform lengths along the two lattice directions
+    integer :: padded(2) = 0
+    !> Columns in a block, number of blocks
+    integer :: width = 0, n_block = 0
+    !> Number of columns and rows of the window
+    integer, private :: extent(2) = 0
+    !> Number of frequencies along the first direction, and the leading dimension that holds them
+    integer, private :: n_frequency = 0, leading = 0
+    !> Number of kernels, the first odd one
+    integer, private :: n_kernel = 0, first_odd = 0
+    !> Where the spectra are
+    type(kernel_spectrum_t), pointer, private :: held => null()
+    type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
+    !> Address of the object that frees them: copies, which have its plans and spectra as long as it is there, do not
+    integer(c_intptr_t), private :: owner = 0
+    !> Row transforms (leading, n_row or one more, component)
+    complex(wp), allocatable, private :: work(:, :, :)
+    !> Two padded rows before and after their transform, for each thread
+    complex(wp), allocatable, private :: row_buffer(:, :, :)
+    !> One column block of each component before and after its transform, for each thread; column by column
+    complex(wp), allocatable, private :: block_buffer(:, :, :, :)
+  contains
+    !> Sums of weighted convolutions
+    procedure :: convolve
+    !> Spectra from a cache, or room for them, and to the cache
+    procedure :: take_spectra, share_spectra
+    !> Spectra of kernels given at the lattice offsets
+    procedure :: transform_kernels
+    !> Frequencies of the entries of a block of the spectra
+    procedure :: frequencies
+    !> The transforms of one scalar product and nothing else
+    procedure :: time_transforms
+    final :: free
+  end type convolution_t
+
+  !> Something that knows the kernels at lattice offsets.
+  type, abstract :: kernel_source_t
+  contains
+    procedure(kernel_row), deferred :: row
+  end type kernel_source_t
+
+  abstract interface
+    !> All kernels at the offsets of j >= 0 rows and -n...n columns: k(kernel, n + 1 + column)
+    pure subroutine kernel_row(self, j, k)
+      import :: kernel_source_t, wp
+      class(kernel_source_t), intent(in) :: self
+      integer, intent(in) :: j
+      real(wp), intent(out) :: k(:, :)
+    end subroutine kernel_row
+  end interface
+
+contains
+
+  !> Plans and scratch space for convolutions over a window; the spectra are still to be taken.
+  subroutine new_convolution(self, extent, padded, n_kernel, n_component, error, first_odd, n_threads)
+    !> Convolution to be set up
+    type(convolution_t), intent(out) :: self
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Transform lengths, the first one a multiple of four; 2*extent - 1 at least unless the convolution is periodic
+    integer, intent(in) :: padded(2)
+    !> Number of kernels, and of components of the fields
+    integer, intent(in) :: n_kernel, n_component
+    !> Allocated on failure: not enough memory, a length FFTW cannot plan
+    type(error_t), allocatable, intent(out) :: error
+    !> The first odd kernel; absent: all are even
+    integer, intent(in), optional :: first_odd
+    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
+    integer, intent(in), optional :: n_threads
+
+    integer :: stat
+
+    self%owner = address(self)
+    self%n_threads = threads_for(extent, n_threads)
+    self%n_kernel = n_kernel
+    self%first_odd = n_kernel + 1
+    if (present(first_odd)) self%first_odd = first_odd
+    self%extent = extent
+    self%padded = padded
+    self%n_frequency = padded(1)/2 + 1
+    self%width = block_width(padded(2))
+    self%n_block = (self%n_frequency + self%width - 1)/self%width
+    self%leading = self%n_block*self%width
+    associate (column => self%width*padded(2))
+      ! the columns that only fill up the last block are transformed too: zeros stay zeros
+      allocate (self%work(self%leading, even(extent(2)), n_component), self%row_buffer(padded(1), 2, self%n_threads), &
+                self%block_buffer(column, n_component, 2, self%n_threads), source=(0.0_wp, 0.0_wp), stat=stat)
+    end associate
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
+      return
+    end if
+    call make_plans(self, error)
+  end subroutine new_convolution
+
+  !> Spectra that a cache has, or room for spectra that are still to be made, zero.
+  subroutine take_spectra(self, found, error, cache, key)
+    class(convolution_t), intent(inout) :: self
+    !> They were there, and must not be changed
+    logical, intent(out) :: found
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Where to look, if anywhere
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> With a cache: what the kernels depend on
+    type(kernel_key_t), intent(in), optional :: key
+    integer :: shape_wanted(3), stat
+
+    shape_wanted = [self%width*self%padded(2), self%n_block, self%n_kernel]
+    found = .false.
+    if (present(cache)) then
+      if (associated(cache)) call cache%find(key, self%held)
+    end if
+    if (associated(self%held)) then
+      call self%held%point(shape_wanted, self%spectrum)
+      found = associated(self%spectrum)
+      if (found) return
+      call release(self%held)
+    end if
+    allocate (self%held)
+    call self%held%reserve(shape_wanted, self%spectrum, stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
+      return
+    end if
+    self%spectrum = 0.0_wp
+  end subroutine take_spectra
+
+  !> Let a cache have the spectra, once they are complete.
+  subroutine share_spectra(self, cache, key)
+    class(convolution_t), intent(in) :: self
+    !> The cache, if there is one
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> With a cache: what the kernels depend on
+    type(kernel_key_t), intent(in), optional :: key
+
+    if (.not. present(cache)) return
+    if (associated(cache)) call cache%keep(key, self%held)
+  end subroutine share_spectra
+
+  !> Threads that a window is worth.
+  integer function threads_for(extent, n_threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
+    integer, intent(in), optional :: n_threads
+
+    threads_for = 1
+    !$ if (product(extent) >= worth_sharing) threads_for = omp_get_max_threads()
+    if (present(n_threads)) then
+      !$ if (n_threads > 0) threads_for = n_threads
+    end if
+  end function threads_for
+
+  !> Bytes that a convolution takes: spectra, row transforms, buffers.
+  pure integer(selected_int_kind(18)) function convolution_memory(extent, padded, n_kernel, n_component, n_threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+    !> Number of kernels, of components of the fields, of threads
+    integer, intent(in) :: n_kernel, n_component, n_threads
+    integer, parameter :: long = selected_int_kind(18)
+    integer(long) :: leading, n_row, length, width
+
+    width = block_width(padded(2))
+    leading = leading_size(padded)
+    n_row = even(extent(2))
+    length = padded(2)
+    convolution_memory = n_kernel*leading*length + 2*n_component*leading*n_row &
+                         + n_threads*(4*padded(1) + 4*n_component*width*length)
+    convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
+  end function convolution_memory
+
+  !> Bytes that are needed besides while the kernels of a padded convolution are transformed: their rows.
+  pure integer(selected_int_kind(18)) function transform_memory(extent, padded, n_kernel)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+    !> Number of kernels
+    integer, intent(in) :: n_kernel
+    integer, parameter :: long = selected_int_kind(18)
+
+    transform_memory = storage_size((1.0_wp, 0.0_wp))/8*n_kernel*leading_size(padded)*int(even(extent(2)), long)
+  end function transform_memory
+
+  !> Leading dimension that holds the frequencies along the first direction, in whole blocks.
+  pure integer function leading_size(padded)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+
+    associate (width => block_width(padded(2)))
+      leading_size = (padded(1)/2 + width)/width*width
+    end associate
+  end function leading_size
+
+  !> Rows are transformed in pairs.
+  elemental integer function even(n)
+    integer, intent(in) :: n
+    even = n + modulo(n, 2)
+  end function even
+
+  !> Columns that are transformed together: 4, 8, 12 or 16, so that all transforms begin at addresses
+  !> alike modulo 16 bytes, as their common plan expects.
+  elemental integer function block_width(length)
+    !> Length of a column
+    integer, intent(in) :: length
+    block_width = 4*min(4, max(1, block_bytes/(64*length)))
+  end function block_width
+
+  subroutine make_plans(self, error)
+    class(convolution_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    integer(c_int) :: length(1), n1, width
+
+    n1 = self%padded(1)
+    width = self%width
+    ! FFTW_ESTIMATE: the same plan, and the same result, in every run
+    !$omp critical (hc_fftw_planner)
+    length = n1
+    self%row_plan = fftw_plan_many_dft(1_c_int, length, 1_c_int, self%row_buffer(:, 1, 1), length, 1_c_int, n1, &
+                                       self%row_buffer(:, 2, 1), length, 1_c_int, n1, fftw_forward, fftw_estimate)
+    length = self%padded(2)
+    self%column_plan = fftw_plan_many_dft(1_c_int, length, width, self%block_buffer(:, 1, 1, 1), length, 1_c_int, length(1), &
+                                          self%block_buffer(:, 1, 2, 1), length, 1_c_int, length(1), fftw_forward, fftw_estimate)
+    !$omp end critical (hc_fftw_planner)
+    if (.not. (c_associated(self%row_plan) .and. c_associated(self%column_plan))) then
+      call raise(error, status%resources, 'FFTW could not plan the transforms of this window')
+    end if
+  end subroutine make_plans
+
+  !> Spectra of kernels that are given at the lattice offsets, for a padded convolution.
+  !>
+  !> A row of negative index is the reverse of its mirror image, up to the sign
+  !> of an odd kernel, so that its transform is the conjugate: half of the
+  !> kernel values and of the row transforms suffice.
+  subroutine transform_kernels(self, source, error)
+    class(convolution_t), intent(inout) :: self
+    !> The kernels
+    class(kernel_source_t), intent(in) :: source
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    complex(wp), allocatable :: rows(:, :, :)
+    real(wp), allocatable :: kernel(:, :, :)
+    real(wp) :: scale, sign
+    integer :: n(2), n_kernel, j, m, b, column, thread, stat, from
+
+    n = self%extent
+    n_kernel = size(self%spectrum, 3)
+    scale = 1.0_wp/(real(self%padded(1), wp)*real(self%padded(2), wp))
+    allocate (rows(self%leading, 0:even(n(2)) - 1, n_kernel), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the spectra of the kernels: use a smaller window')
+      return
+    end if
+
+    thread = 1
+    !$omp parallel num_threads(self%n_threads) private(j, m, b, column, kernel, sign, from) firstprivate(thread)
+    !$ thread = omp_get_thread_num() + 1
+    allocate (kernel(n_kernel, 1 - n(1):n(1) - 1, 2))
+    !$omp do schedule(dynamic)
+    do j = 0, n(2) - 1, 2
+      call source%row(j, kernel(:, :, 1))
+      if (j + 1 < n(2)) then
+        call source%row(j + 1, kernel(:, :, 2))
+      else
+        kernel(:, :, 2) = 0.0_wp                                               ! not what another row left there
+      end if
+      do m = 1, n_kernel
+        associate (given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
+          given(:n(1)) = scale*cmplx(kernel(m, 0:, 1), kernel(m, 0:, 2), wp)
+          given(n(1) + 1:) = 0.0_wp
+          given(self%padded(1) - n(1) + 2:) = scale*cmplx(kernel(m, :-1, 1), kernel(m, :-1, 2), wp)
+          call fftw_execute_dft(self%row_plan, given, transformed)
+          call split_rows(transformed, rows(:self%n_frequency, j, m), rows(:self%n_frequency, j + 1, m))
+        end associate
+        rows(self%n_frequency + 1:, j:j + 1, m) = 0.0_wp
+      end do
+    end do
+    !$omp end do
+    !$omp do schedule(dynamic)
+    do b = 1, self%n_block
+      from = (b - 1)*self%width + 1
+      do m = 1, n_kernel
+        sign = merge(1.0_wp, -1.0_wp, m < self%first_odd)
+        associate (given => self%block_buffer(:, 1, 1, thread), transformed => self%block_buffer(:, 1, 2, thread), &
+                   length => self%padded(2))
+          call gather_columns(self%width, n(2), self%leading, length, rows(from, 0, m), given)
+          do column = 0, self%width - 1
+            associate (line => given(column*length + 1:(column + 1)*length))
+              line(length - n(2) + 2:) = sign*conjg(line(n(2):2:-1))
+            end associate
+          end do
+          call fftw_execute_dft(self%column_plan, given, transformed)
+          if (m < self%first_odd) then
+            self%spectrum(:, b, m) = real(transformed, wp)
+          else
+            self%spectrum(:, b, m) = aimag(transformed)
+          end if
+        end associate
+      end do
+    end do
+    !$omp end do
+    !$omp end parallel
+  end subroutine transform_kernels
+
+  !> Indices of the frequencies of a block, f(1) = 0...padded(1)/2, f(2) = 0...padded(2)-1.
+  pure function frequencies(self, b) result(f)
+    class(convolution_t), intent(in) :: self
+    !> Index of the block
+    integer, intent(in) :: b
+    !> Frequency indices (2, width*padded(2)); f(1) beyond padded(1)/2 is mere filling
+    integer, allocatable :: f(:, :)
+    integer :: column, row
+
+    allocate (f(2, self%width*self%padded(2)))
+    do column = 1, self%width
+      do row = 1, self%padded(2)
+        f(:, (column - 1)*self%padded(2) + row) = [(b - 1)*self%width + column - 1, row - 1]
+      end do
+    end do
+  end function frequencies
+
+  !> result(:, :, o) = sum over i of kernel(o, i) * field(:, :, i)
+  subroutine convolve(self, kernel, field, result)
+    class(convolution_t), intent(inout) :: self
+    !> Number of the kernel (onto, from), negative to reverse its sign
+    integer, intent(in) :: kernel(:, :)
+    !> Fields to be convolved (n_col, n_row, from)
+    real(wp), intent(in), contiguous :: field(:, :, :)
+    !> Sums of the convolutions (n_col, n_row, onto)
+    real(wp), intent(out), contiguous :: result(:, :, :)
+
+    integer :: n(2), i, o, row, b, thread
+
+    n = self%extent
+    thread = 1
+    !$omp parallel num_threads(self%n_threads) private(i, o, row, b) firstprivate(thread)
+    !$ thread = omp_get_thread_num() + 1
+    self%row_buffer(n(1) + 1:, 1, thread) = 0.0_wp
+    do i = 1, size(field, 3)
+      !$omp do schedule(static)
+      do row = 1, n(2), 2
+        call transform_rows(self, row, i, thread, field(:, :, i))
+      end do
+      !$omp end do nowait
+    end do
+    !$omp barrier
+    !$omp do schedule(static)
+    do b = 1, self%n_block
+      call convolve_block(self, b, kernel, thread)
+    end do
+    !$omp end do
+    do o = 1, size(result, 3)
+      !$omp do schedule(static)
+      do row = 1, n(2), 2
+        ! an odd last row has no companion, but what earlier products left there
+        if (row == n(2)) self%work(:, row + 1, o) = 0.0_wp
+        associate (joined => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
+          call join_rows(self%work(:self%n_frequency, row, o), self%work(:self%n_frequency, row + 1, o), joined)
+          call fftw_execute_dft(self%row_plan, joined, transformed)
+          result(:, row, o) = self%factor*real(transformed(:n(1)), wp)
+          if (row < n(2)) result(:, row + 1, o) = -self%factor*aimag(transformed(:n(1)))
+        end associate
+      end do
+      !$omp end do nowait
+    end do
+    !$omp end parallel
+  end subroutine convolve
+
+  !> Transform two rows of a field into those of `work`.
+  subroutine transform_rows(self, row, component, thread, field)
+    class(convolution_t), intent(inout) :: self
+    !> Index of the first row, of the component, and of the thread, whose buffer is zero beyond the window and stays so
+    integer, intent(in) :: row, component, thread
+    !> Field (n_col, n_row)
+    real(wp), intent(in) :: field(:, :)
+    integer :: last
+
+    last = min(row + 1, self%extent(2))
+    associate (n => self%extent(1), given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
+      ! rows off the contact need no transform
+      if (all(abs(field(:, row:last)) <= 0.0_wp)) then
+        self%work(:self%n_frequency, row:row + 1, component) = 0.0_wp
+        return
+      end if
+      if (last > row) then
+        given(:n) = cmplx(field(:, row), field(:, last), wp)
+      else
+        given(:n) = field(:, row)
+      end if
+      call fftw_execute_dft(self%row_plan, given, transformed)
+      call split_rows(transformed, self%work(:self%n_frequency, row, component), &
+                      self%work(:self%n_frequency, row + 1, component))
+    end associate
+  end subroutine transform_rows
+
+  !> Transform a block of columns, multiply with the spectra, transform back (the conjugate, that is).
+  subroutine convolve_block(self, b, kernel, thread)
+    class(convolution_t), intent(inout) :: self
+    !> Index of the block
+    integer, intent(in) :: b
+    !> Number of the kernel (onto, from), negative to reverse its sign
+    integer, intent(in) :: kernel(:, :)
+    !> Index of the thread, whose buffer is used
+    integer, intent(in) :: thread
+
+    integer :: i, o, first
+
+    first = (b - 1)*self%width + 1
+    associate (given => self%block_buffer(:, :, 1, thread), transformed => self%block_buffer(:, :, 2, thread))
+      do i = 1, size(kernel, 2)
+        call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%work(first, 1, i), given(:, i))
+        call fftw_execute_dft(self%column_plan, given(:, i), transformed(:, i))
+      end do
+
+      if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
+        call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
+      else
+        call multiply(self%spectrum(:, b, :), self%first_odd, kernel, transformed, given)
+      end if
+
+      do o = 1, size(kernel, 1)
+        call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))
+        call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), self%work(first, 1, o))
+      end do
+    end associate
+  end subroutine convolve_block
+
+  !> Run the transforms of one scalar product and nothing else, to compare times with.
+  subroutine time_transforms(self)
+    class(convolution_t), intent(inout) :: self
+    integer :: row, b, k, thread
+
+    thread = 1
+    !$omp parallel num_threads(self%n_threads) private(row, b, k) firstprivate(thread)
+    !$ thread = omp_get_thread_num() + 1
+    do k = 1, 2
+      !$omp do schedule(static)
+      do row = 1, self%extent(2), 2
+        call fftw_execute_dft(self%row_plan, self%row_buffer(:, 1, thread), self%row_buffer(:, 2, thread))
+      end do
+      !$omp end do
+      !$omp do schedule(static)
+      do b = 1, self%n_block
+        call fftw_execute_dft(self%column_plan, self%block_buffer(:, 1, 1, thread), self%block_buffer(:, 1, 2, thread))
+      end do
+      !$omp end do
+    end do
+    !$omp end parallel
+  end subroutine time_transforms
+
+  !> Address of an object.
+  integer(c_intptr_t) function address(self)
+    type(convolution_t), intent(in), target :: self
+    address = transfer(c_loc(self), address)
+  end function address
+
+  impure elemental subroutine free(self)
+    type(convolution_t), intent(inout) :: self
+
+    if (self%owner /= address(self)) return
+    !$omp critical (hc_fftw_planner)
+    if (c_associated(self%row_plan)) call fftw_destroy_plan(self%row_plan)
+    if (c_associated(self%column_plan)) call fftw_destroy_plan(self%column_plan)
+    !$omp end critical (hc_fftw_planner)
+    self%row_plan = c_null_ptr
+    self%column_plan = c_null_ptr
+    self%spectrum => null()
+    call release(self%held)
+  end subroutine free
+
+end module hc_convolution

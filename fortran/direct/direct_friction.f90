@@ -1,0 +1,357 @@
+!> Contact with friction by the dissertation's nested iteration on LAPACK solves.
+!>
+!> The outer iteration sorts the nodes in contact into stick and slip, the inner
+!> one finds the contact area with these frozen (section 8.6 and chapter 12,
+!> Figures 8.3 and 12.1): it solves one linear system for the tractions and the
+!> rigid motions, nodes in tension leave and nodes that penetrate enter. The
+!> area of a step starts from the last one with a ring of nodes around it. Stick and
+!> slip follow from q - r ds, and slip is linearised as in hc_friction_law, so
+!> that the whole is a Newton method for pressure, traction and motions at once.
+module hc_direct_friction
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
+  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
+    normal, along_x, force_control, displacement_control, loads_not_carried
+  use hc_friction_law, only: linearize, on_cone
+  use hc_friction_problem, only: friction_problem_t, friction_solver_t
+  use hc_driven_motions, only: overloads
+  use hc_direct_contact, only: first_guess, exchange, patience
+  use hc_direct_system, only: iterate_t, infinite, unloaded, solve_area
+  implicit none
+  private
+
+  public :: direct_friction_t, new_direct_friction, ring
+
+  !> Areas that are tried before there is any shear traction.
+  integer, parameter :: first_tries = 3*patience
+  !> Tension and penetration, relative to the largest pressure, that are rounding errors.
+  real(wp), parameter :: rounding = 1.0e-12_wp
+  !> Slip that gives a node without traction no direction yet, relative to that of the largest pressure.
+  real(wp), parameter :: negligible_slip = 1.0e-6_wp
+  !> Share of the classification parameter with which a step begins.
+  real(wp), parameter :: first_share = 0.2_wp
+  !> Sweeps after which it is halved, again and again.
+  integer, parameter :: halving = 10
+  !> Times that a step may lose its hold.
+  integer, parameter :: max_adrift = 6
+  !> Traction, relative to its largest bound, that no step towards a solution leads to.
+  real(wp), parameter :: beyond_reason = 5.0_wp
+
+  !> A contact problem with friction and its flexibility.
+  type, extends(friction_solver_t) :: direct_friction_t
+    private
+    type(dense_flexibility_t) :: flexibility
+  contains
+    procedure :: solve_step
+    procedure :: displacements
+  end type direct_friction_t
+
+contains
+
+  !> Flexibility of a problem.
+  subroutine new_direct_friction(self, problem, error)
+    !> Solver to be set up
+    type(direct_friction_t), intent(out) :: self
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    self%problem = problem
+    call new_dense_flexibility(self%flexibility, problem%lattice, problem%pair, error)
+  end subroutine new_direct_friction
+
+  subroutine displacements(self, pressure, traction, displacement, error)
+    class(direct_friction_t), intent(inout) :: self
+    real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%problem%displacements(self%flexibility, pressure, traction, displacement, error)
+  end subroutine displacements
+
+  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(direct_friction_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+    type(iterate_t) :: it, before
+    real(wp) :: share
+    integer :: n, sweep, adrift
+
+    if (.not. self%problem%is_pressed(target)) then
+      call self%problem%separate(start, reference, target, tolerance, state)
+      return
+    end if
+    call new_friction_state(state, self%problem%lattice)
+    self%flexibility%applications = 0.0_wp
+    n = self%problem%lattice%size()
+    it%initial_gap = reshape(self%problem%initial_gap, [n])
+    it%candidate = reshape(self%problem%candidate, [n])
+    it%reference = reshape(reference, [n, 2])
+    it%motion = merge(target%value, start%motion, target%control == displacement_control)
+    allocate (it%p(n), it%compliance(n), source=0.0_wp)
+    allocate (it%q(n, 2), it%direction(n, 2), source=0.0_wp)
+    allocate (it%zone(n), source=separated)
+
+    if (any(start%pressure > 0.0_wp)) then
+      call continue_from(self, start, it, error)
+    else
+      call begin(self, target, it, error)
+    end if
+    adrift = 0
+    share = 1.0_wp
+    do sweep = 1, max_sweeps
+      if (allocated(error)) return
+      before = it
+      ! as long as stick and slip are wrong a settled area is not worth its price
+      call find_area(self, target, sweep, it, error)
+      if (allocated(error)) return
+      if (is_adrift(self%problem, it)) then
+        adrift = adrift + 1
+        if (adrift < max_adrift .and. any(it%zone == slip)) then
+          before%solves = it%solves
+          it = before
+          share = first_share*share
+          call hold(it)
+          call find_area(self, target, sweep, it, error)
+          if (allocated(error)) return
+        end if
+      end if
+      call record(self, reference, target, tolerance, it, state, error)
+      if (allocated(error) .or. state%converged) exit
+      if (adrift > 0 .or. sweep == max_sweeps) then
+        state%sliding = overloads(self%problem, target, state%pressure, state%residual_normal)
+        if (state%sliding .or. adrift == max_adrift) exit
+      end if
+      if (mod(sweep, halving) == 0) share = 0.5_wp*share
+      call classify(self%problem, share, it)
+    end do
+    if (state%sliding) state%stopped = loads_not_carried
+  end subroutine solve_step
+
+  !> First contact: without shear traction, and then against the slip that its pressure causes.
+  subroutine begin(self, target, it, error)
+    class(direct_friction_t), intent(inout) :: self
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: weight(size(it%p)), mean
+    integer :: i
+
+    it%contact = first_guess(self%problem%lattice, self%problem%pair, target%control(normal), target%value(normal), &
+                             it%initial_gap, it%candidate)
+    where (it%contact)
+      it%zone = slip
+      it%compliance = infinite
+    end where
+    call find_area(self, target, first_tries, it, error)
+    if (allocated(error)) return
+    ! shifts that are free follow the bodies
+    weight = max(it%p, 0.0_wp)/max(sum(max(it%p, 0.0_wp)), tiny(1.0_wp))
+    do i = 1, 2
+      if (target%control(1 + i) /= force_control) cycle
+      mean = sum(weight*it%ds(:, i))
+      it%motion(1 + i) = it%motion(1 + i) + mean
+      it%ds(:, i) = it%ds(:, i) - mean
+    end do
+    call classify(self%problem, first_share, it)
+  end subroutine begin
+
+  !> Tractions, and contact with a ring around it, of the state to start from.
+  subroutine continue_from(self, start, it, error)
+    class(direct_friction_t), intent(inout) :: self
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n
+
+    n = size(it%p)
+    it%contact = it%candidate .and. reshape(ring(start%pressure > 0.0_wp), [n])
+    if (.not. any(it%contact)) it%contact = it%candidate
+    it%p = merge(reshape(start%pressure, [n]), 0.0_wp, it%contact)
+    it%q = reshape(start%traction, [n, 2])
+    call evaluate(self, it, error)
+    if (.not. allocated(error)) call classify(self%problem, first_share, it)
+  end subroutine continue_from
+
+  !> An area with the ring of lattice neighbours around it.
+  pure function ring(area) result(wider)
+    !> Area (n_col, n_row)
+    logical, intent(in) :: area(:, :)
+    logical :: wider(size(area, 1), size(area, 2))
+    integer :: sign
+
+    wider = area
+    do sign = -1, 1, 2
+      wider = wider .or. eoshift(area, sign, dim=1) .or. eoshift(area, sign, dim=2) &
+              .or. eoshift(eoshift(area, sign, dim=1), -sign, dim=2)
+    end do
+  end function ring
+
+  !> Stick or slip at every node in contact.
+  pure subroutine classify(problem, share, it)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Share of the classification parameter to use
+    real(wp), intent(in) :: share
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    real(wp) :: r, largest_bound
+    integer :: i
+
+    r = share*problem%classification_parameter(count(it%contact .and. it%p > 0.0_wp))
+    largest_bound = problem%friction%bound(maxval(it%p))
+    it%zone = separated
+    do i = 1, size(it%p)
+      if (.not. it%contact(i)) cycle
+      if (it%p(i) > 0.0_wp .and. problem%friction%resists() .and. .not. problem%friction%no_slip) then
+        call linearize(it%q(i, :), it%ds(i, :), problem%friction%bound(it%p(i)), largest_bound, r, &
+                       it%zone(i), it%direction(i, :), it%compliance(i))
+      else
+        call enter(problem, it, i)
+      end if
+    end do
+  end subroutine classify
+
+  !> State of a node that comes into contact: its traction, if any, will oppose its slip.
+  pure subroutine enter(problem, it, node)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    !> Node
+    integer, intent(in) :: node
+    real(wp) :: length
+
+    it%zone(node) = merge(stick, slip, problem%friction%no_slip)
+    it%compliance(node) = merge(0.0_wp, infinite, problem%friction%no_slip)
+    it%direction(node, :) = 0.0_wp
+    length = norm2(it%ds(node, :))
+    if (length > negligible_slip*problem%tangential_compliance*maxval(it%p)) then
+      it%direction(node, :) = -it%ds(node, :)/length
+    end if
+  end subroutine enter
+
+  !> Is there nothing to carry the loads, or no more than the directions of slip, with tractions to match?
+  pure logical function is_adrift(problem, it)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Iterate
+    type(iterate_t), intent(in) :: it
+
+    is_adrift = .not. it%carried
+    if (is_adrift .or. any(it%zone == stick)) return
+    is_adrift = sqrt(maxval(sum(it%q**2, dim=2)))/beyond_reason > problem%friction%bound(maxval(it%p))
+  end function is_adrift
+
+  !> Let the nodes stick that are the closest to it: those whose compliance is below the (harmonic) mean.
+  pure subroutine hold(it)
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    real(wp) :: mean
+
+    mean = count(it%zone == slip)/sum(1.0_wp/it%compliance, mask=it%zone == slip)
+    where (it%zone == slip .and. it%compliance <= mean) it%zone = stick
+  end subroutine hold
+
+  !> Contact area under a frozen state of stick and slip, and its tractions.
+  subroutine find_area(self, target, max_tries, it, error)
+    class(direct_friction_t), intent(inout) :: self
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Areas that may be tried
+    integer, intent(in) :: max_tries
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    logical, dimension(size(it%p)) :: wrong, before
+    real(wp) :: negligible
+    integer :: i, fewest, left, try
+
+    fewest = huge(1)
+    left = patience
+    do try = 1, max_tries
+      call solve_area(self%problem, self%flexibility, target, it, error)
+      if (allocated(error)) return
+      it%solves = it%solves + 1
+      call evaluate(self, it, error)
+      if (allocated(error)) return
+      negligible = rounding*maxval(it%p)
+      wrong = merge(it%p < -negligible, &
+                    it%candidate .and. it%gap < -negligible*self%problem%normal_compliance, it%contact)
+      if (.not. any(wrong)) return
+      before = it%contact
+      call exchange(wrong, fewest, left, it%contact)
+      if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
+      do i = 1, size(it%p)
+        if (it%contact(i) .and. .not. before(i)) call enter(self%problem, it, i)
+      end do
+    end do
+  end subroutine find_area
+
+  !> Gap and slip under the tractions and motions of an iterate.
+  subroutine evaluate(self, it, error)
+    class(direct_friction_t), intent(inout) :: self
+    !> Iterate
+    type(iterate_t), intent(inout) :: it
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), dimension(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3) :: traction, displacement
+    real(wp) :: conditions(size(it%p), 3)
+
+    traction = reshape([it%p, it%q], shape(traction))
+    call self%displacements(traction(:, :, normal), traction(:, :, along_x:), displacement, error)
+    if (allocated(error)) return
+    conditions = unloaded(self%problem, it) + reshape(displacement, shape(conditions))
+    it%gap = conditions(:, normal)
+    it%ds = conditions(:, along_x:)
+  end subroutine evaluate
+
+  !> The state that an iterate stands for: with its tractions projected on p >= 0 and on the cone.
+  subroutine record(self, reference, target, tolerance, it, state, error)
+    class(direct_friction_t), intent(inout) :: self
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Iterate
+    type(iterate_t), intent(in) :: it
+    !> State to be filled
+    type(contact_state_t), intent(inout) :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: displacement(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3)
+    integer :: col, row
+
+    state%pressure = reshape(max(it%p, 0.0_wp), shape(state%pressure))
+    state%traction = reshape(it%q, shape(state%traction))
+    do row = 1, size(state%pressure, 2)
+      do col = 1, size(state%pressure, 1)
+        state%traction(col, row, :) = on_cone(state%traction(col, row, :), &
+                                              self%problem%friction%bound(state%pressure(col, row)))
+      end do
+    end do
+    state%motion = it%motion
+    call self%displacements(state%pressure, state%traction, displacement, error)
+    if (allocated(error)) return
+    call self%problem%conclude(target, tolerance, reference, displacement, state)
+    state%sweeps = it%solves
+    state%operator_applications = self%flexibility%applications
+  end subroutine record
+
+end module hc_direct_friction

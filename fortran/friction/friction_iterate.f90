@@ -1,0 +1,399 @@
+!> An iterate of a frictional load step on one lattice.
+!>
+!> It holds tractions and motions with what they cause, and says which residuals follow from
+!> them. Which zones they call for stands in friction_zones; how to get to the next iterate is left to
+!> friction_sweep and friction_newton.
+module hc_friction_iterate
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
+  use hc_contact_residuals, only: normal_residual, tangential_scale
+  use hc_friction_rows, only: residual_row, cone_row
+  use hc_friction_problem, only: friction_problem_t
+  use hc_driven_motions, only: driven_motions_t, new_driven_motions
+  use hc_friction_operators, only: operators_t
+  use hc_friction_systems, only: pressure_system_t, shear_system_t, new_shear_system
+  use hc_krylov, only: solution_accurate
+  use hc_vectors, only: fill, copy, add, maximum
+  implicit none
+  private
+
+  public :: iterate_t, cautious
+
+  !> The first guess of a shear traction from nothing: this much less of the slip counts.
+  real(wp), parameter :: cautious = 0.2_wp
+
+  !> What displacements that are carried along may be off, relative to the largest: rounding errors, of single
+  !> precision where GMRES puts its solution together.
+  real(wp), parameter :: rounding = 1.0e-6_wp
+
+  !> Tractions and what they cause, as vectors over all nodes; two components one after the other.
+  type :: iterate_t
+    !> Pressure and the closing of the gap that it causes
+    real(wp), allocatable :: p(:), w(:)
+    !> Shear traction, and the tangential displacement that it causes together with the pressure
+    real(wp), allocatable :: q(:), u(:)
+    !> Closing of the gap that the shear traction causes
+    real(wp), allocatable :: closing(:)
+    !> It is that of the traction cut to the cone, as a staggered sweep leaves it; or it is part of `w`, and
+    !> `closing` is zero, as after a coupled sweep
+    logical :: cut = .false., joint = .false.
+    !> Nodes in contact
+    logical, allocatable :: contact(:)
+    !> Approach, shifts and twist
+    real(wp) :: motion(n_motion) = 0.0_wp
+    real(wp) :: residual_normal = 1.0_wp, residual_tangential = 1.0_wp
+    !> Too few nodes stick on their own, some were held so that a prescribed load can be carried
+    logical :: held = .false.
+    !> Even so nothing resists a motion whose load is prescribed
+    logical :: adrift = .false.
+
+    type(friction_problem_t), pointer :: problem => null()
+    type(operators_t), pointer :: operators => null()
+    type(pressure_system_t) :: pressure
+    type(shear_system_t) :: shear
+    type(load_target_t) :: target
+    real(wp) :: tolerance = 0.0_wp
+    !> Initial gap; relative displacement at the beginning of the step
+    real(wp), allocatable :: h(:), origin(:)
+    logical, allocatable :: candidate(:)
+    !> Pressure drags tangentially; shear tractions move the pressure
+    logical :: dragging = .false., pressing = .false.
+    !> Factor of the classification parameter, the smaller the worse the iteration goes
+    real(wp) :: caution = 1.0_wp
+    !> Shear tractions solved for, and the least of their residuals R_t
+    integer :: n_sweep = 0
+    real(wp) :: best = huge(1.0_wp)
+    !> Share of the next step that is taken if that residual does not fall
+    real(wp) :: share = 0.5_wp
+    !> About the pressure that an approach of the contact causes, and the shear traction of each rigid motion,
+    !> components along x and y: what constraints are fulfilled with
+    real(wp), allocatable :: lift(:, :), drag(:, :)
+    !> How the linear solutions of the last sweep ended, the worst of them
+    integer :: outcome = solution_accurate
+    !> The start knew of no contact
+    logical :: cold = .false.
+    !> Nothing has been solved yet
+    logical :: first = .true.
+  contains
+    !> Start from a state
+    procedure :: begin
+    !> Displacements of the present tractions, from scratch
+    procedure :: refresh
+    !> Gap of the present tractions and approach, and its residual
+    procedure :: find_gap, gap_residual
+    !> Relative displacement since the beginning of the step, along one row
+    procedure :: slip_row
+    !> Shear traction cut to the cone
+    procedure :: cut_to_cone
+    !> Largest shear traction that there can be
+    procedure :: traction_scale
+    !> Residuals of the present tractions
+    procedure :: find_residuals, find_tangential_residual
+    !> Are all numbers numbers?
+    procedure :: is_finite
+    !> Are displacements those of the tractions?
+    procedure :: check_displacements
+  end type iterate_t
+
+contains
+
+  !> Start from a state.
+  subroutine begin(self, problem, operators, start, reference, target, tolerance, error)
+    class(iterate_t), intent(inout) :: self
+    !> The problem
+    type(friction_problem_t), intent(in), target :: problem
+    !> Operator and preconditioners over its window
+    type(operators_t), intent(inout), target :: operators
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(driven_motions_t) :: driven
+    real(wp) :: highest
+    integer :: n, row, from, to
+
+    n = problem%lattice%size()
+    self%problem => problem
+    self%operators => operators
+    self%target = target
+    self%tolerance = tolerance
+    self%pressure%operators => operators
+    self%pressure%n_threads = operators%n_threads
+    call new_shear_system(self%shear, operators)
+    self%dragging = abs(problem%pair%lambda_2) > 0.0_wp
+    self%pressing = self%dragging .and. problem%friction%resists() .and. .not. problem%goodman
+    highest = huge(1.0_wp)
+    ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
+    if (target%control(normal) /= force_control .and. .not. self%pressing) highest = target%value(normal)
+    allocate (self%h(n), self%origin(2*n), self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
+    allocate (self%candidate(n), self%contact(n))
+    !$omp parallel do schedule(static) num_threads(operators%n_threads) private(from, to)
+    do row = 1, problem%lattice%extent(2)
+      to = row*problem%lattice%extent(1)
+      from = to - problem%lattice%extent(1) + 1
+      self%h(from:to) = problem%initial_gap(:, row)
+      self%origin(from:to) = reference(:, row, 1)
+      self%origin(n + from:n + to) = reference(:, row, 2)
+      self%p(from:to) = start%pressure(:, row)
+      self%q(from:to) = start%traction(:, row, 1)
+      self%q(n + from:n + to) = start%traction(:, row, 2)
+      self%candidate(from:to) = problem%candidate(:, row) .and. self%h(from:to) < highest
+      self%contact(from:to) = self%p(from:to) > 0.0_wp .and. self%candidate(from:to)
+    end do
+    !$omp end parallel do
+    self%motion = merge(start%motion, target%value, target%control == force_control)
+    if (any(self%contact)) then
+      ! a twist turns about the middle of the contact, as far as the shifts are free
+      call new_driven_motions(driven, problem, target, self%contact)
+      associate (turned => self%motion(about_z) - start%motion(about_z))
+        if (any(driven%motion == along_x)) self%motion(along_x) = self%motion(along_x) + turned*driven%center(2)
+        if (any(driven%motion == along_y)) self%motion(along_y) = self%motion(along_y) - turned*driven%center(1)
+      end associate
+    else
+      ! any pressure is better than none
+      self%cold = .true.
+      self%contact = self%candidate
+      if (target%control(normal) /= force_control) self%contact = self%contact .and. self%h < target%value(normal)
+      self%p = merge(1.0_wp, 0.0_wp, self%contact)
+      self%q = 0.0_wp
+    end if
+    call self%refresh(error)
+  end subroutine begin
+
+  !> Displacements of the present tractions, from scratch.
+  subroutine refresh(self, error)
+    class(iterate_t), intent(inout) :: self
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: moved(:)
+    integer :: n, n_threads
+
+    n = size(self%p)
+    n_threads = self%operators%n_threads
+    self%cut = .false.
+    self%joint = .false.
+    allocate (moved(3*n))
+    if (self%dragging .and. .not. (self%cold .and. self%first)) then
+      call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
+      if (allocated(error)) return
+      call copy(moved(:n), self%w, n_threads)
+      call copy(moved(n + 1:), self%u, n_threads)
+    else
+      call self%operators%apply([normal], self%p, [normal], self%w, error)
+      if (allocated(error)) return
+      call fill(self%u, 0.0_wp, n_threads)
+    end if
+    call fill(self%closing, 0.0_wp, n_threads)
+    if (all_zero(self%q)) return
+    if (self%pressing) then
+      call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
+      if (allocated(error)) return
+      call copy(moved(:n), self%closing, n_threads)
+    else
+      call self%operators%apply([along_x, along_y], self%q, [along_x, along_y], moved(n + 1:), error)
+      if (allocated(error)) return
+    end if
+    call add(moved(n + 1:), self%u, n_threads)
+  end subroutine refresh
+
+  pure logical function all_zero(values)
+    real(wp), intent(in) :: values(:)
+    all_zero = .not. any(abs(values) > 0.0_wp)
+  end function all_zero
+
+  !> Gap of the present tractions and approach.
+  subroutine find_gap(self, gap)
+    class(iterate_t), intent(in) :: self
+    !> The gap (n) [m]
+    real(wp), allocatable, intent(out) :: gap(:)
+    integer :: i
+
+    allocate (gap(size(self%p)))
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads)
+    do i = 1, size(gap)
+      gap(i) = self%h(i) + self%closing(i) + self%w(i) - self%motion(normal)
+    end do
+    !$omp end parallel do
+  end subroutine find_gap
+
+  !> ds of the present tractions and motions at the nodes of a row in contact, zero elsewhere.
+  pure subroutine slip_row(self, row, dsx, dsy)
+    class(iterate_t), intent(in) :: self
+    integer, intent(in) :: row
+    !> Components along x and y (n_col)
+    real(wp), intent(out), contiguous :: dsx(:), dsy(:)
+    integer :: i, n, col
+    logical :: touches
+
+    n = size(self%p)
+    do col = 1, size(dsx)
+      i = (row - 1)*size(dsx) + col
+      touches = self%contact(i) .or. self%p(i) > 0.0_wp
+      dsx(col) = self%u(i) - self%origin(i) - (self%motion(along_x) - self%motion(about_z)*self%problem%y(col, row))
+      dsy(col) = self%u(n + i) - self%origin(n + i) - (self%motion(along_y) + self%motion(about_z)*self%problem%x(col, row))
+      dsx(col) = merge(dsx(col), 0.0_wp, touches)
+      dsy(col) = merge(dsy(col), 0.0_wp, touches)
+    end do
+  end subroutine slip_row
+
+  !> Largest shear traction that there can be.
+  real(wp) function traction_scale(self)
+    class(iterate_t), intent(in) :: self
+    real(wp) :: largest
+    integer :: n
+
+    n = size(self%p)
+    largest = 0.0_wp
+    traction_scale = maximum(self%p, self%operators%n_threads)
+    if (self%problem%friction%no_slip) largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
+    traction_scale = tangential_scale(self%problem%friction, largest)*traction_scale
+  end function traction_scale
+
+  !> Shear traction cut to the cone.
+  subroutine cut_to_cone(self, q)
+    class(iterate_t), intent(in) :: self
+    !> The traction, components along x and y (2 n) [Pa]
+    real(wp), allocatable, intent(out) :: q(:)
+    real(wp) :: unit, slope
+    integer :: n, n_col, row, from, to
+
+    n = size(self%p)
+    n_col = self%problem%lattice%extent(1)
+    allocate (q(2*n))
+    unit = pressure_unit(self)
+    slope = self%problem%friction%slope()
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(from, to)
+    do row = 1, n/n_col
+      from = (row - 1)*n_col + 1
+      to = row*n_col
+      call cone_row(n_col, unit, slope, self%p(from:to), self%q(from:to), self%q(n + from:n + to), q(from:to), &
+                    q(n + from:n + to))
+    end do
+    !$omp end parallel do
+  end subroutine cut_to_cone
+
+  !> Inverse of the largest pressure, 0 without pressure [1/Pa].
+  real(wp) function pressure_unit(self)
+    class(iterate_t), intent(in) :: self
+
+    pressure_unit = max(maximum(self%p, self%operators%n_threads), 0.0_wp)
+    if (pressure_unit > 0.0_wp) pressure_unit = 1.0_wp/pressure_unit
+  end function pressure_unit
+
+  !> Residuals of the present tractions; nothing is multiplied for them.
+  subroutine find_residuals(self)
+    class(iterate_t), intent(inout) :: self
+    real(wp), allocatable :: gap(:)
+
+    call self%find_gap(gap)
+    self%residual_normal = self%gap_residual(gap)
+    call self%find_tangential_residual()
+  end subroutine find_residuals
+
+  !> R_t alone.
+  subroutine find_tangential_residual(self)
+    class(iterate_t), intent(inout) :: self
+    real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, slope, largest, worst
+    integer :: n, row, from, to
+
+    n = size(self%p)
+    self%residual_tangential = 0.0_wp
+    unit = pressure_unit(self)
+    slope = self%problem%friction%slope()
+    if (.not. (unit > 0.0_wp .and. self%problem%friction%resists())) return
+    largest = 0.0_wp
+    worst = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(ds, from, to) &
+    !$omp& reduction(max: largest, worst)
+    do row = 1, self%problem%lattice%extent(2)
+      from = (row - 1)*size(ds, 1) + 1
+      to = row*size(ds, 1)
+      call self%slip_row(row, ds(:, 1), ds(:, 2))
+      call residual_row(size(ds, 1), unit, slope, 1.0_wp/self%problem%tangential_compliance, self%p(from:to), &
+                        self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
+    end do
+    !$omp end parallel do
+    self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, largest)
+  end subroutine find_tangential_residual
+
+  !> Are all tractions and motions finite numbers?
+  logical function is_finite(self)
+    class(iterate_t), intent(in) :: self
+    integer :: n, i
+
+    n = size(self%p)
+    is_finite = all(ieee_is_finite(self%motion))
+    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) reduction(.and.: is_finite)
+    do i = 1, n
+      is_finite = is_finite .and. ieee_is_finite(self%p(i)) .and. ieee_is_finite(self%q(i)) .and. ieee_is_finite(self%q(n + i))
+    end do
+    !$omp end parallel do
+  end function is_finite
+
+  !> Fail where `w`, `closing` and `u` are not what the tractions cause: every step of the algorithm has to
+  !> leave them so. The products are not counted.
+  subroutine check_displacements(self, error)
+    class(iterate_t), intent(inout) :: self
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: applications
+    real(wp), allocatable :: q(:), moved(:), dragged(:), w(:), u(:), closing(:)
+
+    associate (n => size(self%p))
+      allocate (moved(3*n), dragged(3*n), source=0.0_wp)
+      applications = self%operators%flexibility%applications
+      call self%operators%apply([normal], self%p, [normal, along_x, along_y], dragged, error)
+      if (allocated(error)) return
+      if (.not. self%dragging) dragged(n + 1:) = 0.0_wp
+      call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
+      if (allocated(error)) return
+      u = dragged(n + 1:) + moved(n + 1:)
+      if (self%cut) then
+        call self%cut_to_cone(q)
+        call self%operators%apply([along_x, along_y], q, [normal], moved(:n), error)
+        if (allocated(error)) return
+      end if
+      if (.not. self%pressing) moved(:n) = 0.0_wp
+      w = dragged(:n) + merge(moved(:n), 0.0_wp, self%joint)
+      closing = merge(0.0_wp, moved(:n), self%joint)
+      self%operators%flexibility%applications = applications
+      if (.not. (agree(self%w, w, maxval(abs(w))) .and. &
+                 agree(self%closing, closing, maxval(abs(w))) .and. &
+                 (agree(self%u, u, maxval(abs(u))) .or. .not. self%problem%friction%resists()))) then
+        call raise(error, status%no_convergence, 'friction: displacements are not those of the tractions')
+      end if
+    end associate
+  end subroutine check_displacements
+
+  !> Do two fields agree but for rounding errors?
+  pure logical function agree(one, other, scale)
+    real(wp), intent(in) :: one(:), other(:)
+    !> Size of what they belong to
+    real(wp), intent(in) :: scale
+
+    agree = all(abs(one - other) <= rounding*scale)
+  end function agree
+
+  !> R_n of a gap under the present pressure.
+  real(wp) function gap_residual(self, gap)
+    class(iterate_t), intent(in), target :: self
+    !> Gap (n) [m]
+    real(wp), intent(in), contiguous, target :: gap(:)
+    real(wp), pointer, contiguous :: p(:, :), g(:, :)
+
+    associate (n => self%problem%lattice%extent)
+      p(1:n(1), 1:n(2)) => self%p
+      g(1:n(1), 1:n(2)) => gap
+    end associate
+    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%n_threads)
+  end function gap_residual
+
+end module hc_friction_iterate

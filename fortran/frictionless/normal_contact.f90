@@ -1,0 +1,276 @@
+!> Frictionless contact, from coarse to fine lattices.
+!>
+!> The first guess comes from the solution on the lattice of every second node,
+!> and so on down to a few nodes.
+module hc_normal_contact
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_fftw, only: good_size
+  use hc_convolution_single, only: convolution_memory
+  use hc_flexibility_fft, only: fft_memory
+  use hc_normal_kernel, only: normal_kernel_t
+  use hc_kernel_cache, only: kernel_cache_t
+  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target
+  use hc_preconditioner, only: preconditioner_memory
+  use hc_normal_level, only: normal_level_t
+  use hc_normal_iterate, only: iterate_t
+  use hc_normal_steps, only: solve_level
+  use hc_window_part, only: frame, is_worth, part_of
+  use hc_multilevel, only: level_count, prolong_edge, restrict_field, restrict_mask
+  implicit none
+  private
+
+  public :: normal_contact_t, new_normal_contact, normal_contact_memory
+
+  !> Windows below this many nodes a side are not coarsened any further.
+  integer, parameter :: smallest_side = 20
+  !> Coarse lattices only have to give a start.
+  real(wp), parameter :: coarse_tolerance = 3.0e-2_wp
+
+  !> Lattices with fewer nodes are left to one thread.
+  integer, parameter :: worth_sharing = 150000
+  !> Parts of the window that are tried, and their tolerance.
+  integer, parameter :: part_tries = 3
+  real(wp), parameter :: part_tolerance = 0.8_wp
+
+  !> A frictionless contact problem on a hierarchy of lattices.
+  type :: normal_contact_t
+    private
+    !> From the finest to the coarsest lattice
+    type(normal_level_t), allocatable :: level(:)
+    !> Fields of the iterations on each of them, from one solution to the next
+    type(iterate_t), allocatable :: iterate(:)
+    !> The part of the finest lattice around the contact, and its first column and row there
+    type(normal_level_t), allocatable :: inner
+    integer :: corner(2) = 0
+    type(elastic_pair_t) :: pair
+    !> The kernel, as far as it was needed
+    type(normal_kernel_t) :: kernel
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer :: cache => null()
+    !> Threads to use
+    integer :: n_threads = 0
+  contains
+    !> Solve for a normal load or an approach
+    procedure :: solve
+  end type normal_contact_t
+
+contains
+
+  !> Operators of a problem on all its lattices.
+  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads, cache)
+    !> Problem to be set up
+    type(normal_contact_t), intent(out) :: self
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Initial gap (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads to use; absent or 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+    !> Spectra that are kept; it has to outlive the problem
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+
+    integer :: l
+
+    self%pair = pair
+    if (present(n_threads)) self%n_threads = n_threads
+    if (present(cache)) self%cache => cache
+    call check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
+    if (allocated(error)) return
+    allocate (self%level(level_count(lattice%extent, smallest_side)))
+    allocate (self%iterate(size(self%level)))
+    do l = 1, size(self%level)
+      associate (level => self%level(l))
+        if (l == 1) then
+          level%lattice = lattice
+          level%initial_gap = initial_gap
+          level%candidate = candidate
+        else
+          associate (finer => self%level(l - 1))
+            level%lattice = finer%lattice%coarsened()
+            level%initial_gap = restrict_field(finer%lattice, finer%initial_gap, level%lattice)
+            level%candidate = restrict_mask(finer%lattice, finer%candidate, level%lattice)
+          end associate
+        end if
+        ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
+        call level%prepare(pair, self%kernel, l == 1, l > 1, error, threads_of(level%lattice, self%n_threads), self%cache)
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine new_normal_contact
+
+  !> Bytes that a problem takes, for a window of the given size.
+  pure integer(selected_int_kind(18)) function normal_contact_memory(extent, n_threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    integer, parameter :: long = selected_int_kind(18)
+    !> Bytes of a field of numbers, and of logical values or in single precision
+    integer, parameter :: field = 8, half = 4
+    integer(long) :: n, each
+
+    n = int(extent(1), long)*extent(2)
+    ! on all lattices: products in single precision; gap, candidates; pressure, closing, vectors, zones, punch
+    each = preconditioner_memory(extent, n_threads, .false.) - 2*half*n &
+           + convolution_memory(extent, good_size(2*extent - 1), 1, 1, n_threads) &
+           + n*(field + half + 2*field + 4*half + 2*half)
+    ! on the finest: products in double precision, the kernel; states, start, zones to come, edge of the contact
+    normal_contact_memory = each + each/3 + fft_memory(extent, .true., n_threads) &
+                            + field*int(maxval(extent), long)**2 + n*(2*field + half + 2*field + 4*half)
+  end function normal_contact_memory
+
+  !> Solve for a normal load or an approach.
+  subroutine solve(self, control, target, tolerance, max_sweeps, state, error)
+    class(normal_contact_t), intent(inout), target :: self
+    !> force_control or displacement_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Bound of both residuals
+    real(wp), intent(in) :: tolerance
+    !> Active sets that may be tried on each lattice
+    integer, intent(in) :: max_sweeps
+    !> Solution; `converged` tells whether the residuals are within the tolerance
+    type(contact_state_t), intent(out) :: state
+    !> Allocated on failure: a target that cannot be solved for, numbers that are not finite
+    type(error_t), allocatable, intent(out) :: error
+
+    type(contact_state_t) :: coarse
+    real(wp) :: work
+    integer :: l
+
+    call check_target([control], [target], tolerance, max_sweeps, error)
+    if (allocated(error)) return
+    work = 0.0_wp
+    do l = size(self%level), 1, -1
+      associate (level => self%level(l))
+        if (.not. any(level%candidate)) cycle
+        allocate (state%pressure(level%lattice%extent(1), level%lattice%extent(2)), source=0.0_wp)
+        if (allocated(coarse%pressure)) then
+          call prolong_edge(self%level(l + 1)%lattice, coarse%pressure, level%lattice, state%pressure, level%n_threads)
+        else
+          where (level%candidate) state%pressure = 1.0_wp
+        end if
+        if (l > 1) then
+          call solve_level(level, self%iterate(l), control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          if (allocated(error)) return
+          work = work + share_of(level, self%level(1))*level%work()
+          call move_alloc(state%pressure, coarse%pressure)
+        else
+          call solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
+          if (allocated(error)) return
+        end if
+      end associate
+    end do
+    state%operator_applications = work
+  end subroutine solve
+
+  !> Threads for a lattice: one where waking the others for each of the short passes takes longer than they save.
+  pure integer function threads_of(lattice, n_threads)
+    type(lattice_t), intent(in) :: lattice
+    !> Threads that were asked for; 0: as many as OpenMP would take
+    integer, intent(in) :: n_threads
+
+    threads_of = n_threads
+    if (n_threads == 0 .and. lattice%size() < worth_sharing) threads_of = 1
+  end function threads_of
+
+  !> Nodes of a part of a lattice over those of the whole.
+  pure real(wp) function share_of(part, whole)
+    type(normal_level_t), intent(in) :: part, whole
+    share_of = real(part%lattice%size(), wp)/whole%lattice%size()
+  end function share_of
+
+  !> Solve on the finest lattice: on the part around the contact, if that is much smaller than the window.
+  !>
+  !> The gap elsewhere follows from one product over the window; should the bodies overlap there,
+  !> the part grows.
+  subroutine solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
+    class(normal_contact_t), intent(inout), target :: self
+    !> force_control or displacement_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Bound of both residuals
+    real(wp), intent(in) :: tolerance
+    !> Iterations that may be made
+    integer, intent(in) :: max_sweeps
+    !> On entry its pressure is the start, up to a factor; on return the solution
+    type(contact_state_t), intent(inout) :: state
+    !> Work, in applications of the full operator on the finest lattice
+    real(wp), intent(inout) :: work
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(contact_state_t) :: part
+    integer :: low(2), high(2), sweeps, try
+
+    associate (whole => self%level(1))
+      sweeps = 0
+      do try = 1, part_tries
+        call frame(state%pressure > 0.0_wp, low, high)
+        if (try > 1) call frame(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. whole%candidate), low, high)
+        if (.not. is_worth(low, high, whole%lattice)) exit
+        call take_part(self, low, high, error)
+        if (allocated(error)) return
+        associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
+          part%pressure = state%pressure(first(1):last(1), first(2):last(2))
+          ! the product over the window sees what single precision left
+          call solve_level(inner, self%iterate(1), control, target, part_tolerance*tolerance, max_sweeps, part, error)
+          if (allocated(error)) return
+          work = work + share_of(inner, whole)*inner%work()
+          sweeps = sweeps + part%sweeps
+          call new_contact_state(state, whole%lattice, whole%n_threads)
+          state%pressure(first(1):last(1), first(2):last(2)) = part%pressure
+        end associate
+        state%motion = part%motion
+        state%stopped = part%stopped
+        call whole%conclude_anew(control, target, tolerance, state, error)
+        if (allocated(error)) return
+        work = work + whole%work()
+        state%sweeps = sweeps
+        if (state%converged .or. .not. part%converged) return
+      end do
+      if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
+      call whole%prepare(self%pair, self%kernel, .true., .true., error, threads_of(whole%lattice, self%n_threads), self%cache)
+      if (allocated(error)) return
+      call solve_level(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
+      if (allocated(error)) return
+      state%sweeps = state%sweeps + sweeps
+      work = work + whole%work()
+    end associate
+  end subroutine solve_finest
+
+  !> Set up the part of the finest lattice between some columns and rows, unless it is at hand.
+  !>
+  !> No other part is taken, be it large enough: a load gives the same bits whatever came before it.
+  subroutine take_part(self, low, high, error)
+    class(normal_contact_t), intent(inout) :: self
+    integer, intent(in) :: low(2), high(2)
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    if (allocated(self%inner)) then
+      if (all(low == self%corner) .and. all(high - low + 1 == self%inner%lattice%extent)) return
+      deallocate (self%inner)
+    end if
+    allocate (self%inner)
+    self%corner = low
+    associate (inner => self%inner, whole => self%level(1))
+      inner%lattice = part_of(whole%lattice, low, high)
+      inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
+      inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
+      call inner%prepare(self%pair, self%kernel, .true., .true., error, threads_of(inner%lattice, self%n_threads), self%cache)
+    end associate
+  end subroutine take_part
+
+end module hc_normal_contact

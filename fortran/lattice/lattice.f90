@@ -1,0 +1,181 @@
+!> The lattice of nodes that carry the overlapping pyramids.
+!>
+!> A node has two integer indices (col, row) and lies at
+!>
+!>     origin + col * basis(:, 1) + row * basis(:, 2)
+!>
+!> so that any pair of basis vectors gives a regular triangulation with the
+!> three edge directions basis(:, 1), basis(:, 2) and basis(:, 2) - basis(:, 1).
+!> The 60-degree lattice of the dissertation, eq. (5.1), is the default; no
+!> other module knows its angle. A window is the rhombus of nodes that is kept
+!> in memory; a field over it is an array of shape (n_col, n_row).
+module hc_lattice
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  implicit none
+  private
+
+  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, edge_directions, neighbors
+
+  !> Steps in column and row to the six neighbours of a node, along the edges of the triangulation.
+  integer, parameter :: neighbors(2, 6) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1], [2, 6])
+
+  !> Nodes of a window and size of an index that default integers can still work with.
+  integer, parameter :: most_nodes = 2**29 - 1, largest_index = most_nodes
+
+  !> Basis, origin and index window of a lattice.
+  type :: lattice_t
+    !> Basis vectors as columns [m]
+    real(wp) :: basis(2, 2) = 0.0_wp
+    !> Position of node (0, 0) [m]
+    real(wp) :: origin(2) = 0.0_wp
+    !> Smallest column and row index of the window
+    integer :: first(2) = 0
+    !> Number of columns and rows of the window
+    integer :: extent(2) = 0
+  contains
+    !> Number of nodes in the window
+    procedure :: size => lattice_size
+    !> Area of a lattice cell = volume of the pyramid of unit height [m^2]
+    procedure :: cell_area
+    !> Length of the longest edge of the triangulation [m]
+    procedure :: spacing => lattice_spacing
+    !> Coordinates of every node of the window [m]
+    procedure :: coordinates
+    !> The lattice of every second node of this one
+    procedure :: coarsened
+    !> Basis vectors over the spacing
+    procedure :: unit_basis
+  end type lattice_t
+
+contains
+
+  !> A lattice from its basis vectors and window.
+  pure subroutine new_lattice(lattice, basis, first, extent, error, origin)
+    !> Lattice to be set up
+    type(lattice_t), intent(out) :: lattice
+    !> Basis vectors as columns, counter-clockwise [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> Smallest column and row index of the window
+    integer, intent(in) :: first(2)
+    !> Number of columns and rows of the window, at least 1
+    integer, intent(in) :: extent(2)
+    !> Allocated on failure: a degenerate basis, an empty or too large window, numbers that are not finite
+    type(error_t), allocatable, intent(out) :: error
+    !> Position of node (0, 0), default (0, 0) [m]
+    real(wp), intent(in), optional :: origin(2)
+
+    lattice%basis = basis
+    lattice%first = first
+    lattice%extent = extent
+    if (present(origin)) lattice%origin = origin
+    call check_lattice(lattice, error)
+  end subroutine new_lattice
+
+  !> Refuse a lattice on which nothing can be computed.
+  pure subroutine check_lattice(lattice, error)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Allocated on failure: a degenerate basis, an empty or too large window, numbers that are not finite
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: long = selected_int_kind(18)
+
+    if (any(lattice%extent < 1)) then
+      call raise(error, status%invalid_input, 'the lattice window is empty: at least one row and one column expected')
+    else if (product(int(lattice%extent, long)) > most_nodes .or. any(abs(int(lattice%first, long)) > largest_index)) then
+      call raise(error, status%invalid_input, 'the lattice window: at most 536870911 nodes and indices up to that expected')
+    else if (.not. (all(ieee_is_finite(lattice%basis)) .and. all(ieee_is_finite(lattice%origin)))) then
+      ! before any comparison, which NaN may trap
+      call raise(error, status%invalid_input, 'the lattice basis and origin: finite numbers expected')
+    else if (.not. lattice%cell_area() > 1.0e-3_wp*lattice%spacing()**2) then
+      call raise(error, status%invalid_input, &
+                 'the lattice basis is degenerate: two vectors in counter-clockwise order expected')
+    end if
+  end subroutine check_lattice
+
+  !> Basis of the equilateral lattice, eq. (5.1): sides of equal length at 60 degrees.
+  pure function equilateral_basis(spacing) result(basis)
+    !> Length of a side [m]
+    real(wp), intent(in) :: spacing
+    !> Basis vectors as columns [m]
+    real(wp) :: basis(2, 2)
+
+    basis(:, 1) = spacing*[1.0_wp, 0.0_wp]
+    basis(:, 2) = spacing*[0.5_wp, 0.5_wp*sqrt(3.0_wp)]
+  end function equilateral_basis
+
+  !> The three edge directions of the triangulation, as columns [m].
+  pure function edge_directions(basis) result(edges)
+    !> Basis vectors as columns [m]
+    real(wp), intent(in) :: basis(2, 2)
+    !> First and second basis vector and their difference
+    real(wp) :: edges(2, 3)
+
+    edges(:, 1) = basis(:, 1)
+    edges(:, 2) = basis(:, 2)
+    edges(:, 3) = basis(:, 2) - basis(:, 1)
+  end function edge_directions
+
+  pure integer function lattice_size(self)
+    class(lattice_t), intent(in) :: self
+    lattice_size = product(self%extent)
+  end function lattice_size
+
+  pure real(wp) function cell_area(self)
+    class(lattice_t), intent(in) :: self
+    cell_area = self%basis(1, 1)*self%basis(2, 2) - self%basis(2, 1)*self%basis(1, 2)
+  end function cell_area
+
+  pure real(wp) function lattice_spacing(self)
+    class(lattice_t), intent(in) :: self
+    lattice_spacing = maxval(norm2(edge_directions(self%basis), dim=1))
+  end function lattice_spacing
+
+  pure subroutine coordinates(self, x, y)
+    class(lattice_t), intent(in) :: self
+    !> Coordinates of the nodes, (n_col, n_row) [m]
+    real(wp), intent(out) :: x(:, :), y(:, :)
+    integer :: col, row
+    real(wp) :: i, j
+
+    do row = 1, self%extent(2)
+      j = real(self%first(2) + row - 1, wp)
+      do col = 1, self%extent(1)
+        i = real(self%first(1) + col - 1, wp)
+        x(col, row) = self%origin(1) + i*self%basis(1, 1) + j*self%basis(1, 2)
+        y(col, row) = self%origin(2) + i*self%basis(2, 1) + j*self%basis(2, 2)
+      end do
+    end do
+  end subroutine coordinates
+
+  !> Basis vectors over the spacing, as columns: the same to the bit for all equilateral lattices with a row along x.
+  pure function unit_basis(self) result(basis)
+    class(lattice_t), intent(in) :: self
+    real(wp) :: basis(2, 2)
+
+    basis = self%basis/self%spacing()
+    if (all(abs(basis - equilateral_basis(1.0_wp)) < 4.0_wp*epsilon(1.0_wp))) basis = equilateral_basis(1.0_wp)
+  end function unit_basis
+
+  !> Node (i, j) of the coarse lattice is node (2 i, 2 j) of this one; nodes
+  !> outside the window of this one are left out.
+  pure function coarsened(self) result(coarse)
+    class(lattice_t), intent(in) :: self
+    type(lattice_t) :: coarse
+    integer :: last(2)
+
+    coarse%basis = 2.0_wp*self%basis
+    coarse%origin = self%origin
+    last = self%first + self%extent - 1
+    coarse%first = -floor_half(-self%first)
+    coarse%extent = floor_half(last) - coarse%first + 1
+  end function coarsened
+
+  !> Floor of n/2, also for negative n
+  elemental integer function floor_half(n)
+    integer, intent(in) :: n
+    floor_half = (n - modulo(n, 2))/2
+  end function floor_half
+
+end module hc_lattice

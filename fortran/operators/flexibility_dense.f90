@@ -1,0 +1,175 @@
+!> Flexibility operator by direct summation, and its single coefficients, for LAPACK.
+!>
+!> A coefficient depends on the distance of two nodes only, so those of all distances in the window are all
+!> that is kept; the matrix of an area is filled from them where it is needed.
+module hc_flexibility_dense
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid
+  use hc_flexibility, only: flexibility_t, check_operator, normal, along_y, n_block, blocks, block_index
+  implicit none
+  private
+
+  public :: dense_flexibility_t, new_dense_flexibility, dense_memory
+
+  !> Operator by direct summation.
+  type, extends(flexibility_t) :: dense_flexibility_t
+    private
+    !> Position of each node: two nodes differ by the same whenever they are equally far apart (n_node)
+    integer, allocatable :: position(:)
+    !> Blocks of the operator by the difference of positions, onto - from (:, n_block) [m/Pa]
+    real(wp), allocatable :: influence(:, :)
+  contains
+    procedure :: apply => dense_apply
+    !> Displacements of some nodes by a unit pressure on one
+    procedure :: normal_influence
+    !> Displacements of some nodes by the tractions on one
+    procedure :: response
+  end type dense_flexibility_t
+
+contains
+
+  !> The coefficients of the operator over a window.
+  subroutine new_dense_flexibility(operator, lattice, pair, error)
+    !> Operator to be set up
+    type(dense_flexibility_t), intent(out) :: operator
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Allocated on failure: a lattice or constants of no use, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    integer, parameter :: long = selected_int_kind(18)
+    type(pyramid_t) :: pyramid
+    real(wp) :: offset(2)
+    integer :: n(2), col, row, stride, largest, stat
+
+    call check_operator(lattice, pair, error)
+    if (allocated(error)) return
+    if (product(2*int(lattice%extent, long) - 1) > huge(1)) then
+      call raise(error, status%resources, 'the window is too large for a matrix: use method "fft"')
+      return
+    end if
+    operator%lattice = lattice
+    operator%pair = pair
+    n = lattice%extent
+    stride = 2*n(1) - 1
+    largest = n(1) - 1 + (n(2) - 1)*stride
+    allocate (operator%influence(-largest:largest, n_block), operator%position(lattice%size()), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the flexibility operator')
+      return
+    end if
+    operator%position = [((col + row*stride, col=0, n(1) - 1), row=0, n(2) - 1)]
+    call new_pyramid(pyramid, lattice%basis)
+    !$omp parallel do private(col, offset) if (lattice%size() > 1000)
+    do row = 1 - n(2), n(2) - 1
+      do col = 1 - n(1), n(1) - 1
+        offset = col*lattice%basis(:, 1) + row*lattice%basis(:, 2)
+        operator%influence(col + row*stride, :) = blocks(pair, pyramid%kernels(offset(1), offset(2)))
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine new_dense_flexibility
+
+  !> Bytes that the influence coefficients and the matrix of a contact take, factorized.
+  pure integer(selected_int_kind(18)) function dense_memory(extent, n_contact, normal_only)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Nodes in contact; with friction all stick
+    integer, intent(in) :: n_contact
+    !> Contact without friction
+    logical, intent(in) :: normal_only
+    integer, parameter :: long = selected_int_kind(18)
+    !> What BLAS packs matrices into
+    integer(long), parameter :: buffers = 15000000
+    integer(long) :: n
+
+    n = n_contact
+    dense_memory = buffers + 8*n_block*4*int(extent(1), long)*extent(2)
+    if (normal_only) then
+      ! the first guess is where undeformed bodies would overlap, twice the contact and more; half of the matrix is touched
+      dense_memory = dense_memory + 8*min(15*n/7, int(extent(1), long)*extent(2))**2/2
+    else
+      ! beside the matrix its factors of single precision; on its way the area may be a seventh larger
+      dense_memory = dense_memory + (8 + 4)*(3*(n + n/7))**2
+    end if
+  end function dense_memory
+
+  !> Displacements along the normal by a unit pressure on one node [m/Pa].
+  pure function normal_influence(self, onto, from) result(displacement)
+    class(dense_flexibility_t), intent(in) :: self
+    !> Nodes that move, in the order of a window
+    integer, intent(in) :: onto(:)
+    !> Node that is loaded
+    integer, intent(in) :: from
+    real(wp) :: displacement(size(onto))
+
+    displacement = self%influence(self%position(onto) - self%position(from), block_index(normal, normal))
+  end function normal_influence
+
+  !> Displacements by the tractions on one node.
+  pure subroutine response(self, onto, from, traction, displacement)
+    class(dense_flexibility_t), intent(in) :: self
+    !> Nodes that move, in the order of a window
+    integer, intent(in) :: onto(:)
+    !> Node that is loaded
+    integer, intent(in) :: from
+    !> Its tractions [Pa]
+    real(wp), intent(in) :: traction(3)
+    !> Displacements (3, size(onto)) [m]
+    real(wp), intent(out) :: displacement(:, :)
+    real(wp) :: factor(3)
+    integer :: acting, k, offset, block(3)
+
+    displacement = 0.0_wp
+    do acting = normal, along_y
+      if (abs(traction(acting)) <= 0.0_wp) cycle
+      block = abs(block_index(:, acting))
+      factor = traction(acting)*sign(1, block_index(:, acting))
+      do k = 1, size(onto)
+        offset = self%position(onto(k)) - self%position(from)
+        displacement(:, k) = displacement(:, k) + factor*self%influence(offset, block)
+      end do
+    end do
+  end subroutine response
+
+  subroutine dense_apply(self, from, traction, onto, displacement, error)
+    class(dense_flexibility_t), intent(inout) :: self
+    integer, intent(in) :: from(:)
+    real(wp), intent(in), contiguous :: traction(:, :, :)
+    integer, intent(in) :: onto(:)
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: factor
+    integer :: col, row, i, o, block, first, n(2), target_row
+
+    call self%check(from, traction, onto, displacement, error)
+    if (allocated(error)) return
+    n = self%lattice%extent
+    !$omp parallel do private(row, col, i, o, block, first, factor) if (self%lattice%size() > 1000)
+    do target_row = 1, n(2)
+      displacement(:, target_row, :) = 0.0_wp
+      do i = 1, size(from)
+        do row = 1, n(2)
+          do col = 1, n(1)
+            if (abs(traction(col, row, i)) <= 0.0_wp) cycle
+            first = 1 - col + (target_row - row)*(2*n(1) - 1)
+            do o = 1, size(onto)
+              block = block_index(onto(o), from(i))
+              factor = sign(1, block)*traction(col, row, i)
+              displacement(:, target_row, o) = displacement(:, target_row, o) &
+                                               + factor*self%influence(first:first + n(1) - 1, abs(block))
+            end do
+          end do
+        end do
+      end do
+    end do
+    !$omp end parallel do
+    call self%count(from, onto)
+  end subroutine dense_apply
+
+end module hc_flexibility_dense

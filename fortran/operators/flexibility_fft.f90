@@ -1,0 +1,148 @@
+!> Flexibility operator as a zero-padded convolution by FFT.
+module hc_flexibility_fft
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid
+  use hc_flexibility, only: flexibility_t, check_operator, n_block, first_odd_block, blocks, block_index
+  use hc_fftw, only: good_size
+  use hc_convolution, only: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t
+  use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
+  use hc_kernel_cache, only: kernel_cache_t
+  use hc_normal_kernel, only: normal_kernel_t
+  implicit none
+  private
+
+  public :: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
+
+  !> Convolution operator over a window.
+  type, extends(flexibility_t) :: fft_flexibility_t
+    !> Spectra of the blocks over lambda_1 and the spacing, that of the pressure and the gap alone or all six
+    type(convolution_t) :: convolution
+    !> Components that the operator was set up for
+    integer, private :: n_component = 0
+  contains
+    procedure :: apply => fft_apply
+  end type fft_flexibility_t
+
+  !> The blocks of the operator at lattice offsets, over lambda_1 and the spacing.
+  type, extends(kernel_source_t) :: lattice_blocks_t
+    type(pyramid_t) :: pyramid
+    type(elastic_pair_t) :: pair
+    real(wp) :: basis(2, 2) = 0.0_wp
+  contains
+    procedure :: row => lattice_block_row
+  end type lattice_blocks_t
+
+contains
+
+  !> Plans and spectra of the operator over a window.
+  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, n_threads, kernel, cache)
+    !> Operator to be set up
+    type(fft_flexibility_t), intent(out) :: operator
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Allocated on failure: a lattice, constants or threads of no use, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Only the action of the pressure on the gap will be asked for
+    logical, intent(in), optional :: normal_only
+    !> Threads to use; absent or 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+    !> With `normal_only`: the kernel, as far as it is at hand
+    type(normal_kernel_t), intent(inout), optional :: kernel
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+
+    type(lattice_blocks_t) :: source
+    type(normal_kernel_t) :: made
+    type(kernel_key_t) :: key
+    logical :: only_normal, found
+
+    call check_operator(lattice, pair, error, n_threads)
+    if (allocated(error)) return
+    only_normal = .false.
+    if (present(normal_only)) only_normal = normal_only
+    operator%lattice = lattice
+    operator%pair = pair
+    operator%n_component = merge(1, 3, only_normal)
+    call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
+                         merge(1, n_block, only_normal), operator%n_component, error, &
+                         first_odd=first_odd_block, n_threads=n_threads)
+    if (allocated(error)) return
+    operator%convolution%factor = pair%lambda_1*lattice%spacing()
+    key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, pair)
+    call operator%convolution%take_spectra(found, error, cache, key)
+    if (found .or. allocated(error)) return
+    if (only_normal .and. present(kernel)) then
+      call kernel%cover(lattice, n_threads)
+      call operator%convolution%transform_kernels(kernel, error)
+    else if (only_normal) then
+      call made%cover(lattice, n_threads)
+      call operator%convolution%transform_kernels(made, error)
+    else
+      source%basis = lattice%unit_basis()
+      call new_pyramid(source%pyramid, source%basis)
+      source%pair = pair%scaled()
+      call operator%convolution%transform_kernels(source, error)
+    end if
+    if (.not. allocated(error)) call operator%convolution%share_spectra(cache, key)
+  end subroutine new_fft_flexibility
+
+  !> Bytes that the operator takes, for a window of the given size.
+  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, n_threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Only the action of the pressure on the gap will be asked for
+    logical, intent(in) :: normal_only
+    !> Threads to use
+    integer, intent(in) :: n_threads
+
+    fft_memory = convolution_memory(extent, good_size(2*extent - 1), merge(1, n_block, normal_only), &
+                                    merge(1, 3, normal_only), n_threads)
+  end function fft_memory
+
+  !> Bytes that are needed besides while the full operator is set up.
+  pure integer(selected_int_kind(18)) function fft_setup_memory(extent)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+
+    fft_setup_memory = transform_memory(extent, good_size(2*extent - 1), n_block)
+  end function fft_setup_memory
+
+  pure subroutine lattice_block_row(self, j, k)
+    class(lattice_blocks_t), intent(in) :: self
+    integer, intent(in) :: j
+    real(wp), intent(out) :: k(:, :)
+    real(wp) :: block(n_block), position(2)
+    integer :: i, n
+
+    n = size(k, 2)/2
+    do i = -n, n
+      position = i*self%basis(:, 1) + j*self%basis(:, 2)
+      block = blocks(self%pair, self%pyramid%kernels(position(1), position(2)))
+      k(:, n + 1 + i) = block(:size(k, 1))
+    end do
+  end subroutine lattice_block_row
+
+  subroutine fft_apply(self, from, traction, onto, displacement, error)
+    class(fft_flexibility_t), intent(inout) :: self
+    integer, intent(in) :: from(:)
+    real(wp), intent(in), contiguous :: traction(:, :, :)
+    integer, intent(in) :: onto(:)
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%check(from, traction, onto, displacement, error)
+    if (allocated(error)) return
+    if (max(maxval(from), maxval(onto)) > self%n_component) then
+      call raise(error, status%invalid_input, 'the operator was set up for normal contact only')
+      return
+    end if
+    call self%convolution%convolve(block_index(onto, from), traction, displacement)
+    call self%count(from, onto)
+  end subroutine fft_apply
+
+end module hc_flexibility_fft

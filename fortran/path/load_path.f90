@@ -1,0 +1,187 @@
+!> From one load to the next.
+!>
+!> A load step that does not converge is cut in half, again and again up to a
+!> bound; a state is only taken over when it has converged. In an incremental
+!> path every part starts from the relative displacement that the last one left; the slip
+!> increment that is recorded is that of all parts, and the residual of the friction conditions is that of this
+!> record, so that it shows how far the parts are from one implicit step.
+!> A static load is applied at once: parts only serve as starts, and the relative
+!> displacement counts from the undeformed bodies. So it is tried with a step that begins without contact, which no
+!> path precedes: it is the same problem as a static load.
+module hc_load_path
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached
+  use hc_contact_residuals, only: tangential_residual
+  use hc_friction_problem, only: friction_problem_t, friction_solver_t
+  use hc_entry_state, only: solve_with_entry
+  implicit none
+  private
+
+  public :: advance
+
+contains
+
+  !> Advance a state to given loads or motions.
+  subroutine advance(solver, state, target, static, tolerance, max_sweeps, max_cuts, next, error, interpolated)
+    !> Method
+    class(friction_solver_t), intent(inout) :: solver
+    !> State to go on from
+    type(contact_state_t), intent(in), target :: state
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> The load is applied to the undeformed bodies at once
+    logical, intent(in) :: static
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> Times that a step may be halved
+    integer, intent(in) :: max_cuts
+    !> The new state; not converged: the attempt that failed, or a part of the step that reached the rim of the window,
+    !> where nothing was gone on with (stopped is rim_reached, and the residuals of the loads are those of the whole step)
+    type(contact_state_t), intent(out) :: next
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    !> Slip of a node that enters counts from where it stood when its gap closed; default: from the beginning of the step
+    logical, intent(in), optional :: interpolated
+
+    type(contact_state_t), target :: now
+    type(contact_state_t), pointer :: from
+    real(wp), allocatable :: reference(:, :, :), slipped(:, :, :)
+    logical :: from_entry, at_once
+    real(wp) :: done, part, work
+    integer :: cuts, sweeps
+
+    call check_target(target%control, target%value, tolerance, max_sweeps, error)
+    if (allocated(error)) return
+    if (max_cuts < 0) then
+      call raise(error, status%invalid_input, 'the times that a step may be halved: a number of at least 0 expected')
+      return
+    end if
+    call check_state(state, solver%problem%lattice, error)
+    if (allocated(error)) return
+    from_entry = .false.
+    if (present(interpolated)) from_entry = interpolated
+    at_once = static .or. .not. (from_entry .or. any(state%pressure > 0.0_wp))
+    if (at_once) allocate (reference, source=state%relative_displacement)
+    if (static) reference = 0.0_wp
+    if (from_entry) then
+      allocate (slipped, source=0.0_wp*state%relative_displacement)
+    else
+      allocate (slipped(0, 0, 0))
+    end if
+    from => state
+    done = 0.0_wp
+    part = 1.0_wp
+    work = 0.0_wp
+    cuts = 0
+    sweeps = 0
+    do
+      associate (goal => between(state, target, done + part))
+        if (at_once) then
+          call solver%solve_step(from, reference, goal, tolerance, max_sweeps, next, error)
+        else if (from_entry) then
+          call solve_with_entry(solver, from, goal, tolerance, max_sweeps, next, error)
+        else
+          call solver%solve_step(from, from%relative_displacement, goal, tolerance, max_sweeps, next, error)
+        end if
+      end associate
+      if (allocated(error)) return
+      work = work + next%operator_applications
+      sweeps = sweeps + next%sweeps
+      if (next%converged) then
+        if (at_once) then
+          call add_slip(solver%problem, state, static, next)
+        else
+          call add_slip(solver%problem, from, static, next)
+        end if
+        if (from_entry) slipped = slipped + next%slip_increment
+        done = done + part
+        if (done >= 1.0_wp .or. next%clipped) exit
+        now = next
+        from => now
+      else
+        ! where an attempt that failed has pressure means nothing
+        next%clipped = .false.
+        ! no path leads to loads that full sliding does not carry
+        if (next%sliding .and. done + part >= 1.0_wp) exit
+        if (cuts >= max_cuts) then
+          ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
+          if (static .or. .not. at_once .or. max_cuts == 0 .or. next%sliding) exit
+          at_once = .false.
+          from => state
+          done = 0.0_wp
+          part = 1.0_wp
+          cuts = 0
+        end if
+        cuts = cuts + 1
+        part = 0.5_wp*part
+      end if
+    end do
+    next%cuts = cuts
+    next%sweeps = sweeps
+    next%operator_applications = work
+    if (.not. at_once .and. cuts > 0 .and. next%converged) then
+      ! the slip of the step is that of all its parts
+      if (from_entry) then
+        next%slip_increment = slipped
+      else
+        next%slip_increment = next%relative_displacement - state%relative_displacement
+      end if
+      where (spread(next%pressure <= 0.0_wp, 3, 2)) next%slip_increment = 0.0_wp
+      associate (problem => solver%problem)
+        next%residual_tangential = tangential_residual(next%traction, next%slip_increment, next%pressure, problem%friction, &
+                                                       problem%tangential_compliance, problem%n_threads)
+      end associate
+    end if
+    if (next%converged .and. done < 1.0_wp) then
+      next%converged = .false.
+      next%stopped = rim_reached
+      call solver%problem%judge_loads(target, next)
+    end if
+  end subroutine advance
+
+  !> Add slip path and dissipated energy of a step, sum of A (-q . ds) [J], to those before.
+  subroutine add_slip(problem, before, static, state)
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: before
+    !> Nothing was before
+    logical, intent(in) :: static
+    !> State at its end
+    type(contact_state_t), intent(inout) :: state
+    real(wp) :: part(size(state%pressure, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(problem%n_threads)
+    do row = 1, size(part)
+      associate (q => state%traction(:, row, :), ds => state%slip_increment(:, row, :))
+        state%accumulated_slip(:, row) = norm2(ds, dim=2)
+        if (.not. static) state%accumulated_slip(:, row) = before%accumulated_slip(:, row) + state%accumulated_slip(:, row)
+        part(row) = dot_product(q(:, 1), ds(:, 1)) + dot_product(q(:, 2), ds(:, 2))
+      end associate
+    end do
+    !$omp end parallel do
+    state%dissipated_energy = -problem%lattice%cell_area()*sum(part)
+    if (.not. static) state%dissipated_energy = before%dissipated_energy + state%dissipated_energy
+  end subroutine add_slip
+
+  !> Part of the way from a state to a target.
+  pure type(load_target_t) function between(state, target, fraction)
+    !> State at the beginning
+    type(contact_state_t), intent(in) :: state
+    !> Target at the end
+    type(load_target_t), intent(in) :: target
+    !> Fraction of the way
+    real(wp), intent(in) :: fraction
+
+    between = target
+    if (fraction < 1.0_wp) then
+      associate (start => merge(state%load, state%motion, target%control == force_control))
+        between%value = start + fraction*(target%value - start)
+      end associate
+    end if
+  end function between
+
+end module hc_load_path

@@ -1,0 +1,260 @@
+!> Contact problems with friction for Python: flat procedures for f2py, no mathematics.
+!>
+!> A state is three arrays: fields (node, field), zones, and numbers; their
+!> order is that of the parameters below.
+module hc_f2py_friction
+  use iso_c_binding, only: c_double, c_int, c_int64_t
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_lattice, only: lattice_t, new_lattice
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
+  use hc_friction_law, only: coulomb_t
+  use hc_friction_problem, only: friction_problem_t, new_friction_problem
+  use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
+  use hc_direct_friction, only: direct_friction_t, new_direct_friction
+  use hc_flexibility_dense, only: dense_memory
+  use hc_load_path, only: advance
+  implicit none
+  private
+
+  public :: create_frictional_contact, advance_friction, relative_displacement, friction_memory_needed
+
+  !> The method of explicit matrices and LAPACK; any other number means FFT.
+  integer, parameter :: direct = 0
+  !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path
+  integer, parameter :: n_field = 9
+  !> Numbers of a state: loads, motions, dissipated energy
+  integer, parameter :: n_number = 2*n_motion + 1
+
+contains
+
+  !> Bytes that a problem takes while a step is solved.
+  subroutine friction_memory_needed(method, extent, n_contact, n_force, coupled, n_threads, bytes)
+    !> 0: direct (LAPACK), else FFT
+    integer(c_int), intent(in) :: method
+    !> Number of columns and rows of the window
+    integer(c_int), intent(in) :: extent(2)
+    !> Nodes in contact
+    integer(c_int), intent(in) :: n_contact
+    !> Loads that are prescribed, the normal one among them
+    integer(c_int), intent(in) :: n_force
+    !> Not zero: pressure and shear move each other
+    integer(c_int), intent(in) :: coupled
+    !> Threads
+    integer(c_int), intent(in) :: n_threads
+    !> Bytes
+    integer(c_int64_t), intent(out) :: bytes
+
+    if (method == direct) then
+      bytes = dense_memory(extent, n_contact, normal_only=.false.)
+    else
+      bytes = windowed_friction_memory(extent, n_contact, n_force, coupled /= 0, n_threads)
+    end if
+  end subroutine friction_memory_needed
+
+  !> A contact problem with friction.
+  subroutine create_frictional_contact(method, basis, first, extent, origin, lambda, n_node, initial_gap, candidate, &
+                                       coefficient, goodman, n_threads, handle, code, message)
+    !> 0: direct (LAPACK), else FFT
+    integer(c_int), intent(in) :: method
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> Smallest column and row index, number of columns and rows of the window
+    integer(c_int), intent(in) :: first(2), extent(2)
+    !> Position of node (0, 0) [m]
+    real(c_double), intent(in) :: origin(2)
+    !> lambda_1, lambda_2, lambda_5 [1/Pa]
+    real(c_double), intent(in) :: lambda(3)
+    !> Number of nodes of the window
+    integer(c_int), intent(in) :: n_node
+    !> Initial gap [m]
+    real(c_double), intent(in) :: initial_gap(n_node)
+    !> Not zero where a node may come into contact
+    integer(c_int), intent(in) :: candidate(n_node)
+    !> Coefficient of friction; infinite or huge: no slip
+    real(c_double), intent(in) :: coefficient
+    !> Not zero: shear tractions do not move the pressure
+    integer(c_int), intent(in) :: goodman
+    !> Threads to use; 0: as many as OpenMP would take
+    integer(c_int), intent(in) :: n_threads
+    !> Handle of the problem
+    integer(c_int64_t), intent(out) :: handle
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(slot_t), pointer :: slot
+    type(error_t), allocatable :: error
+    type(friction_problem_t) :: problem
+    type(coulomb_t) :: friction
+    type(windowed_friction_t), pointer :: fft
+    type(direct_friction_t), pointer :: dense
+
+    friction%no_slip = coefficient > 0.5_wp*huge(1.0_wp)
+    if (.not. friction%no_slip) friction%coefficient = coefficient
+    call take_slot(slot, handle, error)
+    if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
+    if (.not. allocated(error)) call check_size(slot, n_node, error)
+    if (.not. allocated(error)) then
+      call new_friction_problem(problem, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
+                                reshape(candidate /= 0, extent), friction, goodman /= 0, error)
+    end if
+    if (.not. allocated(error)) then
+      if (method == direct) then
+        allocate (dense)
+        slot%friction => dense
+        call new_direct_friction(dense, problem, error)
+      else
+        allocate (fft)
+        slot%friction => fft
+        call new_windowed_friction(fft, problem, error, n_threads, kernel_cache)
+      end if
+    end if
+    if (allocated(error)) call free_slot(handle)
+    call report(error, code, message)
+  end subroutine create_frictional_contact
+
+  !> Advance a state to given loads or motions.
+  subroutine advance_friction(handle, control, target, static, interpolated, tolerance, max_sweeps, max_cuts, n_node, &
+                              fields, numbers, new_fields, zone, new_numbers, residuals, sweeps, cuts, &
+                              operator_applications, flags, code, message)
+    !f2py threadsafe
+    !> Handle of the problem
+    integer(c_int64_t), intent(in) :: handle
+    !> z, x, y, twist: 1: the load is given, 2: the motion
+    integer(c_int), intent(in) :: control(4)
+    !> Loads [N], [N m] or motions [m], [rad]
+    real(c_double), intent(in) :: target(4)
+    !> Not zero: the load is applied to the undeformed bodies at once
+    integer(c_int), intent(in) :: static
+    !> Not zero: the slip of a node that enters counts from where it stood when its gap closed
+    integer(c_int), intent(in) :: interpolated
+    !> Bound of the residuals
+    real(c_double), intent(in) :: tolerance
+    !> Active sets that may be tried, times that a step may be halved
+    integer(c_int), intent(in) :: max_sweeps, max_cuts
+    !> Number of nodes of the window
+    integer(c_int), intent(in) :: n_node
+    !> The state to go on from
+    real(c_double), intent(in) :: fields(n_node, 9), numbers(9)
+    !> The new state
+    real(c_double), intent(out) :: new_fields(n_node, 9)
+    integer(c_int), intent(out) :: zone(n_node)
+    real(c_double), intent(out) :: new_numbers(9)
+    !> R_n, R_t, R_P, R_Q, R_M
+    real(c_double), intent(out) :: residuals(5)
+    !> Active sets that were tried, times that the step was halved
+    integer(c_int), intent(out) :: sweeps, cuts
+    !> Work, in applications of the full operator
+    real(c_double), intent(out) :: operator_applications
+    !> Not zero: converged; gross sliding; contact at the rim of the window; and why the solver stopped
+    integer(c_int), intent(out) :: flags(4)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(slot_t), pointer :: slot
+    type(error_t), allocatable :: error
+    type(contact_state_t) :: state, next
+
+    new_fields = 0.0_c_double
+    zone = 0
+    call enter(handle, n_node, slot, error)
+    if (.not. allocated(error)) then
+      if (associated(slot%friction)) then
+        call unpack_state(slot%lattice, fields, numbers, state)
+        call advance(slot%friction, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
+                     next, error, interpolated /= 0)
+      else
+        call raise(error, status%bad_handle, 'the handle is not that of a contact problem with friction')
+      end if
+      call leave(slot)
+    end if
+    if (.not. allocated(error)) then
+      call pack_state(next, new_fields, new_numbers)
+      zone = reshape(next%zone, [n_node])
+      flags = [merge(1, 0, [next%converged, next%sliding, next%clipped]), next%stopped]
+    else
+      new_numbers = 0.0_c_double
+      flags = 0
+    end if
+    residuals = [next%residual_normal, next%residual_tangential, next%residual_force, next%residual_shear_force, &
+                 next%residual_torque]
+    sweeps = next%sweeps
+    cuts = next%cuts
+    operator_applications = next%operator_applications
+    call report(error, code, message)
+  end subroutine advance_friction
+
+  !> Relative displacement that follows from tractions and rigid motions.
+  subroutine relative_displacement(handle, n_node, traction, motion, displacement, code, message)
+    !f2py threadsafe
+    !> Handle of the problem
+    integer(c_int64_t), intent(in) :: handle
+    !> Number of nodes of the window
+    integer(c_int), intent(in) :: n_node
+    !> Pressure, traction along x and along y [Pa]
+    real(c_double), intent(in) :: traction(n_node, 3)
+    !> Approach, shifts [m] and twist [rad]
+    real(c_double), intent(in) :: motion(4)
+    !> w - approach, s_x and s_y [m]
+    real(c_double), intent(out) :: displacement(n_node, 3)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(slot_t), pointer :: slot
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: field(:, :, :), u(:, :, :)
+
+    displacement = 0.0_c_double
+    call enter(handle, n_node, slot, error)
+    if (.not. allocated(error)) then
+      if (associated(slot%friction)) then
+        field = reshape(traction, [slot%lattice%extent, 3])
+        allocate (u, mold=field)
+        call slot%friction%displacements(field(:, :, 1), field(:, :, 2:), u, error)
+        u(:, :, 1) = u(:, :, 1) - motion(1)
+        u(:, :, 2:) = u(:, :, 2:) - slot%friction%problem%rigid_displacement(motion)
+        displacement = reshape(u, [n_node, 3])
+      else
+        call raise(error, status%bad_handle, 'the handle is not that of a contact problem with friction')
+      end if
+      call leave(slot)
+    end if
+    call report(error, code, message)
+  end subroutine relative_displacement
+
+  !> A state from its arrays.
+  subroutine unpack_state(lattice, fields, numbers, state)
+    type(lattice_t), intent(in) :: lattice
+    real(c_double), intent(in) :: fields(:, :), numbers(:)
+    type(contact_state_t), intent(out) :: state
+
+    call new_friction_state(state, lattice)
+    state%pressure = reshape(fields(:, 1), lattice%extent)
+    state%traction = reshape(fields(:, 2:3), [lattice%extent, 2])
+    state%gap = reshape(fields(:, 4), lattice%extent)
+    state%relative_displacement = reshape(fields(:, 5:6), [lattice%extent, 2])
+    state%slip_increment = reshape(fields(:, 7:8), [lattice%extent, 2])
+    state%accumulated_slip = reshape(fields(:, n_field), lattice%extent)
+    state%load = numbers(:n_motion)
+    state%motion = numbers(n_motion + 1:2*n_motion)
+    state%dissipated_energy = numbers(n_number)
+  end subroutine unpack_state
+
+  !> The arrays of a state.
+  subroutine pack_state(state, fields, numbers)
+    type(contact_state_t), intent(in) :: state
+    real(c_double), intent(out) :: fields(:, :), numbers(:)
+    integer :: n
+
+    n = size(fields, 1)
+    fields(:, 1) = reshape(state%pressure, [n])
+    fields(:, 2:3) = reshape(state%traction, [n, 2])
+    fields(:, 4) = reshape(state%gap, [n])
+    fields(:, 5:6) = reshape(state%relative_displacement, [n, 2])
+    fields(:, 7:8) = reshape(state%slip_increment, [n, 2])
+    fields(:, n_field) = reshape(state%accumulated_slip, [n])
+    numbers = [state%load, state%motion, state%dissipated_energy]
+  end subroutine pack_state
+
+end module hc_f2py_friction

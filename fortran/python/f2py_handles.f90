@@ -1,0 +1,150 @@
+!> The table of objects that Python holds handles of.
+!>
+!> A handle is a slot number with a generation count, so that a stale handle is
+!> an error and never another object. A handle at work in one thread is refused
+!> in another. The spectra that all objects share are here, too. This is the one place with module state; it is not part of the
+!> Fortran library.
+module hc_f2py_handles
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_flexibility, only: flexibility_t
+  use hc_normal_contact, only: normal_contact_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_direct_contact, only: direct_contact_t
+  use hc_friction_problem, only: friction_solver_t
+  use hc_kernel_cache, only: kernel_cache_t
+  implicit none
+  private
+
+  public :: slot_t, kernel_cache, take_slot, check_size, enter, leave, free_slot, report, pair_of
+
+  !> Objects that may exist at a time.
+  integer, parameter :: n_slot = 4096
+
+  !> What a handle stands for.
+  type :: slot_t
+    !> Odd while the slot is in use
+    integer(c_int64_t) :: generation = 0
+    !> At work in some thread
+    logical :: busy = .false.
+    type(lattice_t) :: lattice
+    class(flexibility_t), pointer :: operator => null()
+    type(normal_contact_t), pointer :: normal_contact => null()
+    type(direct_contact_t), pointer :: direct_contact => null()
+    class(friction_solver_t), pointer :: friction => null()
+  end type slot_t
+
+  type(slot_t), target :: slots(n_slot)
+
+  !> Spectra of kernels that all problems share.
+  type(kernel_cache_t), pointer :: kernel_cache => null()
+
+contains
+
+  !> Free what a handle stands for; a stale handle is ignored.
+  subroutine free_slot(handle)
+    !> Handle of an operator or a problem
+    integer(c_int64_t), intent(in) :: handle
+    integer :: i
+
+    i = int(modulo(handle, int(n_slot, c_int64_t))) + 1
+    if (handle < 0 .or. slots(i)%generation /= handle/n_slot) return
+    associate (slot => slots(i))
+      if (associated(slot%operator)) deallocate (slot%operator)
+      if (associated(slot%normal_contact)) deallocate (slot%normal_contact)
+      if (associated(slot%direct_contact)) deallocate (slot%direct_contact)
+      if (associated(slot%friction)) deallocate (slot%friction)
+      slot%generation = slot%generation + 1
+      slot%busy = .false.
+    end associate
+  end subroutine free_slot
+
+  !> A free slot of the table, and its handle. An odd generation marks a slot in use.
+  subroutine take_slot(slot, handle, error)
+    type(slot_t), pointer, intent(out) :: slot
+    integer(c_int64_t), intent(out) :: handle
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i, free
+
+    handle = -1
+    free = 0
+    !$omp critical (hc_handles)
+    do i = 1, n_slot
+      if (modulo(slots(i)%generation, 2_c_int64_t) == 0) then
+        free = i
+        slots(i)%generation = slots(i)%generation + 1
+        exit
+      end if
+    end do
+    !$omp end critical (hc_handles)
+    slot => slots(max(free, 1))
+    if (free == 0) then
+      call raise(error, status%resources, 'too many contact problems exist at once: delete some')
+      return
+    end if
+    handle = slot%generation*n_slot + free - 1
+  end subroutine take_slot
+
+  !> Look a handle up and mark it as at work.
+  subroutine enter(handle, n_node, slot, error)
+    integer(c_int64_t), intent(in) :: handle
+    integer(c_int), intent(in) :: n_node
+    type(slot_t), pointer, intent(out) :: slot
+    type(error_t), allocatable, intent(out) :: error
+    logical :: busy
+
+    slot => slots(int(modulo(handle, int(n_slot, c_int64_t))) + 1)
+    if (handle < 0 .or. slot%generation /= handle/n_slot) then
+      call raise(error, status%bad_handle, 'the handle is stale: its object has been freed')
+      return
+    end if
+    call check_size(slot, n_node, error)
+    if (allocated(error)) return
+    !$omp critical (hc_handles)
+    busy = slot%busy
+    slot%busy = .true.
+    !$omp end critical (hc_handles)
+    if (busy) call raise(error, status%bad_handle, 'the object is at work in another thread')
+  end subroutine enter
+
+  !> Refuse arrays that do not fit the window of a slot.
+  pure subroutine check_size(slot, n_node, error)
+    type(slot_t), intent(in) :: slot
+    integer(c_int), intent(in) :: n_node
+    type(error_t), allocatable, intent(out) :: error
+
+    if (slot%lattice%size() /= n_node) then
+      call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
+    end if
+  end subroutine check_size
+
+  !> Mark a handle as free for work.
+  subroutine leave(slot)
+    type(slot_t), pointer, intent(in) :: slot
+    !$omp critical (hc_handles)
+    slot%busy = .false.
+    !$omp end critical (hc_handles)
+  end subroutine leave
+
+  !> Elastic constants from a vector.
+  pure type(elastic_pair_t) function pair_of(lambda)
+    real(c_double), intent(in) :: lambda(3)
+    pair_of = elastic_pair_t(lambda(1), lambda(2), lambda(3))
+  end function pair_of
+
+  !> An error as a code and a message.
+  pure subroutine report(error, code, message)
+    type(error_t), allocatable, intent(in) :: error
+    integer(c_int), intent(out) :: code
+    character(len=*), intent(out) :: message
+
+    code = status%ok
+    message = ''
+    if (allocated(error)) then
+      code = error%code
+      message = error%message
+    end if
+  end subroutine report
+
+end module hc_f2py_handles

@@ -1,0 +1,483 @@
+"""Frictionless contacts with a closed solution: what the solver is checked against.
+
+Two elastic half-spaces touch with an undeformed separation ``h``; the materials enter through the effective
+modulus E* only, 1/E* = (1-nu_1^2)/E_1 + (1-nu_2^2)/E_2.  All quantities are SI (or any consistent set).
+
+The axisymmetric solutions come from one theorem (Galin, Sneddon): with
+``delta(t) = t * integral_0^t h'(r)/sqrt(t^2-r^2) dr`` the approach that makes the contact radius t,
+
+    P = 2 E* integral_0^a (delta(a) - delta(t)) dt,     p(r) = E*/pi integral_r^a delta'(t)/sqrt(t^2-r^2) dt.
+
+The solutions with friction are in :mod:`hexcontact.analytic.friction`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypedDict, Unpack
+
+import numpy as np
+import scipy  # its parts are loaded when they are first used: a fifth of a second
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import number, reals
+
+Array = NDArray[np.float64]
+Profile = Callable[[Array], Array]
+
+
+class Given(TypedDict, total=False):
+    """What a contact is driven by: one of the load (N), the approach (m), the contact radius (m)."""
+
+    normal_load: float
+    approach: float
+    contact_radius: float
+
+
+@dataclass(frozen=True)
+class AxisymmetricContact:
+    """A contact over the circle r <= a.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    contact_radius : float
+        a, m.
+    approach : float
+        delta, m.
+    normal_load : float
+        P, N.
+    max_pressure : float
+        Largest contact pressure, Pa; ``inf`` for a cone (center) and a flat punch (edge).
+    """
+
+    effective_modulus: float
+    contact_radius: float
+    approach: float
+    normal_load: float
+    max_pressure: float
+    _pressure: Profile = field(repr=False, compare=False)
+
+    def pressure(self, r: ArrayLike) -> Array:
+        """Contact pressure (Pa) at distance ``r`` (m, any shape) from the axis; 0 outside the contact."""
+        radius: Array = np.abs(reals(r, "r"))
+        inside = radius <= self.contact_radius
+        p = np.zeros(radius.shape)
+        p[inside] = self._pressure(radius[inside])
+        return p
+
+
+@dataclass(frozen=True)
+class EllipticContact:
+    """Hertz contact over an ellipse; returned by `hertz_ellipse` and `crossed_cylinders`.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    semi_major, semi_minor : float
+        Semi-axes a >= b, m.
+    angle : float
+        Direction of the major axis from x, rad, in (-pi/2, pi/2].
+    approach, normal_load, max_pressure : float
+        delta (m), P (N), p0 (Pa).
+    """
+
+    effective_modulus: float
+    semi_major: float
+    semi_minor: float
+    angle: float
+    approach: float
+    normal_load: float
+    max_pressure: float
+
+    def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Contact pressure (Pa) at the points (x, y) (m, broadcast); 0 outside the contact."""
+        x, y = reals(x, "x"), reals(y, "y")
+        along = x * np.cos(self.angle) + y * np.sin(self.angle)
+        across = y * np.cos(self.angle) - x * np.sin(self.angle)
+        inside = 1.0 - (along / self.semi_major) ** 2 - (across / self.semi_minor) ** 2
+        return np.asarray(self.max_pressure * np.sqrt(np.maximum(inside, 0.0)))
+
+
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} is {value!r}; expected a positive number")
+
+
+def _one_of(given: Given, with_radius: bool = True) -> tuple[str, float]:
+    """Name and value of the one quantity that was given."""
+    names = ("normal_load", "approach", "contact_radius")[: 3 if with_radius else 2]
+    if len(given) != 1 or not set(given) <= set(names):
+        raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
+    [(name, value)] = given.items()
+    found = number(value, name, "a positive number")
+    _positive(**{name: found})
+    return name, found
+
+
+# ----------------------------------------------------------------------------------- power laws
+
+
+def power_law(
+    effective_modulus: float, coefficient: float, exponent: float, **given: Unpack[Given]
+) -> AxisymmetricContact:
+    """Solve the contact with the separation h = C r^n.
+
+    With c_n = sqrt(pi) Gamma(n/2+1)/Gamma(n/2+1/2): delta = c_n C a^n, P = 2 E* n/(n+1) delta a and
+    p(r) = (E*/pi) n c_n C a^(n-2) sigma 2F1(1, 1-n/2; 3/2; sigma^2/a^2), sigma^2 = a^2 - r^2.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    coefficient : float
+        C > 0, m^(1-n).
+    exponent : float
+        n >= 1.
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
+
+    Returns
+    -------
+    AxisymmetricContact
+    """
+    _positive(effective_modulus=effective_modulus, coefficient=coefficient)
+    n = float(exponent)
+    if not (np.isfinite(n) and n >= 1.0):
+        raise ValueError(f"exponent is {exponent!r}; expected a number of at least 1")
+    name, value = _one_of(given)
+    log_gamma = scipy.special.gammaln
+    c = np.sqrt(np.pi) * np.exp(log_gamma(n / 2 + 1) - log_gamma(n / 2 + 0.5)) * coefficient
+    load_factor = 2.0 * effective_modulus * n / (n + 1.0)  # P = load_factor * delta * a
+    if name == "normal_load":
+        a = (value / (load_factor * c)) ** (1.0 / (n + 1.0))
+    else:
+        a = value if name == "contact_radius" else (value / c) ** (1.0 / n)
+    delta = c * a**n
+    scale = effective_modulus * n * delta / (np.pi * a)
+
+    def pressure(r: Array) -> Array:
+        z = np.maximum(1.0 - (r / a) ** 2, 0.0)
+        return np.asarray(scale * np.sqrt(z) * scipy.special.hyp2f1(1.0, 1.0 - n / 2, 1.5, z))
+
+    if n == 1.0:
+        peak = np.inf
+    elif n <= 2.0:  # the pressure falls from the center outwards
+        peak = scale / (n - 1.0)
+    else:
+        peak = _maximum(pressure, 0.0, a)
+    return AxisymmetricContact(
+        effective_modulus, float(a), float(delta), float(load_factor * delta * a), float(peak), pressure
+    )
+
+
+def hertz_sphere(effective_modulus: float, radius: float, **given: Unpack[Given]) -> AxisymmetricContact:
+    """Solve Hertz's contact of spheres, h = r^2/(2R): a^3 = 3PR/(4E*), p0 = 3P/(2 pi a^2), delta = a^2/R.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    radius : float
+        R, m; 1/R = 1/R_1 + 1/R_2.
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
+
+    Returns
+    -------
+    AxisymmetricContact
+    """
+    _positive(radius=radius)
+    return power_law(effective_modulus, 0.5 / radius, 2.0, **given)
+
+
+def cone(effective_modulus: float, slope: float, **given: Unpack[Given]) -> AxisymmetricContact:
+    """Solve the contact with a cone, h = m r: delta = pi m a/2, P = pi E* m a^2/2, p = (E* m/2) arcosh(a/r).
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    slope : float
+        m = tangent of the angle between the cone's side and the plane.
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
+
+    Returns
+    -------
+    AxisymmetricContact
+    """
+    return power_law(effective_modulus, slope, 1.0, **given)
+
+
+# ----------------------------------------------------------------------------------- punches
+
+
+def flat_punch(effective_modulus: float, radius: float, **given: Unpack[Given]) -> AxisymmetricContact:
+    """Solve the contact of a flat circular punch: P = 2 E* a delta, p = P/(2 pi a sqrt(a^2-r^2)).
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    radius : float
+        a, m.
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``.
+
+    Returns
+    -------
+    AxisymmetricContact
+    """
+    _positive(effective_modulus=effective_modulus, radius=radius)
+    name, value = _one_of(given, with_radius=False)
+    stiffness = 2.0 * effective_modulus * radius
+    load = value if name == "normal_load" else stiffness * value
+
+    def pressure(r: Array) -> Array:
+        with np.errstate(divide="ignore"):
+            return np.asarray(load / (2 * np.pi * radius * np.sqrt(np.maximum(radius**2 - r**2, 0.0))))
+
+    return AxisymmetricContact(effective_modulus, radius, load / stiffness, load, np.inf, pressure)
+
+
+def rounded_punch(
+    effective_modulus: float, flat_radius: float, edge_radius: float, **given: Unpack[Given]
+) -> AxisymmetricContact:
+    """Solve the contact of a flat punch with a parabolic edge: h = (r-b)^2/(2R) outside r = b, 0 inside.
+
+    delta(t) = (t/R) [sqrt(t^2-b^2) - b arccos(b/t)] for t > b.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    flat_radius : float
+        b, m.
+    edge_radius : float
+        R, m.
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
+
+    Returns
+    -------
+    AxisymmetricContact
+    """
+    _positive(effective_modulus=effective_modulus, flat_radius=flat_radius, edge_radius=edge_radius)
+    b, radius = flat_radius, edge_radius
+
+    def leg(t: Array) -> Array:
+        return np.sqrt(np.maximum((t - b) * (t + b), 0.0))
+
+    def delta(t: Array) -> Array:
+        t = np.maximum(t, b)
+        return np.asarray(t / radius * (leg(t) - b * np.arctan2(leg(t), b)))
+
+    def rate(t: Array) -> Array:
+        t = np.maximum(t, b)
+        return np.asarray((2.0 * leg(t) - b * np.arctan2(leg(t), b)) / radius)
+
+    return _solve_profile(effective_modulus, delta, rate, _one_of(given), smallest=b)
+
+
+def axisymmetric(
+    effective_modulus: float,
+    slope: Profile,
+    curvature: Profile,
+    *,
+    scale: float = 1.0,
+    **given: Unpack[Given],
+) -> AxisymmetricContact:
+    """Solve the contact of any smooth convex axisymmetric profile h(r), by Gauss quadrature.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    slope, curvature : callable
+        h'(r) and h''(r) as functions of an array of radii; smooth on [0, contact radius].
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
+    scale : float
+        A radius (m) at which the profile is defined; the search for the contact radius starts there.
+
+    Returns
+    -------
+    AxisymmetricContact
+    """
+    _positive(effective_modulus=effective_modulus, scale=scale)
+    node, weight = _gauss(64)
+    sine = np.sin(np.pi / 2 * node)  # r = t sin(theta), theta = pi/2 * node
+
+    def delta(t: Array) -> Array:
+        t = np.asarray(t, dtype=float)[..., None]
+        return np.asarray(np.pi / 2 * np.sum(weight * t * slope(t * sine), axis=-1))
+
+    def rate(t: Array) -> Array:
+        r = np.asarray(t, dtype=float)[..., None] * sine
+        return np.asarray(np.pi / 2 * np.sum(weight * (slope(r) + r * curvature(r)), axis=-1))
+
+    return _solve_profile(effective_modulus, delta, rate, _one_of(given), start=scale)
+
+
+def _gauss(n: int) -> tuple[Array, Array]:
+    """Nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
+    node, weight = scipy.special.roots_legendre(n)
+    return 0.5 * (node + 1.0), 0.5 * weight
+
+
+def _solve_profile(
+    effective_modulus: float,
+    delta: Profile,
+    rate: Profile,
+    given: tuple[str, float],
+    *,
+    smallest: float = 0.0,
+    start: float | None = None,
+) -> AxisymmetricContact:
+    """Contact whose approach grows as ``delta(t)`` with ``rate`` = delta'; both vanish for t <= smallest."""
+    node, weight = _gauss(200)
+    node, weight = node**2, 2.0 * node * weight  # the square takes the root-like start out of the integrand
+
+    def load(a: float) -> float:
+        t = smallest + (a - smallest) * node  # by parts: P = 2 E* int t delta'(t) dt
+        return float(2.0 * effective_modulus * (a - smallest) * np.sum(weight * t * rate(t)))
+
+    name, value = given
+    if name == "contact_radius":
+        if value <= smallest:
+            raise ValueError(f"contact_radius is {value!r}; expected more than the flat radius {smallest!r}")
+        a = value
+    else:
+        target = load if name == "normal_load" else lambda t: float(delta(np.array(t)))
+        upper = start if start is not None else 2.0 * smallest
+        while target(upper) < value:
+            upper *= 2.0
+        a = scipy.optimize.brentq(
+            lambda t: target(t) - value, smallest, upper, xtol=1e-15 * upper, rtol=1e-15
+        )
+
+    def pressure(r: Array) -> Array:
+        r = np.asarray(r, dtype=float)[..., None]
+        first = np.sqrt(np.maximum(smallest**2 - r**2, 0.0))  # t^2 = r^2 + s^2
+        last = np.sqrt(np.maximum(a**2 - r**2, 0.0))
+        t = np.sqrt(r**2 + (first + (last - first) * node) ** 2)
+        with np.errstate(invalid="ignore"):
+            integrand = np.where(t > 0.0, rate(t) / t, 0.0)
+        return np.asarray(effective_modulus / np.pi * np.sum((last - first) * weight * integrand, axis=-1))
+
+    r = np.linspace(0.0, a, 401)
+    at = int(np.argmax(pressure(r)))
+    peak = float(pressure(r[at]))
+    if at > 0:
+        peak = _maximum(pressure, r[at - 1], r[min(at + 1, 400)])
+    return AxisymmetricContact(effective_modulus, a, float(delta(np.array(a))), load(a), peak, pressure)
+
+
+def _maximum(pressure: Profile, first: float, last: float) -> float:
+    """Largest value between two radii; there is one maximum between them."""
+    found: scipy.optimize.OptimizeResult = scipy.optimize.minimize_scalar(
+        lambda s: -float(pressure(np.array(s))),
+        bounds=(first, last),
+        method="bounded",
+        options={"xatol": 1e-8 * last},
+    )
+    return -float(found.fun)
+
+
+# ----------------------------------------------------------------------------------- ellipses
+
+
+def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[Given]) -> EllipticContact:
+    """Solve Hertz's contact with the separation h = (x, y) H (x, y)^T / 2.
+
+    The complete elliptic integrals (parameter m = e^2 = 1 - b^2/a^2) enter in Carlson's symmetric form,
+    K = R_F(0, 1-m, 1), (K-E)/m = R_D(0, 1-m, 1)/3, (E-(1-m)K)/m = (1-m) R_D(0, 1, 1-m)/3, which keeps all
+    digits for nearly circular and for very slender ellipses.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    hessian : array_like
+        H, the symmetric 2x2 tensor of second derivatives of h (1/m), positive definite.
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``.
+
+    Returns
+    -------
+    EllipticContact
+    """
+    _positive(effective_modulus=effective_modulus)
+    tensor = reals(hessian, "hessian")
+    if tensor.shape != (2, 2) or not np.allclose(
+        tensor, tensor.T, rtol=0.0, atol=1e-12 * np.abs(tensor).max()
+    ):
+        raise ValueError("hessian is not a symmetric 2x2 tensor")
+    name, value = _one_of(given, with_radius=False)
+    (small, large), axes = np.linalg.eigh(tensor)
+    if small <= 1e-12 * large:
+        raise ValueError(
+            "the gap does not close into an ellipse: hessian is not positive definite (line contact)"
+        )
+
+    def axis_ratio_error(log_ratio: float) -> float:
+        m1 = np.exp(2.0 * log_ratio)  # (b/a)^2
+        ratio = scipy.special.elliprd(0, m1, 1) / scipy.special.elliprd(0, 1, m1)
+        return float(np.log(ratio) - np.log(small / large))
+
+    m1, k, d = 1.0, np.pi / 2, 0.75 * np.pi  # a circle, with which scipy need not be loaded
+    if small < large * (1 - 1e-15):  # (A/B) lies between (b/a)^2 and b/a
+        lowest = np.log(small / large) - 1e-9
+        m1 = min(np.exp(scipy.optimize.brentq(axis_ratio_error, lowest, 1e-9, xtol=1e-15)), 1.0) ** 2
+        k, d = scipy.special.elliprf(0, m1, 1), scipy.special.elliprd(0, m1, 1)
+    if name == "normal_load":
+        a = (value * d / (np.pi * effective_modulus * small)) ** (1.0 / 3.0)  # A = small/2
+    else:
+        a = np.sqrt(2.0 * value * d / (3.0 * k * small))
+    load = np.pi * effective_modulus * small * a**3 / d
+    delta = 1.5 * load * k / (np.pi * effective_modulus * a)
+    angle = np.arctan2(axes[1, 0], axes[0, 0]) if m1 < 1.0 else 0.0
+    angle = np.pi / 2 - (np.pi / 2 - angle) % np.pi  # an axis has no sense: (-pi/2, pi/2]
+    b = a * np.sqrt(m1)
+    return EllipticContact(
+        effective_modulus,
+        float(a),
+        float(b),
+        float(angle),
+        float(delta),
+        float(load),
+        float(1.5 * load / (np.pi * a * b)),
+    )
+
+
+def crossed_cylinders(
+    effective_modulus: float, radius_1: float, radius_2: float, angle: float, **given: Unpack[Given]
+) -> EllipticContact:
+    """Solve the contact of two cylinders, the first with its axis along x, the second turned by ``angle``.
+
+    Parameters
+    ----------
+    effective_modulus : float
+        E*, Pa.
+    radius_1, radius_2 : float
+        Radii, m.
+    angle : float
+        From the axis of cylinder 1 (the x axis) to that of cylinder 2, rad; not a multiple of pi.
+    **given
+        `Given`: exactly one of ``normal_load``, ``approach``.
+
+    Returns
+    -------
+    EllipticContact
+        Its ``angle`` is that of the major axis from the axis of cylinder 1.
+    """
+    _positive(radius_1=radius_1, radius_2=radius_2)
+    across_1 = np.array([0.0, 1.0])
+    across_2 = np.array([-np.sin(angle), np.cos(angle)])
+    hessian = np.outer(across_1, across_1) / radius_1 + np.outer(across_2, across_2) / radius_2
+    return hertz_ellipse(effective_modulus, hessian, **given)

@@ -1,0 +1,64 @@
+"""The initial gap of a result as a quadratic form, under which Hertz's solution holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frictionless import EllipticContact, hertz_ellipse
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+
+SIMILAR = 1e-9  # |beta| of bodies whose pressure is that of the contact without friction
+
+
+@dataclass(frozen=True)
+class QuadraticGap:
+    """An initial gap that is a quadratic form: sphere, cylinder, paraboloid.
+
+    Attributes
+    ----------
+    modulus : float
+        E*, Pa.
+    hessian : ndarray, shape (2, 2)
+        Its second derivatives, 1/m.
+    center : tuple of float
+        Where it is smallest, m.
+    """
+
+    modulus: float
+    hessian: Array
+    center: tuple[float, float]
+
+    @classmethod
+    def of(cls, dataset: xarray.Dataset) -> QuadraticGap | None:
+        """Look at the gap of a result; None if it is of another kind, or the contact is along a line."""
+        modulus = dataset.attrs.get("effective_modulus")
+        if modulus is None or "initial_gap" not in dataset:
+            return None
+        gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
+        if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:
+            return None
+        size = max(np.ptp(x), np.ptp(y))
+        u, v = (x - x.mean()) / size, (y - y.mean()) / size
+        forms = np.stack([np.ones_like(u), u, v, 0.5 * u**2, u * v, 0.5 * v**2], axis=1)
+        coefficients = np.linalg.lstsq(forms, gap, rcond=None)[0]
+        if np.abs(forms @ coefficients - gap).max() > 1e-9 * np.ptp(gap):
+            return None
+        hessian = np.array([[coefficients[3], coefficients[4]], [coefficients[4], coefficients[5]]]) / size**2
+        try:
+            hertz_ellipse(float(modulus), hessian, normal_load=1.0)
+        except ValueError:  # a line contact
+            return None
+        lowest = -np.linalg.solve(hessian, coefficients[1:3] / size)
+        return cls(float(modulus), hessian, (float(x.mean() + lowest[0]), float(y.mean() + lowest[1])))
+
+    def contact(self, load: float) -> EllipticContact:
+        """Return Hertz's solution under a load (N) above 0."""
+        return hertz_ellipse(self.modulus, self.hessian, normal_load=load)

@@ -1,0 +1,323 @@
+"""Closed solutions that belong to a result with friction, recognized from its attributes and its history.
+
+Similar bodies (beta = 0) pressed by a constant normal load and then sheared along one line: Cattaneo-Mindlin,
+and after each reversal Mindlin-Deresiewicz. Spheres twisted about their common normal: Lubkin. Where the
+history is of another kind there is no closed solution, and the functions here return None.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .friction import LubkinTorsion, MindlinContact
+from .hertz_gap import SIMILAR, QuadraticGap
+
+if TYPE_CHECKING:
+    import xarray
+
+    from .frictionless import EllipticContact
+
+Array = NDArray[np.float64]
+
+CIRCULAR = 0.999  # least ratio of the axes of a contact that counts as circular
+_SMALL = 1e-6  # share of the sliding load that counts as no load, and as no change of a load
+_ASIDE = (
+    1e-3  # share of the sliding load, or shift, beside the line of the load that still counts as on the line
+)
+_BEFORE_SLIDING = (
+    0.999  # share of the sliding load beyond which the rigid motion is not determined by the load
+)
+_FINE = 24  # points of a curve between two load steps
+
+
+def turning_points(loads: Iterable[float]) -> list[float]:
+    """Return the turning points of a load history that a contact of constant size remembers.
+
+    The last is the load now. A contact in partial slip follows Masing's rules: a new slip zone that has grown
+    as large as an older one wipes out the memory of it.
+
+    Parameters
+    ----------
+    loads : iterable of float
+        Loads in order, monotone in between; the history begins at 0.
+    """
+    path = [0.0]
+    for load in loads:
+        if len(path) > 1 and (load - path[-1]) * (path[-1] - path[-2]) >= 0.0:
+            path[-1] = load
+        else:
+            path.append(load)
+        while len(path) > 3 and abs(path[-1] - path[-2]) >= abs(path[-2] - path[-3]):
+            del path[-3:-1]
+        if len(path) == 3 and abs(path[2]) >= abs(path[1]):  # back on the first loading, or its mirror image
+            del path[1]
+    return path[1:]
+
+
+def superposed(first: Callable[[float], Array], turns: Sequence[float]) -> Array:
+    """Return a traction or motion after reversals: f(Q1) + 2 f((Q2 - Q1)/2) + 2 f((Q3 - Q2)/2) + ...
+
+    Parameters
+    ----------
+    first : callable
+        f, an odd function: what belongs to a load under first loading.
+    turns : sequence of float
+        The remembered turning points Q1, Q2, ..., the last being the load now.
+    """
+    total = np.asarray(first(turns[0]))
+    for before, after in itertools.pairwise(turns):
+        total = total + 2.0 * first(0.5 * (after - before))
+    return total
+
+
+@dataclass(frozen=True)
+class PartialSlip:
+    """Similar bodies sheared along one line under a constant normal load, over a Hertz circle or ellipse.
+
+    Over an ellipse the tractions have the same form as over a circle: stick and contact area are similar.
+
+    Attributes
+    ----------
+    contact : MindlinContact
+        Spheres with a contact of the same area.
+    ellipse : EllipticContact
+        Hertz contact.
+    center : tuple of float
+        Its center, m.
+    direction : tuple of float
+        Unit vector of the tangential load.
+    turns : tuple of float
+        Remembered turning points of the tangential load along `direction`, N; the last is the load now.
+    loads : tuple of float
+        All loads along `direction` so far, N, from the first one on.
+    """
+
+    contact: MindlinContact
+    ellipse: EllipticContact
+    center: tuple[float, float]
+    direction: tuple[float, float]
+    turns: tuple[float, ...]
+    loads: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """Whose solution it is."""
+        return "Cattaneo–Mindlin" if len(self.turns) == 1 else "Mindlin–Deresiewicz"
+
+    @property
+    def stick_ratio(self) -> float:
+        """Size of the stick area relative to the contact area, c/a."""
+        swing = self.turns[0] if len(self.turns) == 1 else 0.5 * (self.turns[-1] - self.turns[-2])
+        return float(self.contact.stick_radius(swing)) / self.contact.contact_radius
+
+    def traction(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Shear traction on body 1 along x and y (Pa) at points (m)."""
+        dx, dy, angle = x - self.center[0], y - self.center[1], self.ellipse.angle
+        along, across = dx * np.cos(angle) + dy * np.sin(angle), dy * np.cos(angle) - dx * np.sin(angle)
+        way = np.hypot(along / self.ellipse.semi_major, across / self.ellipse.semi_minor)
+        radius = way * self.contact.contact_radius
+        size = superposed(lambda load: self.contact.traction(radius, load), self.turns)
+        return size * self.direction[0], size * self.direction[1]
+
+
+class ClosedForms:
+    """The closed solutions that belong to a result.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        The whole result.
+    """
+
+    def __init__(self, dataset: xarray.Dataset) -> None:
+        self.dataset = dataset
+        attributes = dataset.attrs
+        self.friction, self.modulus, self.beta, self.gamma = (
+            float(attributes.get(name, math.nan))
+            for name in (
+                "friction_coefficient",
+                "effective_modulus",
+                "dundurs_beta",
+                "tangential_compliance_ratio",
+            )
+        )
+        self.static = attributes.get("algorithm") == "static"
+        self.apply = (
+            attributes.get("algorithm") in ("static", "incremental")
+            and 0.0 < self.friction < math.inf
+            and abs(self.beta) <= SIMILAR
+        )
+
+    @cached_property
+    def _gap(self) -> QuadraticGap | None:
+        return QuadraticGap.of(self.dataset)
+
+    def partial_slip(self, number: int) -> PartialSlip | None:
+        """Return the closed solution of a step that sheared the contact, None if there is none.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+        """
+        history = _History(self.dataset, number, self.static)
+        scale = self.friction * history.normal_load
+        load = np.stack([history[f"tangential_load_{axis}"] for axis in "xy"])
+        direction = line_of(load, _SMALL * scale, _ASIDE * scale) if self.apply else None
+        if direction is None:
+            return None
+        loads = history.at_constant_pressure(np.array(direction) @ load, scale)
+        if loads is None or self._gap is None:
+            return None
+        hertz = self._gap.contact(history.normal_load)
+        contact = MindlinContact(
+            self.friction,
+            history.normal_load,
+            math.sqrt(hertz.semi_major * hertz.semi_minor),
+            4.0 / self.modulus * (1.0 + 0.5 * self.gamma),
+        )
+        if np.abs(history["twist"]).max() * contact.contact_radius > _ASIDE * contact.sliding_shift:
+            return None
+        return PartialSlip(
+            contact, hertz, self._gap.center, direction, tuple(turning_points(loads)), tuple(loads.tolist())
+        )
+
+    def shear_loop(self) -> tuple[Array, Array] | None:
+        """Return the curve of the shift (m) over the tangential load (N) along its direction, for spheres.
+
+        Returns
+        -------
+        tuple of ndarray or None
+            (shift, load) from the first tangential load to the last step that has a closed solution.
+        """
+        for number in self.dataset["step"].values[::-1]:
+            found = self.partial_slip(int(number))
+            if found is not None:
+                loads = _until_sliding(found.loads, found.contact.sliding_load)
+                return _curve(loads, found.contact.shift) if _circular(found.ellipse) else None
+        return None
+
+    def torsion_loop(self) -> tuple[Array, Array] | None:
+        """Return the curve of the twist (rad) over the torque (N m), for spheres.
+
+        Returns
+        -------
+        tuple of ndarray or None
+            (twist, torque) from the first torque to the last step that has a closed solution.
+        """
+        numbers = self.dataset["step"].values[::-1]
+        return next((loop for number in numbers if (loop := self.torsion(int(number))) is not None), None)
+
+    def torsion(self, number: int) -> tuple[Array, Array] | None:
+        """Return the same curve up to a load step; None if that step has no closed solution.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+        """
+        if not self.apply or self._gap is None:
+            return None
+        history = _History(self.dataset, number, self.static)
+        shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
+        if not history.normal_load > 0.0 or shear > _ASIDE * self.friction * history.normal_load:
+            return None
+        hertz = self._gap.contact(history.normal_load)
+        contact = LubkinTorsion(
+            self.friction, history.normal_load, hertz.semi_major, 2.0 / self.modulus * (1.0 + self.gamma)
+        )
+        loads = history.at_constant_pressure(history["torque"], contact.sliding_torque)
+        if loads is None or not _circular(hertz):
+            return None
+        turned = _until_sliding(loads.tolist(), _BEFORE_SLIDING * contact.sliding_torque)
+        return _curve(turned, _lubkin(contact, max(map(abs, turned))))
+
+
+def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | None:
+    """Return the direction of the line on which tangential loads lie.
+
+    Parameters
+    ----------
+    load : ndarray, shape (2, n)
+        The loads, N.
+    least, aside : float
+        Size of the largest load and distance from the line (N) up to which there is no load, and a load is on
+        the line.
+
+    Returns
+    -------
+    tuple of float or None
+        A unit vector whose larger component is positive; None if there is no load, or no such line.
+    """
+    size = np.hypot(*load)
+    largest = load[:, int(np.argmax(size))]
+    if not size.max() > least:
+        return None
+    x, y = largest / size.max() * np.sign(largest[int(np.argmax(np.abs(largest)))])
+    return (float(x), float(y)) if np.abs(x * load[1] - y * load[0]).max() <= aside else None
+
+
+class _History:
+    """What led to a load step: all steps up to it, or itself alone if each step stands alone (static)."""
+
+    def __init__(self, dataset: xarray.Dataset, number: int, static: bool) -> None:
+        last = int(np.flatnonzero(dataset["step"].values == number)[0])
+        self.steps = slice(last if static else 0, last + 1)
+        self.dataset = dataset
+        self.normal_load = float(dataset["normal_load"].values[last])
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.dataset:
+            return np.zeros_like(self["normal_load"])
+        return np.asarray(self.dataset[name].values[self.steps], dtype=float)
+
+    def at_constant_pressure(self, loads: Array, sliding: float) -> Array | None:
+        """Return the loads from the first one on, if the normal load is constant from just before it."""
+        if not np.isfinite(loads).all() or np.abs(loads).max() > (1.0 + _ASIDE) * sliding:
+            return None
+        begun = np.flatnonzero(np.abs(loads) > _SMALL * sliding)
+        if not begun.size:
+            return None
+        pressed = self["normal_load"][max(begun[0] - 1, 0) :]
+        if np.ptp(pressed) > _SMALL * pressed[-1]:
+            return None
+        loads = np.clip(loads[begun[0] :], -sliding, sliding)
+        moved = np.abs(np.diff(loads, prepend=0.0)) > _SMALL * sliding  # a load that is held does not turn
+        return np.asarray(loads[moved])
+
+
+def _until_sliding(loads: Sequence[float], sliding: float) -> list[float]:
+    """Return the loads up to the sliding load, beyond which they do not determine the motion."""
+    reached = next((k for k, load in enumerate(loads) if abs(load) >= _BEFORE_SLIDING * sliding), None)
+    return [*loads] if reached is None else [*loads[:reached], math.copysign(sliding, loads[reached])]
+
+
+def _circular(hertz: EllipticContact) -> bool:
+    return hertz.semi_minor >= CIRCULAR * hertz.semi_major
+
+
+def _lubkin(contact: LubkinTorsion, largest: float) -> Callable[[float], Array]:
+    """Twist under a first torque up to the largest one, by a table that is exact at its points."""
+    stick = np.linspace(contact.contact_radius, contact.stick_radius(largest), 8 * _FINE)[1:]
+    torque = np.array([0.0, *(contact.torque(c) for c in stick)])
+    twist = np.array([0.0, *(contact.twist(c) for c in stick)])
+    return lambda load: np.asarray(np.sign(load) * np.interp(abs(load), torque, twist))
+
+
+def _curve(loads: Sequence[float], first: Callable[[float], Array]) -> tuple[Array, Array]:
+    """Return motions and loads along a history that begins at 0, with points between the steps."""
+    branches = [np.linspace(a, b, _FINE + 1)[1:] for a, b in itertools.pairwise((0.0, *loads))]
+    fine = np.concatenate([[0.0], *branches])
+    motion, turns = [0.0], [0.0]
+    for load in fine[1:]:
+        turns = turning_points([*turns, float(load)])  # what is remembered stands for the whole history
+        motion.append(float(superposed(first, turns)))
+    return np.array(motion), fine

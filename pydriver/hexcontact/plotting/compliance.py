@@ -1,0 +1,119 @@
+"""The initial tangential compliance of several runs (Figure 13.4)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ..analytic.friction import MindlinContact
+from ..analytic.shear import CIRCULAR
+from ..step_view import QuadraticGap, as_list, dataset_of
+from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, new_figure, set_title
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..step_view import Results
+
+Array = NDArray[np.float64]
+
+
+def _values(dataset: xarray.Dataset, name: str) -> Array:
+    return np.asarray(dataset[name].values, dtype=float)
+
+
+def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
+    """Return the shift in the first step with a tangential load, relative to Mindlin's, and Q/(mu P) then.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        The whole result: spheres pressed, then sheared at a constant normal load.
+
+    Raises
+    ------
+    ValueError
+        If it is no such result.
+    """
+    gap, attributes = QuadraticGap.of(dataset), dataset.attrs
+    friction = float(attributes.get("friction_coefficient", np.nan))
+    if (
+        attributes.get("algorithm") not in ("static", "incremental")
+        or not 0.0 < friction < np.inf
+        or gap is None
+    ):
+        raise ValueError("the tangential compliance is that of spheres with friction")
+    normal = _values(dataset, "normal_load")
+    load, shift = (
+        np.stack([_values(dataset, f"{name}_{axis}") for axis in "xy"])
+        for name in ("tangential_load", "shift")
+    )
+    begun = np.flatnonzero(np.hypot(*load) > 1e-6 * friction * normal)
+    if (
+        not begun.size
+        or begun[0] == 0
+        or abs(normal[begun[0]] - normal[begun[0] - 1]) > 1e-6 * normal[begun[0]]
+    ):
+        raise ValueError(
+            "the tangential compliance needs a load step that only shears, after those that press"
+        )
+    step = int(begun[0])
+    hertz = gap.contact(float(normal[step]))
+    if hertz.semi_minor < CIRCULAR * hertz.semi_major:
+        raise ValueError("the tangential compliance is that of spheres with friction")
+    gamma = float(attributes["tangential_compliance_ratio"])
+    compliance = 4.0 / float(attributes["effective_modulus"]) * (1.0 + 0.5 * gamma)
+    mindlin = MindlinContact(friction, float(normal[step]), hertz.semi_major, compliance)
+    size = float(np.hypot(*load[:, step]))
+    moved = float((shift[:, step] - shift[:, step - 1]) @ load[:, step]) / size
+    if not size < mindlin.sliding_load:
+        raise ValueError("the first tangential load is as large as friction can carry")
+    return moved / float(mindlin.shift(size)), size / mindlin.sliding_load
+
+
+def compliance(results: Results) -> Figure:
+    """Draw the initial tangential compliance of spheres against Dundurs' beta, a point for each result.
+
+    Parameters
+    ----------
+    results : Result or xarray.Dataset, or a sequence of them
+        What runs returned, or `open_result` read: spheres pressed, then sheared.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If one of them is no such result.
+    """
+    several = [dataset_of(one) for one in as_list(results)]
+    series: dict[tuple[float, str], list[tuple[float, float]]] = {}
+    shares = []
+    for dataset in several:
+        ratio, share = initial_compliance(dataset)
+        shares.append(share)
+        key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
+        series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
+    with matplotlib.rc_context(STYLE):
+        figure = new_figure(4.6, 3.6)
+        axes = figure.add_subplot()
+        axes.axhline(1.0, color=GUIDE, lw=0.8, ls=":", label="Mindlin")
+        colors = dict(zip(sorted({mu for mu, _ in series}), (COMPUTED, EXACT, THIRD), strict=False))
+        for (mu, coupling), points in sorted(series.items()):
+            beta, ratio_of = np.array(sorted(points)).T
+            full = coupling == "full"
+            look: dict[str, Any] = {"marker": "o"} if full else {"marker": "s", "ls": "--", "mfc": "none"}
+            label = f"$\\mu$ = {mu:g}" + ("" if full else f", {coupling.title()}")
+            axes.plot(beta, ratio_of, color=colors.get(mu, "black"), ms=4, lw=0.9, label=label, **look)
+        axes.set(xlabel=r"$|\beta|$", ylabel=r"initial compliance $\Delta/\Delta_\mathrm{Mindlin}$")
+        axes.legend()
+        low, high = min(shares), max(shares)
+        at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
+        set_title(figure, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}")
+        return figure

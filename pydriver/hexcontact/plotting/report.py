@@ -1,0 +1,338 @@
+"""A page that shows a result: one HTML file that needs nothing else, neither a network nor this program.
+
+What the page holds is gathered here and in `hexcontact.plotting.report_fields`; how it looks and moves is in
+data/report.html, which draws from numbers and small pictures in the file itself.
+"""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import summary
+from .._version import __version__
+from ..errors import DeckError
+from ..progress import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
+from ..remarks import remarks
+from ..step_view import scaled
+from ..text import escaped, quantity
+from ..variables import VARIABLES
+from .report_fields import kept_steps, maps_of, rounded
+
+if TYPE_CHECKING:
+    from ..result import Result
+
+History = Mapping[str, Any]
+
+_CURVES = (  # title, and what is drawn over the step number
+    ("Normal load", ("normal_load",)),
+    ("Approach", ("approach",)),
+    ("Tangential load", ("tangential_load_x", "tangential_load_y")),
+    ("Shift", ("shift_x", "shift_y")),
+    ("Torque", ("torque",)),
+    ("Twist", ("twist",)),
+    ("Contact and stick area", ("contact_area_fit", "stick_area_fit")),
+    ("Largest pressure", ("max_pressure",)),
+    ("Largest shear traction", ("max_traction",)),
+    ("Elastic energy", ("elastic_energy",)),
+    ("Dissipated energy", ("dissipated_energy",)),
+)
+_LOOPS = (  # title, what is drawn over what
+    ("Tangential load over shift, x", "shift_x", "tangential_load_x"),
+    ("Tangential load over shift, y", "shift_y", "tangential_load_y"),
+    ("Torque over twist", "twist", "torque"),
+)
+_SYMBOLS = {
+    "tangential_load_x": "Q_x",
+    "tangential_load_y": "Q_y",
+    "shift_x": "x",
+    "shift_y": "y",
+    "contact_area_fit": "contact",
+    "stick_area_fit": "stick",
+}
+
+
+def write_report(result: Result, target: Path) -> Path:
+    """Write the page of a result.
+
+    Parameters
+    ----------
+    result : Result
+        The result, of a finished run or not.
+    target : Path
+        File to write, ``.html``; replaced as a whole if it is there.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    DeckError
+        If the name is not that of a page.
+    """
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise DeckError(f"--output {target}: expected a page, such as {target.with_suffix('.html')}")
+    text = report(result)
+    temporary = target.with_name(f"{target.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return target
+
+
+def report(result: Result) -> str:
+    """Return the page of a result as text.
+
+    Parameters
+    ----------
+    result : Result
+        The result, of a finished run or not.
+    """
+    import matplotlib
+
+    histories = result.history.reset_index().to_dict("records")
+    numbers = kept_steps(result)
+    palette = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, 255))[:, :3]
+    data = {
+        "palette": np.round(255 * palette).astype(int).ravel().tolist(),
+        "numbers": [history["step"] for history in histories],
+        "labels": [str(history.get("label", "")) for history in histories],
+        "states": [summary.step_rows(history) for history in histories],
+        "charts": charts_of(histories),
+        "fields": maps_of(result, numbers) if numbers else None,
+    }
+    title = result.case_title or Path(result.path).stem or "hexcontact result"
+    page = resources.files("hexcontact").joinpath("data/report.html").read_text(encoding="utf-8")
+    parts = dict(
+        title=escaped(title),
+        status=_status(result, histories),
+        kept=_kept(len(numbers), len(histories)),
+        inputs=_pairs(_inputs(result)),
+        loads=_loads(histories),
+        deck=_deck(result.deck),
+        hertz=_hertz(result, histories[-1]),
+        accuracy=_accuracy(result),
+        residuals=_residuals(histories),
+        provenance=_pairs(_provenance(result, histories)),
+        data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+    )
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], page)
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+def _status(result: Result, histories: Sequence[History]) -> str:
+    notes = [_unfinished(result), *remarks(histories, result.dataset.attrs)]
+    return "".join(f'<p class="warning" role="note">{escaped(note)}</p>' for note in notes if note)
+
+
+def _unfinished(result: Result) -> str:
+    if result.shortfall or result.complete:
+        return result.shortfall
+    planned = int(result.dataset.attrs.get("planned_steps", 0))
+    reason = str(result.dataset.attrs.get("stopped", ""))
+    of = f" of {planned}" if planned else ""
+    return f"Unfinished run: {len(result)}{of} load steps. {reason}".strip()
+
+
+def _kept(shown: int, steps: int) -> str:
+    if shown == steps:
+        return ""
+    if shown == 0:
+        return "The fields of this run were not kept (output.fields), so that there are no maps."
+    return (
+        f"Maps of {shown} of {steps} load steps: those kept in the result, evenly chosen if there are many."
+    )
+
+
+def _inputs(result: Result) -> list[tuple[str, ...]]:
+    attributes, sizes = result.dataset.attrs, result.dataset.sizes
+    case = summary.case_of(result)
+    left_out = {"window", "memory", "load steps"}
+    rows: list[tuple[str, ...]] = []
+    if case is not None and case.accuracy:
+        left_out |= {"spacing", "accuracy", "work"}  # those of the first lattice, and guesses
+        rows = [("spacing", quantity(float(attributes["lattice_spacing"]), "m"))]
+    if case is not None:
+        rows = [row for row in summary.case_rows(case) if row[0] not in left_out] + rows
+    elif "effective_modulus" in attributes:
+        rows = [
+            (
+                "pair",
+                f"E* = {quantity(float(attributes['effective_modulus']), 'Pa')}, "
+                f"beta = {float(attributes['dundurs_beta']):.4g}, "
+                f"gamma = {float(attributes['tangential_compliance_ratio']):.4g}",
+            ),
+            ("algorithm", summary.algorithm(attributes)),
+            ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
+        ]
+    window = f"{sizes['row']} x {sizes['col']} nodes at the end"
+    planned = int(attributes["planned_steps"])
+    return [
+        *rows,
+        ("window", window),
+        ("load steps", f"{len(result)}" + (f" of {planned}" if planned else "")),
+    ]
+
+
+def _provenance(result: Result, histories: Sequence[History]) -> list[tuple[str, ...]]:
+    attributes, deck = result.dataset.attrs, result.deck
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    return [
+        ("file", result.path or "not written"),
+        ("computed by", str(attributes["source"])),
+        ("machine", str(attributes.get("machine", "not recorded"))),
+        ("run started", str(attributes["created"])),
+        ("time in the solver", quantity(sum(float(h["seconds"]) for h in histories), "s", 3)),
+        ("run", str(attributes["run"])),
+        ("deck, SHA-256", hashlib.sha256(deck.encode()).hexdigest() if deck else "made in Python, no deck"),
+        ("layout of the file", str(attributes["schema_version"])),
+        ("page written by", f"hexcontact {__version__}, {now}"),
+    ]
+
+
+def _pairs(rows: Iterable[tuple[str, ...]]) -> str:
+    cells = (f'<tr><th scope="row">{escaped(n)}</th><td>{escaped(v)}</td></tr>' for n, v in rows)
+    return f'<table class="pairs"><tbody>{"".join(cells)}</tbody></table>'
+
+
+def _table(caption: str, headers: Sequence[str], rows: Iterable[Sequence[str]], link: bool = False) -> str:
+    def line(row: Sequence[str]) -> str:
+        cells = zip(kinds[1:], row[1:], strict=True)
+        first, rest = (
+            escaped(row[0]),
+            "".join(f"<td{kind}>{escaped(cell)}</td>" for kind, cell in cells),
+        )
+        mark = f' id="row-{first}"' if link else ""
+        start = f'<a href="#step={first}">{first}</a>' if link else first
+        return f'<tr{mark}><th scope="row">{start}</th>{rest}</tr>'
+
+    kinds = [' class="text"' * (name == "label") for name in headers]
+    names = zip(kinds, headers, strict=True)
+    head = "".join(f'<th scope="col"{kind}>{escaped(name)}</th>' for kind, name in names)
+    return (
+        f'<table class="numbers"><caption>{escaped(caption)}</caption><thead><tr>{head}</tr></thead>'
+        f"<tbody>{''.join(map(line, rows))}</tbody></table>"
+    )
+
+
+def _loads(histories: Sequence[History]) -> str:
+    """Return a table of the load history: where each segment ends."""
+    ends = {int(history.get("segment", 1)): history for history in histories}
+    names = worth_showing(histories)
+    rows, before = [], 0
+    for segment, history in ends.items():
+        steps = f"{before + 1} to {history['step']}" if history["step"] > before + 1 else str(history["step"])
+        rows.append(
+            (str(segment), str(history.get("label", "")), steps, *(load_or_motion(n, history) for n in names))
+        )
+        before = history["step"]
+    symbols = [LOADS_AND_MOTIONS[name][0] for name in names]
+    return _table("Load history: the end of each segment", ("segment", "label", "steps", *symbols), rows)
+
+
+def _deck(deck: str) -> str:
+    if not deck:
+        return "<p>The case was made in Python, without a deck.</p>"
+    return (
+        "<details><summary>The whole deck</summary>"
+        f'<pre tabindex="0" aria-label="deck">{escaped(deck)}</pre></details>'
+    )
+
+
+def _hertz(result: Result, history: History) -> str:
+    case = summary.case_of(result)
+    rows = summary.hertz_rows(case, history) if case is not None else []
+    return _table("Last load step against Hertz", summary.HERTZ_HEADERS, rows) if rows else ""
+
+
+def _accuracy(result: Result) -> str:
+    rows = summary.trial_rows(result)
+    return _table("Accuracy", summary.TRIAL_HEADERS, rows) if rows else ""
+
+
+def _residuals(histories: Sequence[History]) -> str:
+    signs = [sign for sign, name in RESIDUALS.items() if name in histories[0]]
+    rows = [
+        (
+            str(h["step"]),
+            str(h.get("label", "")),
+            *(f"{float(h[RESIDUALS[sign]]):.1e}" for sign in signs),
+            str(h["sweeps"]),
+            str(h.get("cuts", 0)),
+            f"{float(h['operator_applications']):.3g}",
+            quantity(float(h["seconds"]), "s", 3),
+        )
+        for h in histories
+    ]
+    headers = ("step", "label", *signs, "iterations", "halved", "operator applications", "time")
+    return _table("Residuals and work of each load step", headers, rows, link=True)
+
+
+# --- curves ---------------------------------------------------------------------------------------
+
+
+def charts_of(histories: Sequence[History]) -> list[dict[str, Any]]:
+    """Return the curves of a history as the page draws them; none of a single load step.
+
+    Parameters
+    ----------
+    histories : sequence of mapping
+        History of each step.
+    """
+    if len(histories) < 2:
+        return []
+    telling = {name for name in VARIABLES if name in histories[0] and name not in LOADS_AND_MOTIONS}
+    telling |= set(worth_showing(histories))
+    steps = [history["step"] for history in histories]
+    charts: list[dict[str, Any]] = []
+    for title, names in _CURVES:
+        shown = [name for name in names if name in telling and _peak(name, histories) > 0.0]
+        if not shown:
+            continue
+        factor, unit = scaled(max(_peak(name, histories) for name in shown), VARIABLES[shown[0]].units)
+        curves = {_SYMBOLS.get(name, ""): _values(name, histories, factor) for name in shown}
+        charts.append({"title": title, "x": steps, "xlabel": "step", "unit": unit, "curves": curves})
+    for title, over, name in _LOOPS:
+        if {over, name} <= telling and min(_peak(over, histories), _peak(name, histories)) > 0.0:
+            to_x, x_unit = scaled(_peak(over, histories), VARIABLES[over].units)
+            factor, unit = scaled(_peak(name, histories), VARIABLES[name].units)
+            charts.append(
+                {
+                    "title": title,
+                    "x": _values(over, histories, to_x),
+                    "xlabel": f"{over.replace('_', ' ')} [{x_unit}]",
+                    "unit": unit,
+                    "curves": {"": _values(name, histories, factor)},
+                    "points": True,
+                }
+            )
+    signs = {sign: name for sign, name in RESIDUALS.items() if name in histories[0]}
+    curves = {sign: _values(name, histories, 1.0) for sign, name in signs.items() if _peak(name, histories)}
+    charts.append(
+        {"title": "Residuals", "x": steps, "xlabel": "step", "unit": "", "curves": curves, "log": True}
+    )
+    return charts
+
+
+def _peak(name: str, histories: Sequence[History]) -> float:
+    values = np.abs([float(history[name]) for history in histories])
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def _values(name: str, histories: Sequence[History], factor: float) -> list[float | None]:
+    return rounded([factor * float(history[name]) for history in histories], 5)

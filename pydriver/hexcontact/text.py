@@ -1,0 +1,127 @@
+"""Words and numbers for people: quantities with prefixes, and tables as text, as HTML and for terminals."""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Row = Sequence[str]
+
+_TABLE = "border-collapse:collapse;margin:0.3em 0"
+_CELL = "padding:0.15em 1.2em 0.15em 0;border:0;background:none"
+_HEAD = f"{_CELL};border-bottom:1px solid currentColor;font-weight:600"
+_TITLE = "font-weight:600;text-align:left;padding:0.2em 0;color:inherit;caption-side:top"
+
+# Control characters but tab and ends of lines, separators of lines, marks that change the direction of
+# reading, halves of surrogate pairs, and what is no character: terminals obey them, XML forbids most.
+_UNSEEN = re.compile(
+    "[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+    "|\r(?!\n)"
+)
+
+
+def visible(text: str) -> str:
+    r"""Write text of a user so that a terminal or a page only shows it: an escape character as ``\u001b``."""
+    return _UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def escaped(text: str) -> str:
+    """Write text of a user for HTML and XML."""
+    return html.escape(visible(text))
+
+
+PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+
+
+def quantity(value: float, unit: str = "", digits: int = 4) -> str:
+    """Write a number as an engineer would: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``.
+
+    Parameters
+    ----------
+    value : float
+        The number, in SI.
+    unit : str
+        A unit that takes a prefix; without one, or where no prefix fits, the number is written plainly.
+    digits : int
+        Significant digits.
+    """
+    if math.isnan(value):
+        return "-"
+    if value == 0 or math.isinf(value):
+        return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
+    rounded = float(f"{value:.{digits - 1}e}")
+    power = 3 * math.floor(math.log10(abs(rounded)) / 3)
+    if not unit or power not in PREFIXES:
+        return f"{rounded:.{digits}g} {unit}".rstrip()
+    scaled = f"{rounded / 10.0**power:#.{digits}g}".rstrip(".")
+    return f"{scaled} {PREFIXES[power]}{unit}"
+
+
+def percent(share: float) -> str:
+    """Write a share with two digits, as "0.051 %"."""
+    return f"{100.0 * share:.2g} %" if math.isfinite(share) else "-"
+
+
+def text_table(headers: Row, rows: Iterable[Row]) -> str:
+    """Return a table as plain text; numbers are at the right of their columns."""
+    table = [[visible(cell) for cell in row] for row in (headers, *rows)]
+    widths = [max(len(row[k]) for row in table) for k in range(len(headers))]
+    left = [k == 0 or not _numbers(row[k] for row in table[1:]) for k in range(len(headers))]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if first else cell.rjust(width)
+            for cell, width, first in zip(row, widths, left, strict=True)
+        ).rstrip()
+        for row in table
+    ]
+    return "\n".join(lines if any(headers) else lines[1:])
+
+
+def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") -> str:
+    """Return a table as HTML that looks the same in light and dark notebooks."""
+    rows = [list(row) for row in rows]
+    right = [k > 0 and _numbers(row[k] for row in rows) for k in range(len(headers))]
+
+    def line(row: Row, tag: str, style: str) -> str:
+        cells = (
+            f'<{tag} style="{style};text-align:{"right" if at_right else "left"}">{escaped(cell)}</{tag}>'
+            for cell, at_right in zip(row, right, strict=True)
+        )
+        return f'<tr style="background:none">{"".join(cells)}</tr>'
+
+    head = f"<thead>{line(headers, 'th', _HEAD)}</thead>" if any(headers) else ""
+    body = "".join(line(row, "td", _CELL) for row in rows)
+    caption = f'<caption style="{_TITLE}">{escaped(title)}</caption>' if title else ""
+    under = f'<div style="opacity:0.75;margin-bottom:0.6em">{escaped(note)}</div>' if note else ""
+    return f'<table style="{_TABLE}">{caption}{head}<tbody>{body}</tbody></table>{under}'
+
+
+def _numbers(cells: Iterable[str]) -> bool:
+    """Tell whether a column holds numbers, some of which may be missing."""
+    found = [cell for cell in cells if cell not in ("", "-")]
+    return bool(found) and all(cell.lstrip("+-").replace("inf", "0")[:1].isdigit() for cell in found)
+
+
+def rich_table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: bool = False) -> Table:
+    """Return a table of numbers; names and labels are text, which may wrap on a narrow terminal."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = Table(
+        title=Text(visible(title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD,
+        show_header=any(headers),
+        pad_edge=False, collapse_padding=tight,
+    )  # fmt: skip
+    for header in headers:
+        text = header in ("", "label")
+        shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
+    for row in rows:
+        shown.add_row(*(Text(visible(cell)) for cell in row))
+    return shown

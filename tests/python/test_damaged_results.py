@@ -1,0 +1,279 @@
+"""Damaged results, records and lists of lattices: data as written, or an error that names the file."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray
+from fuzz.file_made import WINDOW, made_step, written
+
+from hexcontact.accuracy import Solution
+from hexcontact.errors import DeckError
+from hexcontact.record import read_record, write_record
+from hexcontact.result import Metadata, assemble
+from hexcontact.store import Store, journal_of, open_result
+from hexcontact.study_collect import histories
+from hexcontact.trial_folder import TrialFolder
+
+MATERIALS = {
+    **{"effective_modulus": 2e11, "dundurs_beta": 0.0, "tangential_compliance_ratio": 1.0},
+    **{"friction_coefficient": 0.2, "algorithm": "incremental", "coupling": "full", "tolerance": 1e-8},
+}
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "out.nc"
+
+
+def test_files_that_are_no_results(tmp_path: Path) -> None:
+    (tmp_path / "text.nc").write_text("no netCDF")
+    (tmp_path / "empty.nc").touch()
+    (tmp_path / "folder").mkdir()
+    xarray.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "foreign.nc")
+    for name, message in {
+        "text.nc": r"text\.nc is damaged or not a netCDF file",
+        "empty.nc": r"empty\.nc is damaged or not a netCDF file",
+        "foreign.nc": r"foreign\.nc was not written by hexcontact",
+        "missing.nc": r"there is no file .*missing\.nc",
+        "folder": "folder is a folder without finished steps",
+    }.items():
+        with pytest.raises(DeckError, match=message):
+            open_result(tmp_path / name)
+
+
+def test_another_layout_is_refused_with_its_number(out: Path) -> None:
+    written(out)
+    with netCDF4.Dataset(out, "a") as file:
+        file.schema_version = np.int32(99)
+        file.hexcontact_version = "7.0"
+    message = r"has the file layout 99 of hexcontact 7\.0; this version reads layout 1"
+    with pytest.raises(DeckError, match=message):
+        open_result(out)
+
+
+def test_a_truncated_file_is_damaged_not_a_crash(out: Path) -> None:
+    written(out)
+    whole = out.read_bytes()
+    for part in np.linspace(0, len(whole) - 1, 40).astype(int):
+        out.write_bytes(whole[:part])
+        with pytest.raises(DeckError, match="is damaged"):
+            open_result(out)
+
+
+def test_flipped_bytes_in_a_result_are_noticed(out: Path) -> None:
+    """Before HDF5, which damage may crash, reads any of them."""
+    written(out, 1, planned=1)
+    whole = out.read_bytes()
+    for at in range(0, len(whole) - 8, 211):
+        out.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
+        for read in (open_result, histories):
+            with pytest.raises(DeckError, match=r"out\.nc is damaged: its bytes are not those"):
+                read(out)
+
+
+def test_flipped_bytes_in_a_record_are_noticed(out: Path) -> None:
+    """A record that can be read is the record that was written, its history included."""
+    described = written(out, 1, planned=2)
+    record = journal_of(out) / "000001.npz"
+    whole = record.read_bytes()
+    expected = assemble(described, [made_step(0)], complete=False)
+    noticed, places = 0, range(0, len(whole), 11)
+    for at in places:
+        record.write_bytes(whole[:at] + bytes([255 - whole[at]]) + whole[at + 1 :])
+        try:
+            read = open_result(out).dataset
+        except DeckError as error:
+            assert "000001.npz is damaged" in str(error)
+            noticed += 1
+        else:
+            assert read.identical(expected)
+    assert noticed > 0.9 * len(places)
+
+
+def test_every_flipped_bit_in_a_list_of_lattices_is_noticed(out: Path) -> None:
+    trials = TrialFolder(out.parent)
+    solution = Solution(1, 0, 1e-6, (0.0, 1e-9), 99, [{"max_pressure": 1.0 / 3.0, "label": "é", "cuts": 0}])
+    trials.write(Metadata(title="a case", deck="deck = 1", parameters=MATERIALS), [solution])
+    data, read, noticed = trials.ledger.read_bytes(), trials.read(), 0
+    for place in range(8 * len(data)):
+        changed = bytearray(data)
+        changed[place // 8] ^= 1 << place % 8
+        trials.ledger.write_bytes(changed)
+        try:
+            found = trials.read()
+        except DeckError as error:
+            assert str(error).startswith(f"{trials.ledger} ")
+            noticed += 1
+        else:
+            assert found == read  # E for e in a number
+    assert noticed > 0.99 * 8 * len(data)
+    trials.ledger.write_bytes(data)
+    assert trials.read() == read
+    earlier = {name: value for name, value in json.loads(data).items() if name != "sha256"}
+    trials.ledger.write_text(json.dumps(earlier | {"trials_version": 1}))  # which had no checksum
+    assert trials.read() == read
+
+
+def changed_record(record: Path, **changes: object) -> None:
+    """Write a record again with other metadata."""
+    metadata, step = read_record(record)
+    write_record(record, replace(metadata, **changes), step)  # type: ignore[arg-type]
+
+
+def test_lattices_of_another_run_are_refused(out: Path) -> None:
+    trials = TrialFolder(out.parent)
+    for steps_of, of in (("one", "one"), ("one", "another")):
+        trials.write(Metadata(run=of), [])
+        with Store(trials.path(0), Metadata(run=steps_of, planned_steps=3), overwrite=True) as store:
+            store.append(made_step(0))
+        if of == steps_of:
+            assert len(trials.result(out)) == 1
+    with pytest.raises(DeckError, match=r"lattices holds load steps of another run than .*trials\.json"):
+        trials.result(out)
+
+
+DECK = """[body.1]
+young_modulus = {modulus}
+[[load]]
+steps = {steps}
+[solver]
+tolerance = {tolerance}
+[grid]
+spacing = 1e-6
+"""
+OTHER_RUNS: dict[str, tuple[dict[str, object], str]] = {
+    "run": ({"run": "another"}, "run"),
+    "start": ({"created": "2030-01-01T00:00:00Z"}, "created"),
+    "program": ({"version": "0.1"}, "version"),
+    "material": ({"parameters": MATERIALS | {"effective_modulus": 2.1e11}}, "effective_modulus"),
+    "friction": ({"parameters": MATERIALS | {"friction_coefficient": 0.3}}, "friction_coefficient"),
+    "law": ({"parameters": MATERIALS | {"algorithm": "static"}}, "algorithm"),
+    "deck": ({"deck": DECK.format(modulus=3e11, steps=5, tolerance=1e-8)}, "deck"),
+    "loads": ({"deck": DECK.format(modulus=2e11, steps=6, tolerance=1e-8)}, "deck"),
+    "fields": ({"fields": ("pressure",)}, "fields"),
+    "earlier": ({"resumed": ()}, "written before"),
+}
+
+
+@pytest.mark.parametrize(("changes", "named"), OTHER_RUNS.values(), ids=OTHER_RUNS)
+def test_records_of_a_journal_are_of_one_run(out: Path, changes: dict[str, object], named: str) -> None:
+    deck = DECK.format(modulus=2e11, steps=5, tolerance=1e-8)
+    described = Metadata(deck=deck, planned_steps=5, parameters=MATERIALS, resumed=("once",))
+    with Store(out, described) as store:
+        for index in range(3):
+            store.append(made_step(index))
+    record = journal_of(out) / "000002.npz"
+    # what a run that goes on, or a session, may change
+    last = {
+        "deck": DECK.format(modulus=2e11, steps=9, tolerance=1e-6) + "origin = [0, 0]",
+        "resumed": ("once", "twice"),
+    }
+    changed_record(journal_of(out) / "000003.npz", **last, parameters=MATERIALS | {"tolerance": 1e-6})
+    assert len(open_result(out)) == 3
+    changed_record(record, **changes)
+    with pytest.raises(DeckError, match=rf"000002\.npz does not belong to the records before it: .*{named}"):
+        open_result(out)
+    with pytest.raises(DeckError, match=r"000002\.npz does not belong to the records before it") as caught:
+        Store.reopened(out)
+    assert "goes on after step 1" in caught.value.__notes__[0]
+
+
+@pytest.mark.parametrize("story", ["", "resumed, tolerance = 1e-07 instead of 1e-05"])
+def test_values_that_no_step_has_are_refused(out: Path, story: str) -> None:
+    """In a record, and in a result without a checksum, which another program has written again."""
+    step, tolerance = made_step(0), 1e-5 if story else 1e-8
+    described = Metadata(
+        planned_steps=2, resumed=(story,), parameters=MATERIALS | {"algorithm": "frictionless"}
+    )
+    fields = dict(step.fields)
+    contact = fields["zone"] > 0
+    history = dict(step.history) | {
+        **{"max_pressure": fields["pressure"].max(), "contact_area": contact.sum() * WINDOW.cell_area},
+        **{"contact_radius": 1.0, "approach": 1.0, "sweeps": 7, "operator_applications": 7.5, "cuts": 0},
+        **{"residual_normal": tolerance, "residual_tangential": tolerance, "residual_force": 0.0},
+    }
+    places = (f"{n}.nc" for n in range(99))
+
+    def fault(of_fields: dict[str, object], of_history: dict[str, object]) -> str:
+        changed = replace(step, fields=fields | of_fields, history=history | of_history)  # type: ignore[arg-type]
+        record, result = out.parent / "000001.npz", out.parent / next(places)
+        write_record(record, described, changed)
+        assemble(described, [changed]).to_netcdf(result)
+        found = []
+        for path, read in ((record, read_record), (result, open_result)):
+            try:
+                read(path)
+                found.append("")
+            except DeckError as error:
+                assert str(error).startswith(f"{path} is damaged: ")
+                found.append(str(error).removeprefix(f"{path} is damaged: ").removesuffix(" in step 1"))
+        assert found[0] == found[1]
+        return found[0]
+
+    assert fault({}, {}) == ""
+    for name, value in {
+        **{"residual_normal": 1.0, "residual_tangential": 3 * tolerance, "residual_force": -1e-9},
+        **{"max_pressure": -1.0, "cuts": -2, "seconds": -1.0, "contact_area": -1e-9, "step_limited": 7},
+        **{"approach": 1e31, "sweeps": -3},
+    }.items():
+        assert fault({}, {name: value}) == f"{name} holds numbers that no load step has"
+    assert fault({}, {"cuts": 1, "residual_tangential": 0.04}) == ""  # of the parts one after the other
+    assert fault({}, {"cuts": 1, "residual_normal": 0.04}) != ""
+    for name, wrong in (("pressure", -1.0), ("pressure", np.nan), ("zone", 7), ("zone", -1), ("gap", np.nan)):
+        values = fields[name].copy()
+        values[contact] = wrong
+        assert fault({name: values}, {}) == f"{name} holds numbers that no node has"
+    outside = np.where(contact, fields["gap"], np.nan)
+    assert fault({"gap": outside}, {}) == ""
+    assert fault({"pressure": fields["pressure"] * 2}, {}) == "pressure does not fit to max_pressure"
+    assert fault({"zone": 0 * fields["zone"]}, {}) == "zone does not fit to contact_area"
+
+
+def test_files_of_earlier_versions_are_read_and_searched(out: Path) -> None:
+    """Without a checksum, an index of chunks that is damaged shows by what it leads to."""
+    written(out, every=2)
+    data = out.read_bytes()
+    expected = open_result(out).dataset.load()
+    earlier = data[:-48]
+    out.write_bytes(earlier)
+    assert open_result(out).dataset.identical(expected)
+    for part in (1, 24, 47):
+        out.write_bytes(data[:-part])
+        with pytest.raises(DeckError, match=r"out\.nc is damaged: the checksum at its end cannot be read"):
+            open_result(out)
+    for name, missing in (("pressure", np.nan), ("zone", -1)):
+        other = out.with_name(f"{name}.nc")
+        other.write_bytes(earlier)
+        with netCDF4.Dataset(other, "a") as file:
+            file[name][1] = missing
+        with pytest.raises(DeckError, match=rf"{name}\.nc is damaged: {name} holds numbers .* in step 2"):
+            open_result(other)
+
+
+def test_a_record_of_another_version_is_refused(out: Path) -> None:
+    written(out, 1, planned=2)
+    record = journal_of(out) / "000001.npz"
+    with np.load(record) as file:
+        arrays = dict(file)
+    text = arrays["about"].tobytes().replace(b'"journal_version": 1', b'"journal_version": 9')
+    np.savez(record, **(arrays | {"about": np.frombuffer(text, "u1")}))
+    with pytest.raises(DeckError, match=r"000001\.npz was kept by hexcontact .*layout 9; .* reads layout 1"):
+        open_result(out)
+
+
+def test_a_gap_or_a_damaged_record_in_the_journal_is_named(out: Path) -> None:
+    written(out, count=3, planned=9)
+    record = journal_of(out) / "000002.npz"
+    kept = record.read_bytes()
+    record.write_bytes(kept[: len(kept) // 2])
+    with pytest.raises(DeckError, match=r"000002\.npz is damaged"):
+        open_result(out)
+    record.unlink()
+    with pytest.raises(DeckError, match=r"lacks the record of step 2, 000002\.npz"):
+        open_result(out)
+    with Store(out, Metadata(planned_steps=1), overwrite=True):  # nothing stands in the way of a new run
+        pass

@@ -1,0 +1,211 @@
+"""What a run exits with when signals come, and what a job that puts itself in line again makes of it."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import hexcontact
+from hexcontact import Case
+from hexcontact import store as store_module
+from hexcontact.netcdf import read_output
+from hexcontact.result import Step
+from hexcontact.store import journal_of, open_result
+
+DECK = """
+title = "A sphere"
+[body.1]
+young_modulus = "432 GPa"
+poisson_ratio = 0.32
+surface = { shape = "sphere", radius = "1 mm" }
+[body.2]
+young_modulus = "72 GPa"
+poisson_ratio = 0.32
+[friction]
+coefficient = 0.2
+[grid]
+nodes_in_radius = 4
+[[load]]
+normal_load = "20 N"
+steps = 4
+"""
+PACKAGE = Path(hexcontact.__file__).parents[1]
+ENVIRONMENT = os.environ | {
+    "PYTHONPATH": os.pathsep.join(filter(None, [str(PACKAGE), os.environ.get("PYTHONPATH", "")])),
+    "OMP_NUM_THREADS": "1",
+}
+
+# --- signals after the last step --------------------------------------------------------------------------
+
+LATE = """
+import atexit, os, sys, time
+from hexcontact import cli, json_output, run_command, solve, store, study_run
+
+number, sent = int(sys.argv.pop(1)), []
+def signaled(module, name):
+    original = getattr(module, name)
+    def call(*arguments, **options):
+        if sent or name == "write":
+            os.kill(os.getpid(), number)
+            time.sleep(0.02)  # for the thread that waits for it
+            sent.append(name)
+        return original(*arguments, **options)
+    setattr(module, name, call)
+
+signaled(store, "write")  # the output is assembled
+signaled(store.Journal, "remove")
+signaled(store.Store, "close")
+signaled(run_command, "overview")
+signaled(run_command.Listeners, "tell")
+signaled(json_output, "write")
+atexit.register(lambda: (os.kill(os.getpid(), number), sys.stderr.write(" ".join(sent))))
+cli.main()
+"""
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+@pytest.mark.parametrize("command", ["run", "resume"])
+def test_a_complete_run_exits_with_0_whatever_comes(
+    tmp_path: Path, sent: signal.Signals, command: str
+) -> None:
+    (tmp_path / "sphere.toml").write_text(DECK)
+    out = tmp_path / "sphere.nc"
+    if command == "resume":
+        stopped(out, 4 if sent == signal.SIGINT else 3)
+    name = "sphere.toml" if command == "run" else "sphere.nc"
+    words = [sys.executable, "-c", LATE, str(int(sent)), command, name, "--plot", "-q", "--json"]
+    done = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.split() == ["write", "remove", "close", "close", "overview", "tell", "write"]
+    assert open_result(out).complete
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.nc", "sphere.png", "sphere.toml"]
+
+
+def stopped(out: Path, after: int) -> None:
+    """Leave a run that was interrupted after a step; after all of them: before its output."""
+    case = Case.from_text(DECK)
+
+    def stop(step: Step) -> None:
+        if step.number == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        case.run(out, on_step=stop)
+    assert len(store_module.Journal(journal_of(out))) == after
+
+
+# --- a job that puts itself in line again -----------------------------------------------------------------
+
+
+def nothing(out: Path) -> None:
+    pass
+
+
+def before_the_first_step(out: Path) -> None:
+    """As SIGKILL leaves it."""
+    journal_of(out).mkdir()
+    (journal_of(out) / "lock").write_text("")
+
+
+def after_two_steps(out: Path) -> None:
+    stopped(out, 2)
+
+
+def with_an_interim_output(out: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(store_module, "PUBLISH_INTERVAL", 0.0)
+        stopped(out, 3)
+    assert not read_output(out).complete
+
+
+def without_its_output(out: Path) -> None:
+    stopped(out, 4)
+
+
+def complete(out: Path) -> None:
+    Case.from_text(DECK).run(out)
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        *(nothing, before_the_first_step, after_two_steps, with_an_interim_output, without_its_output),
+        complete,
+    ],
+)
+def test_the_job_of_the_documentation_works_in_every_state(
+    tmp_path: Path, state: Callable[[Path], None]
+) -> None:
+    page = Path(__file__).parents[2] / "docs" / "restart.md"
+    if not page.exists():
+        pytest.skip("needs the documentation")
+    [script] = re.findall(r"```sh\n(#!/bin/bash\n.*?)```", page.read_text(), re.DOTALL)
+    (tmp_path / "job.sh").write_text(script)
+    (tmp_path / "fretting.toml").write_text(DECK)
+    programs = {
+        "srun": 'exec "$@"',
+        "scontrol": 'echo "$@" >> requeued',
+        "hexcontact": f'exec "{sys.executable}" -m hexcontact "$@"',
+    }
+    (tmp_path / "bin").mkdir()
+    for name, line in programs.items():
+        (tmp_path / "bin" / name).write_text(f"#!/bin/sh\n{line}\n")
+        (tmp_path / "bin" / name).chmod(0o755)
+    state(tmp_path / "fretting.nc")
+    slurm = {"SLURM_CPUS_PER_TASK": "1", "SLURM_JOB_ID": "7"}
+    path = os.pathsep.join([str(tmp_path / "bin"), ENVIRONMENT["PATH"]])
+    done = subprocess.run(
+        ["bash", "job.sh"],
+        cwd=tmp_path,
+        env=ENVIRONMENT | slurm | {"PATH": path},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "requeued").exists()
+    assert open_result(tmp_path / "fretting.nc").complete
+    assert not journal_of(tmp_path / "fretting.nc").exists()
+
+
+def test_a_run_is_sent_to_resume_wherever_steps_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for state in (after_two_steps, with_an_interim_output, without_its_output):
+        out = tmp_path / f"{state.__name__}.nc"
+        state(out)
+        with pytest.raises(
+            hexcontact.DeckError,
+            match=rf"holds \d finished steps of an unfinished run; hexcontact resume {out} goes on, ",
+        ):
+            Case.from_text(DECK).run(out)
+    again = tmp_path / "again.nc"
+    shutil.copy(tmp_path / "with_an_interim_output.nc", again)  # without its steps
+    with pytest.raises(hexcontact.DeckError, match="exists already; --overwrite"):
+        Case.from_text(DECK).run(again)
+
+
+# --- signals at random moments ----------------------------------------------------------------------------
+
+
+def test_signals_at_random_moments_leave_what_the_code_says(tmp_path: Path) -> None:
+    """20 runs, signaled in the course of their time: 0 for a complete result, else one that can go on."""
+    command = [
+        sys.executable,
+        str(Path(__file__).with_name("killed_runs.py")),
+        str(tmp_path),
+        "20",
+        "3",
+        "signals",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    *runs, signals = done.stdout.splitlines()
+    assert len(runs) == 20
+    assert int(signals.removeprefix("signals ")) > 10

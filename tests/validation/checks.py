@@ -1,0 +1,224 @@
+"""The list of checks, and those that solve nothing."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from hexcontact.verify import Check, Comparison
+
+from .reference import reference
+
+
+def kernels() -> Comparison:
+    """Pyramid kernels at lattice points against the reference table."""
+    from hexcontact.influence import pyramid_kernels
+
+    found = Comparison()
+    for col, row in ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, -1)):
+        values = pyramid_kernels(np.array(col + 0.5 * row), np.array(math.sqrt(0.75) * row))
+        for name, value in zip(("K1", "Kxx", "Kxy", "Kx", "Ky"), values, strict=True):
+            known = reference(f"kernel at index difference ({col},{row})", f"{name}/le")
+            # the table has 13 digits
+            found.add(f"({col},{row})", f"{name}/l_e", "-", float(value), row=known, absolute=5e-13)
+    return found
+
+
+def materials() -> Comparison:
+    """Constants of the pairs of materials of sections 9.2 and 9.3."""
+    from hexcontact.native import ElasticPair
+
+    found = Comparison()
+    for section, beta, moduli in (
+        ("9.2", "Dundurs beta", (432e9, 0.32, 72e9, 0.32)),
+        ("9.3", "beta", (200e9, 0.30, 69e9, 0.33)),
+    ):
+        pair, case = ElasticPair.from_materials(*moduli), f"{section} materials"
+        found.add(case, "E*", "GPa", pair.effective_modulus, row=reference(case, "E*"), relative=1e-7)
+        found.add(case, "beta", "-", pair.beta, row=reference(case, beta), relative=5e-7)
+        found.add(case, "gamma", "-", pair.gamma, row=reference(case, "gamma"), relative=5e-7)
+    found.notes.append(
+        "9.2: 432 GPa on 72 GPa, both 0.32. 9.3: steel (200 GPa, 0.30) on aluminium (69 GPa, 0.33)."
+    )
+    return found
+
+
+def _of(module: str, name: str) -> Callable[[], Comparison]:
+    """Return the check `name` of a module of this package, imported when it runs."""
+
+    def run() -> Comparison:
+        check: Callable[[], Comparison] = getattr(importlib.import_module(f"validation.{module}"), name)
+        return check()
+
+    return run
+
+
+_ALL = (
+    Check(
+        "kernels",
+        "Influence functions of the pyramid",
+        "The five kernels at lattice points. Pictures, made by `make pictures`: "
+        "[displacements of the pyramid](images/pyramid.png), as in Figure 5.6; "
+        "[the pyramid beside other load shapes](images/load_shapes.png), as in Figure 7.3.",
+        kernels,
+    ),
+    Check("materials", "Pairs of materials", "Constants of the pairs of sections 9.2 and 9.3.", materials),
+    Check(
+        "table-9.2",
+        "Two spheres on five meshes (Tables 9.1 and 9.2)",
+        "Frictionless contact of two spheres; on each mesh the discrete solution is unique.",
+        _of("normal", "table_9_2"),
+    ),
+    Check(
+        "convergence",
+        "Convergence of the frictionless sphere",
+        "Errors against Hertz on lattices with a/l_e spacings in the contact radius.",
+        _of("normal", "convergence"),
+    ),
+    Check(
+        "crossed-cylinders",
+        "Crossed cylinders without friction (section 9.3)",
+        "Contact ellipse of two cylinders whose axes enclose an angle, against Hertz.",
+        _of("normal", "crossed_cylinders"),
+    ),
+    Check(
+        "error-bars",
+        "Estimated discretization errors",
+        "How many true errors lie within the estimated ones, on lattices of random spacing and origin.",
+        _of("error_bars", "error_bars"),
+    ),
+    Check(
+        "profiles",
+        "Cone, powers and punches",
+        "Axisymmetric contacts with closed solutions.",
+        _of("normal", "profiles"),
+    ),
+    Check(
+        "control",
+        "Load control and approach control",
+        "The same problem driven by its load or by its approach, by both methods.",
+        _of("normal", "control"),
+    ),
+    Check(
+        "methods",
+        "Direct and fft with friction",
+        "The same histories by both methods.",
+        _of("methods", "methods"),
+    ),
+    Check(
+        "table-9.3",
+        "Dissimilar spheres pressed with friction (section 9.2, Table 9.3)",
+        "Static and incremental solutions for P = 10 and 31.5 N, on the lattices of the reference table and "
+        "extrapolated to many load steps.",
+        _of("dissimilar", "table_9_3"),
+    ),
+    Check(
+        "goodman",
+        "Dissimilar spheres, uncoupled (section 9.2)",
+        "The stick radius where shear does not move the pressure, against Spence's formula.",
+        _of("dissimilar", "goodman"),
+    ),
+    Check(
+        "rigid-plane",
+        "Sphere with ν = 0 pressed on a rigid plane",
+        "The strongest coupling of pressure and shear, β = 1/2.",
+        _of("dissimilar", "rigid_plane"),
+    ),
+    Check(
+        "stick-radius",
+        "Stick radius of self-similar contacts",
+        "The stick radius under a growing load depends on β and μ only; here from a flat punch.",
+        _of("no_slip", "stick_radii"),
+    ),
+    Check(
+        "flat-punch-no-slip",
+        "Flat punch without slip",
+        "A rigid flat punch that cannot slip (Mossakovskii).",
+        _of("no_slip", "flat_punch"),
+    ),
+    Check(
+        "sphere-no-slip",
+        "Sphere without slip",
+        "A sphere pressed in many steps that cannot slip (Mossakovskii, Spence).",
+        _of("no_slip", "sphere"),
+    ),
+    Check(
+        "entry",
+        "Few load steps of a growing contact",
+        "Nodes that come into contact, with both values of solver.entry, against exact solutions.",
+        _of("entry", "entry"),
+    ),
+    Check(
+        "unloading",
+        "Dissimilar sphere pressed and let go",
+        "Normal unloading with friction: slip reverses from the edge inwards.",
+        _of("unloading", "unloading"),
+    ),
+    Check(
+        "crossed-cylinders-friction",
+        "Crossed cylinders with friction (section 9.3, Figure 9.4)",
+        "Contact and stick ellipses, static and incremental.",
+        _of("crossed_cylinders", "crossed_cylinders"),
+    ),
+    Check(
+        "cattaneo-mindlin",
+        "Alike spheres sheared (section 13.1, Figure 13.2)",
+        "Stick radius, shift and tractions at Q/μP = 0.1 ... 0.9 against Cattaneo and Mindlin.",
+        _of("tangential", "cattaneo_mindlin"),
+    ),
+    Check(
+        "loop",
+        "Hysteresis loop at constant normal load",
+        "Spheres sheared to and fro, against Mindlin and Deresiewicz.",
+        _of("tangential", "loop"),
+    ),
+    Check(
+        "prescribed-shift",
+        "Prescribed shift",
+        "Spheres shifted by given amounts up to full slip.",
+        _of("tangential", "prescribed_shift"),
+    ),
+    Check("torsion", "Torsion", "Spheres twisted, against Lubkin.", _of("tangential", "torsion")),
+    Check(
+        "long-contact",
+        "Middle of a long contact, sheared (Figure 13.3)",
+        "Tractions in the mid-plane against the plane solution of Cattaneo and Mindlin.",
+        _of("plane", "cattaneo"),
+    ),
+    Check(
+        "long-contact-dissimilar",
+        "Middle of a long contact of dissimilar bodies, pressed, then sheared",
+        "Stick in the mid-plane against the plane solution.",
+        _of("plane", "dissimilar"),
+    ),
+    Check(
+        "fretting",
+        "Dissimilar spheres pressed, then sheared (section 13.2.2, Tables 13.3 to 13.5)",
+        "The 40 load steps of the text.",
+        _of("fretting", "fretting"),
+    ),
+    Check(
+        "fretting-fine-steps",
+        "Dissimilar spheres pressed, then sheared in finer steps",
+        "The path of section 13.2.2 in 185 steps.",
+        _of("fretting", "refined_path"),
+    ),
+    Check(
+        "stick-outlines",
+        "Stick zones, coupled and uncoupled (Figure 13.5)",
+        "The history of section 13.2.2 by both kinds of coupling.",
+        _of("fretting", "stick_outlines"),
+    ),
+    Check(
+        "compliance",
+        "Initial tangential compliance against β (Figure 13.4)",
+        "The first small shear after pressing dissimilar spheres.",
+        _of("fretting", "compliance"),
+    ),
+)
+
+CHECKS = {check.name: check for check in _ALL}
+"""All checks by name, in the order in which they run."""

@@ -81,7 +81,7 @@ module hc_contact_state
     integer :: stopped = not_solved
     !> There is contact at the rim of the window: a larger window would have another solution, unless nothing can touch there
     logical :: clipped = .false.
-    !> No node sticks and the tangential load cannot be carried
+    !> The tangential loads are more than full sliding carries
     logical :: sliding = .false.
     !> Active sets that were tried on the finest lattice
     integer :: sweeps = 0

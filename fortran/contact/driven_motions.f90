@@ -6,12 +6,21 @@
 !> known too: a contact far from the origin would not tell a twist from a shift.
 module hc_driven_motions
   use hc_precision, only: wp, pi
-  use hc_contact_state, only: load_target_t, along_x, along_y, about_z, n_motion, force_control
+  use hc_lapack, only: dgesv
+  use hc_contact_state, only: load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_friction_problem, only: friction_problem_t
   implicit none
   private
 
-  public :: driven_motions_t, new_driven_motions
+  public :: driven_motions_t, new_driven_motions, overloads
+
+  !> Share of a load that rounding may add.
+  real(wp), parameter :: rounding = 1.0e-6_wp
+  !> Residual R_n above which a pressure tells nothing.
+  real(wp), parameter :: trusted = 0.1_wp
+  !> Motions that are tried for the one that the least load drives, and the gain below which no more are.
+  integer, parameter :: max_tries = 100
+  real(wp), parameter :: no_gain = 1.0e-9_wp
 
   !> The driven motions of a contact.
   type :: driven_motions_t
@@ -153,5 +162,92 @@ contains
       if (any(self%motion == along_y)) motion(along_y) = motion(along_y) - motion(about_z)*self%center(1)
     end if
   end subroutine set_motions
+
+  !> Is more prescribed than full sliding carries, whatever is still wrong with the pressure?
+  !>
+  !> Friction carries the prescribed loads times a factor, and no more than
+  !>
+  !>     factor <= sum of mu p |u| / (loads . motion)
+  !>
+  !> with u the displacement of any motion that they drive (upper bound of limit analysis). For shifts alone the
+  !> least is mu P/|Q|. With a torque, or without a prescribed P, it depends on the pressure: a gap that makes the
+  !> residual R_n moves it by that share of its largest value where it acts on single nodes, by less where it is smooth.
+  logical function overloads(problem, target, pressure, residual_normal)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Pressure (n_col, n_row) [Pa], and its residual R_n
+    real(wp), intent(in) :: pressure(problem%lattice%extent(1), problem%lattice%extent(2)), residual_normal
+    type(driven_motions_t) :: driven
+    real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
+    real(wp) :: carried, error, factor, before
+    integer :: k, try
+
+    overloads = .false.
+    if (problem%friction%no_slip .or. .not. any(pressure > 0.0_wp)) return
+    call new_driven_motions(driven, problem, target, pressure > 0.0_wp)
+    associate (n => size(driven%motion), n_contact => count(pressure > 0.0_wp))
+      load = [(driven%load(k, problem, target), k=1, n)]
+      overloads = any(abs(load) > 0.0_wp) .and. .not. problem%friction%resists()
+      if (overloads .or. n == 0) return
+      allocate (u(n_contact, 2, n))
+      bound = problem%friction%bound(pack(pressure, pressure > 0.0_wp))
+      error = residual_normal
+      if (target%control(normal) == force_control) then
+        carried = problem%friction%bound(target%value(normal))/problem%lattice%cell_area()
+        if (sum(bound) > 0.0_wp) bound = bound*(carried/sum(bound))
+        if (.not. any(driven%motion == about_z)) error = 0.0_wp
+      end if
+      if (error > trusted) return
+      do k = 1, n
+        field = driven%direction(k, problem)
+        u(:, 1, k) = pack(field(:, :, 1), pressure > 0.0_wp)
+        u(:, 2, k) = pack(field(:, :, 2), pressure > 0.0_wp)
+      end do
+      allocate (length(n_contact), source=1.0_wp)
+      factor = huge(1.0_wp)
+      do try = 1, max_tries
+        before = factor
+        call lower(u, bound, load, length, factor)
+        if (.not. factor < (1.0_wp - no_gain)*before) exit
+      end do
+      overloads = factor*(1.0_wp + error) < 1.0_wp - rounding
+    end associate
+  end function overloads
+
+  !> Try the motion that nodes with springs of stiffness bound/length would make: what slips far resists the less.
+  subroutine lower(u, bound, load, length, factor)
+    !> Displacements of unit motions (n, 2, motion)
+    real(wp), intent(in) :: u(:, :, :)
+    !> Largest traction of each node, and load of each motion over the cell area [Pa]
+    real(wp), intent(in) :: bound(:), load(:)
+    !> Displacement of each node in the motion tried before, and in this one
+    real(wp), intent(inout) :: length(:)
+    !> Least load factor so far
+    real(wp), intent(inout) :: factor
+    real(wp) :: stiffness(size(load), size(load)), motion(size(load), 1), moved(size(bound), 2)
+    integer :: i, k, info, pivot(size(load))
+
+    do k = 1, size(load)
+      do i = 1, size(load)
+        stiffness(i, k) = sum(spread(bound/length, 2, 2)*u(:, :, i)*u(:, :, k))
+      end do
+    end do
+    motion(:, 1) = load
+    call dgesv(size(load), 1, stiffness, size(load), pivot, motion, size(load), info)
+    if (info /= 0) return
+    associate (work => dot_product(load, motion(:, 1)))
+      if (.not. work > 0.0_wp) return
+      motion = motion/work
+    end associate
+    moved = 0.0_wp
+    do k = 1, size(load)
+      moved = moved + motion(k, 1)*u(:, :, k)
+    end do
+    length = norm2(moved, dim=2)
+    factor = min(factor, dot_product(bound, length))
+    length = max(length, no_gain*maxval(length))
+  end subroutine lower
 
 end module hc_driven_motions

@@ -34,9 +34,6 @@ module hc_friction_problem
   !> |beta| min(mu, 1) from which pressure and shear traction are better found together.
   real(wp), parameter :: strong_coupling = 0.03_wp
 
-  !> Share of a load that rounding may add.
-  real(wp), parameter :: rounding = 1.0e-6_wp
-
   !> What is given.
   type :: friction_problem_t
     !> Lattice and window
@@ -64,8 +61,6 @@ module hc_friction_problem
     procedure :: is_pressed
     !> Do pressure and shear traction act strongly on each other?
     procedure :: couples_strongly
-    !> Is a tangential load prescribed beyond mu P?
-    procedure :: overloads
     !> State of bodies that do not touch
     procedure :: separate
     !> Relative displacements (w, u_x, u_y) of given tractions
@@ -211,20 +206,6 @@ contains
     if (.not. self%friction%no_slip) mu = min(self%friction%coefficient, 1.0_wp)
     couples_strongly = abs(self%pair%beta())*mu > strong_coupling .and. .not. self%goodman
   end function couples_strongly
-
-  !> Is a tangential load prescribed beyond mu P?
-  pure logical function overloads(self, target, pressures)
-    class(friction_problem_t), intent(in) :: self
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Sum of the pressures [Pa]
-    real(wp), intent(in) :: pressures
-    real(wp) :: load
-
-    load = norm2(merge(target%value(along_x:along_y), 0.0_wp, target%control(along_x:along_y) == force_control))
-    overloads = .not. self%friction%no_slip .and. &
-                load > (1.0_wp + rounding)*self%friction%coefficient*self%lattice%cell_area()*pressures
-  end function overloads
 
   !> State of bodies that do not touch; motions that are driven by their load stay where they are.
   subroutine separate(self, start, reference, target, tolerance, state)

@@ -9,7 +9,7 @@
 !>
 !> Every kernel is even or odd, so that its spectrum is real, or i times real.
 module hc_convolution
-  use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_int
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
@@ -52,6 +52,8 @@ module hc_convolution
     !> Where the spectra are
     type(kernel_spectrum_t), pointer, private :: held => null()
     type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
+    !> Address of the object that frees them: copies, which have its plans and spectra as long as it is there, do not
+    integer(c_intptr_t), private :: owner = 0
     !> Row transforms (leading, n_row or one more, component)
     complex(wp), allocatable, private :: work(:, :, :)
     !> Two padded rows before and after their transform, for each thread
@@ -109,6 +111,7 @@ contains
 
     integer :: stat
 
+    self%owner = address(self)
     self%n_threads = threads_for(extent, n_threads)
     self%n_kernel = n_kernel
     self%first_odd = n_kernel + 1
@@ -381,14 +384,14 @@ contains
     do i = 1, size(field, 3)
       !$omp do schedule(static)
       do row = 1, n(2), 2
-        call transform_rows(self, row, field(:, :, i), self%row_buffer(:, :, thread), self%work(:, row:row + 1, i))
+        call transform_rows(self, row, i, thread, field(:, :, i))
       end do
       !$omp end do nowait
     end do
     !$omp barrier
     !$omp do schedule(static)
     do b = 1, self%n_block
-      call convolve_block(self, b, kernel, self%block_buffer(:, :, 1, thread), self%block_buffer(:, :, 2, thread))
+      call convolve_block(self, b, kernel, thread)
     end do
     !$omp end do
     do o = 1, size(result, 3)
@@ -408,63 +411,63 @@ contains
     !$omp end parallel
   end subroutine convolve
 
-  !> Transform two rows of a field.
-  subroutine transform_rows(self, row, field, buffer, transformed)
-    class(convolution_t), intent(in) :: self
-    !> Index of the first row
-    integer, intent(in) :: row
+  !> Transform two rows of a field into those of `work`.
+  subroutine transform_rows(self, row, component, thread, field)
+    class(convolution_t), intent(inout) :: self
+    !> Index of the first row, of the component, and of the thread, whose buffer is zero beyond the window and stays so
+    integer, intent(in) :: row, component, thread
     !> Field (n_col, n_row)
     real(wp), intent(in) :: field(:, :)
-    !> Scratch (padded row, 2); the first row is zero beyond the window and stays so
-    complex(wp), intent(inout), contiguous :: buffer(:, :)
-    !> Transforms of both rows (leading, 2)
-    complex(wp), intent(inout), contiguous :: transformed(:, :)
-    integer :: n, last
+    integer :: last
 
-    n = self%extent(1)
     last = min(row + 1, self%extent(2))
-    ! rows off the contact need no transform
-    if (all(abs(field(:, row:last)) <= 0.0_wp)) then
-      transformed(:self%n_frequency, :) = 0.0_wp
-      return
-    end if
-    if (last > row) then
-      buffer(:n, 1) = cmplx(field(:, row), field(:, last), wp)
-    else
-      buffer(:n, 1) = field(:, row)
-    end if
-    call fftw_execute_dft(self%row_plan, buffer(:, 1), buffer(:, 2))
-    call split_rows(buffer(:, 2), transformed(:self%n_frequency, 1), transformed(:self%n_frequency, 2))
+    associate (n => self%extent(1), given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
+      ! rows off the contact need no transform
+      if (all(abs(field(:, row:last)) <= 0.0_wp)) then
+        self%work(:self%n_frequency, row:row + 1, component) = 0.0_wp
+        return
+      end if
+      if (last > row) then
+        given(:n) = cmplx(field(:, row), field(:, last), wp)
+      else
+        given(:n) = field(:, row)
+      end if
+      call fftw_execute_dft(self%row_plan, given, transformed)
+      call split_rows(transformed, self%work(:self%n_frequency, row, component), &
+                      self%work(:self%n_frequency, row + 1, component))
+    end associate
   end subroutine transform_rows
 
   !> Transform a block of columns, multiply with the spectra, transform back (the conjugate, that is).
-  subroutine convolve_block(self, b, kernel, given, transformed)
+  subroutine convolve_block(self, b, kernel, thread)
     class(convolution_t), intent(inout) :: self
     !> Index of the block
     integer, intent(in) :: b
     !> Number of the kernel (onto, from), negative to reverse its sign
     integer, intent(in) :: kernel(:, :)
-    !> Scratch (width*padded(2), component)
-    complex(wp), intent(inout), contiguous :: given(:, :), transformed(:, :)
+    !> Index of the thread, whose buffer is used
+    integer, intent(in) :: thread
 
     integer :: i, o, first
 
     first = (b - 1)*self%width + 1
-    do i = 1, size(kernel, 2)
-      call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%work(first, 1, i), given(:, i))
-      call fftw_execute_dft(self%column_plan, given(:, i), transformed(:, i))
-    end do
+    associate (given => self%block_buffer(:, :, 1, thread), transformed => self%block_buffer(:, :, 2, thread))
+      do i = 1, size(kernel, 2)
+        call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%work(first, 1, i), given(:, i))
+        call fftw_execute_dft(self%column_plan, given(:, i), transformed(:, i))
+      end do
 
-    if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
-      call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
-    else
-      call multiply(self%spectrum(:, b, :), self%first_odd, kernel, transformed, given)
-    end if
+      if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
+        call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
+      else
+        call multiply(self%spectrum(:, b, :), self%first_odd, kernel, transformed, given)
+      end if
 
-    do o = 1, size(kernel, 1)
-      call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))
-      call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), self%work(first, 1, o))
-    end do
+      do o = 1, size(kernel, 1)
+        call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))
+        call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), self%work(first, 1, o))
+      end do
+    end associate
   end subroutine convolve_block
 
   !> Run the transforms of one scalar product and nothing else, to compare times with.
@@ -490,9 +493,16 @@ contains
     !$omp end parallel
   end subroutine time_transforms
 
+  !> Address of an object.
+  integer(c_intptr_t) function address(self)
+    type(convolution_t), intent(in), target :: self
+    address = transfer(c_loc(self), address)
+  end function address
+
   impure elemental subroutine free(self)
     type(convolution_t), intent(inout) :: self
 
+    if (self%owner /= address(self)) return
     call lock(fftw_planner)
     if (c_associated(self%row_plan)) call fftw_destroy_plan(self%row_plan)
     if (c_associated(self%column_plan)) call fftw_destroy_plan(self%column_plan)

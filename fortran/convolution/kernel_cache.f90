@@ -51,6 +51,9 @@ module hc_kernel_cache
     procedure :: keep
     !> What was wrong with the folder
     procedure :: take_complaint
+    !> A copy has the bound and begins empty: what two caches had would be freed twice
+    generic :: assignment(=) => copy
+    procedure, private :: copy
     final :: free
   end type kernel_cache_t
 
@@ -174,6 +177,15 @@ contains
     end if
     call unlock(kernel_table)
   end subroutine take_complaint
+
+  subroutine copy(self, other)
+    class(kernel_cache_t), intent(inout) :: self
+    type(kernel_cache_t), intent(in) :: other
+
+    call free(self)
+    self%held = 0
+    self%bound = other%bound
+  end subroutine copy
 
   !> Spectra that a problem uses stay until it is gone.
   subroutine free(self)

@@ -15,6 +15,7 @@ module hc_direct_friction
     normal, along_x, force_control, displacement_control, loads_not_carried
   use hc_friction_law, only: linearize, on_cone
   use hc_friction_problem, only: friction_problem_t, friction_solver_t
+  use hc_driven_motions, only: overloads
   use hc_direct_contact, only: first_guess, exchange, patience
   use hc_direct_system, only: iterate_t, infinite, unloaded, solve_area
   implicit none
@@ -32,7 +33,7 @@ module hc_direct_friction
   real(wp), parameter :: first_share = 0.2_wp
   !> Sweeps after which it is halved, again and again.
   integer, parameter :: halving = 10
-  !> Times that a step may lose its hold before the loads count as not to be carried.
+  !> Times that a step may lose its hold.
   integer, parameter :: max_adrift = 6
   !> Traction, relative to its largest bound, that no step towards a solution leads to.
   real(wp), parameter :: beyond_reason = 5.0_wp
@@ -113,7 +114,6 @@ contains
       if (allocated(error)) return
       if (is_adrift(self%problem, it)) then
         adrift = adrift + 1
-        if (self%problem%overloads(target, sum(it%p))) adrift = max_adrift
         if (adrift < max_adrift .and. any(it%zone == slip)) then
           before%solves = it%solves
           it = before
@@ -124,11 +124,14 @@ contains
         end if
       end if
       call record(self, reference, target, tolerance, it, state, error)
-      if (allocated(error) .or. state%converged .or. adrift == max_adrift) exit
+      if (allocated(error) .or. state%converged) exit
+      if (adrift > 0 .or. sweep == max_sweeps) then
+        state%sliding = overloads(self%problem, target, state%pressure, state%residual_normal)
+        if (state%sliding .or. adrift == max_adrift) exit
+      end if
       if (mod(sweep, halving) == 0) share = 0.5_wp*share
       call classify(self%problem, share, it)
     end do
-    state%sliding = .not. state%converged .and. adrift > 1
     if (state%sliding) state%stopped = loads_not_carried
   end subroutine solve_step
 

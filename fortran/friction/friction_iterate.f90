@@ -6,7 +6,7 @@
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
   use hc_friction_rows, only: residual_row, cone_row
@@ -24,23 +24,30 @@ module hc_friction_iterate
   !> The first guess of a shear traction from nothing: this much less of the slip counts.
   real(wp), parameter :: cautious = 0.2_wp
 
+  !> What displacements that are carried along may be off, relative to the largest: rounding errors, of single
+  !> precision where GMRES puts its solution together.
+  real(wp), parameter :: rounding = 1.0e-6_wp
+
   !> Tractions and what they cause, as vectors over all nodes; two components one after the other.
   type :: iterate_t
     !> Pressure and the closing of the gap that it causes
     real(wp), allocatable :: p(:), w(:)
     !> Shear traction, and the tangential displacement that it causes together with the pressure
     real(wp), allocatable :: q(:), u(:)
-    !> Closing of the gap that the shear traction, cut to the cone, causes
+    !> Closing of the gap that the shear traction causes
     real(wp), allocatable :: closing(:)
+    !> It is that of the traction cut to the cone, as a staggered sweep leaves it; or it is part of `w`, and
+    !> `closing` is zero, as after a coupled sweep
+    logical :: cut = .false., joint = .false.
     !> Nodes in contact
     logical, allocatable :: contact(:)
     !> Approach, shifts and twist
     real(wp) :: motion(n_motion) = 0.0_wp
     real(wp) :: residual_normal = 1.0_wp, residual_tangential = 1.0_wp
-    !> No node sticks on its own, some were held so that a prescribed load can be carried
+    !> Too few nodes stick on their own, some were held so that a prescribed load can be carried
     logical :: held = .false.
-    !> The prescribed loads cannot be reached: no node resists a motion
-    logical :: sliding = .false.
+    !> Even so nothing resists a motion whose load is prescribed
+    logical :: adrift = .false.
 
     type(friction_problem_t), pointer :: problem => null()
     type(operators_t), pointer :: operators => null()
@@ -86,6 +93,8 @@ module hc_friction_iterate
     procedure :: find_residuals, find_tangential_residual
     !> Are all numbers numbers?
     procedure :: is_finite
+    !> Are displacements those of the tractions?
+    procedure :: check_displacements
   end type iterate_t
 
 contains
@@ -169,6 +178,8 @@ contains
 
     n = size(self%p)
     n_threads = self%operators%n_threads
+    self%cut = .false.
+    self%joint = .false.
     allocate (moved(3*n))
     if (self%dragging .and. .not. (self%cold .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
@@ -326,6 +337,50 @@ contains
     end do
     !$omp end parallel do
   end function is_finite
+
+  !> Fail where `w`, `closing` and `u` are not what the tractions cause: every step of the algorithm has to
+  !> leave them so. The products are not counted.
+  subroutine check_displacements(self, error)
+    class(iterate_t), intent(inout) :: self
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: applications
+    real(wp), allocatable :: q(:), moved(:), dragged(:), w(:), u(:), closing(:)
+
+    associate (n => size(self%p))
+      allocate (moved(3*n), dragged(3*n), source=0.0_wp)
+      applications = self%operators%flexibility%applications
+      call self%operators%apply([normal], self%p, [normal, along_x, along_y], dragged, error)
+      if (allocated(error)) return
+      if (.not. self%dragging) dragged(n + 1:) = 0.0_wp
+      call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
+      if (allocated(error)) return
+      u = dragged(n + 1:) + moved(n + 1:)
+      if (self%cut) then
+        call self%cut_to_cone(q)
+        call self%operators%apply([along_x, along_y], q, [normal], moved(:n), error)
+        if (allocated(error)) return
+      end if
+      if (.not. self%pressing) moved(:n) = 0.0_wp
+      w = dragged(:n) + merge(moved(:n), 0.0_wp, self%joint)
+      closing = merge(0.0_wp, moved(:n), self%joint)
+      self%operators%flexibility%applications = applications
+      if (.not. (agree(self%w, w, maxval(abs(w))) .and. &
+                 agree(self%closing, closing, maxval(abs(w))) .and. &
+                 (agree(self%u, u, maxval(abs(u))) .or. .not. self%problem%friction%resists()))) then
+        call raise(error, status%no_convergence, 'friction: displacements are not those of the tractions')
+      end if
+    end associate
+  end subroutine check_displacements
+
+  !> Do two fields agree but for rounding errors?
+  pure logical function agree(one, other, scale)
+    real(wp), intent(in) :: one(:), other(:)
+    !> Size of what they belong to
+    real(wp), intent(in) :: scale
+
+    agree = all(abs(one - other) <= rounding*scale)
+  end function agree
 
   !> R_n of a gap under the present pressure.
   real(wp) function gap_residual(self, gap)

@@ -4,10 +4,12 @@
 !> and where that is not enough both together (friction_newton).
 module hc_friction_level
   use hc_precision, only: wp
+  use hc_build_options, only: debug_checks
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, along_x, force_control, &
-    sweeps_used_up, no_progress, loads_not_carried, out_of_range
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, sweeps_used_up, &
+    no_progress, loads_not_carried, out_of_range
   use hc_friction_problem, only: friction_problem_t
+  use hc_driven_motions, only: overloads
   use hc_friction_operators, only: operators_t
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_friction_sweep, only: staggered_sweep
@@ -18,7 +20,7 @@ module hc_friction_level
 
   public :: solve_level
 
-  !> Sweeps without a node that sticks on its own, after which a load counts as not carried.
+  !> Sweeps in which nodes had to be held, after which no more are made.
   integer, parameter :: max_held = 12
   !> Sweeps after which tractions that do not settle one after the other are found together, unless they act on
   !> each other so strongly that it is done sooner: once residuals are near, or a few sweeps later all the same.
@@ -29,7 +31,7 @@ contains
   !> Sweeps on one lattice.
   subroutine solve_level(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
     !> The problem
-    type(friction_problem_t), intent(in) :: problem
+    type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners
     type(operators_t), intent(inout), target :: operators
     !> State to start from
@@ -75,13 +77,16 @@ contains
       if (failed) call staggered_sweep(now, error)
       if (allocated(error)) return
       if (.not. now%is_finite()) exit
-      if (now%held) held = held + 1
+      if (debug_checks) call now%check_displacements(error)
+      if (allocated(error)) return
       if (now%held) then
-        if (problem%overloads(target, sum(now%p))) held = max_held
+        held = held + 1
+        state%sliding = overloads(problem, target, reshape(now%p, problem%lattice%extent), now%residual_normal)
+        if (state%sliding) held = max_held
       end if
       state%sweeps = sweep
       if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
-          .and. .not. now%sliding .and. held < max_held) cycle
+          .and. .not. now%adrift .and. held < max_held) cycle
 
       ! what is recorded fulfils the bounds exactly, and is judged by a product of its own
       call record(now, state)
@@ -89,12 +94,14 @@ contains
       call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
       if (allocated(error)) return
       call problem%conclude(target, tolerance, reference, displacement, state)
-      if (state%converged .or. now%sliding .or. held >= max_held) exit
+      if (state%converged .or. now%adrift .or. held >= max_held) exit
       call now%refresh(error)
       if (allocated(error)) return
     end do
-    state%sliding = .not. state%converged .and. any(target%control(along_x:) == force_control) .and. &
-                    (now%sliding .or. held > 1)
+    if (.not. (state%converged .or. state%sliding)) then
+      state%sliding = overloads(problem, target, state%pressure, state%residual_normal)
+    end if
+    state%sliding = state%sliding .and. .not. state%converged
     state%operator_applications = operators%work()
     if (state%converged) return
     state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)

@@ -128,9 +128,10 @@ contains
     now%p = x(:n)
     x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
     call now%shear%to_plane(x(n + 1:), now%q)
-    ! from here on w is that of all tractions together
     now%w = ax(:n)
     now%closing = 0.0_wp
+    now%cut = .false.
+    now%joint = .true.
     ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*x(n + 1:2*n)
     call now%shear%to_plane(ax(n + 1:), now%u)
     call now%find_residuals()

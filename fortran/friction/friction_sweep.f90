@@ -53,6 +53,9 @@ contains
     real(wp), allocatable :: q(:)
 
     now%outcome = solution_accurate
+    ! the pressure is found under the shear traction: what each of them causes has to be known
+    if (now%joint) call now%refresh(error)
+    if (allocated(error)) return
     call press(now, error)
     if (allocated(error)) return
     if (now%dragging .and. now%cold .and. now%first) then
@@ -67,6 +70,7 @@ contains
       call now%cut_to_cone(q)
       call now%operators%apply([along_x, along_y], q, [normal], now%closing, error)
       if (allocated(error)) return
+      now%cut = .true.
     end if
     call now%find_residuals()
     now%first = .false.
@@ -83,14 +87,16 @@ contains
     logical, allocatable :: contact(:)
     real(wp) :: goal, residual, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations, outcome
-    logical :: changed, independent
+    logical :: changed, independent, searching
 
     n = size(now%p)
+    ! a start that knows of no contact: the one without shear has to be found before stick and slip can be
+    searching = now%cold .and. now%first
     cell_area = now%problem%lattice%cell_area()
     n_constraint = merge(1, 0, now%target%control(normal) == force_control)
     allocate (constraint(n, n_constraint), rhs(n))
     level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
-    do area = 1, merge(max_areas, max_areas_alone, now%pressing)
+    do area = 1, merge(max_areas, max_areas_alone, now%pressing .and. .not. searching)
       call now%find_gap(gap)
       now%residual_normal = now%gap_residual(gap)
       missing = 0.0_wp
@@ -104,8 +110,10 @@ contains
         if (.not. changed) changed = count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if
+      if (searching .and. now%pressing .and. .not. changed) return
 
       if (changed) call now%pressure%take(now%contact)
+      if (searching .and. now%pressing .and. allocated(now%lift)) deallocate (now%lift)
       !$omp parallel do schedule(static) num_threads(now%pressure%n_threads)
       do i = 1, n
         if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))
@@ -185,17 +193,22 @@ contains
         if (allocated(error)) return
         now%outcome = max(now%outcome, outcome)
       end if
-      now%sliding = .not. independent
-      if (size(missing) == 0 .or. holding .or. any(active(n + 1:))) exit
+      now%adrift = .not. independent
+      if (size(missing) == 0 .or. holding) exit
       ! where all nodes slip, only their directions resist a load: not beyond reason
       if (independent) then
+        if (any(active(n + 1:))) exit
         if (maxval(abs(x(:n))) <= beyond_reason*now%traction_scale()) exit
       end if
       holding = .true.
       now%caution = max(cautious*now%caution, least_caution)
       now%q = q
     end do
-    if (now%sliding) return
+    if (now%adrift) then
+      now%q = q
+      call now%refresh(error)
+      return
+    end if
     motion = now%motion
     call driven%set_motions(multiplier, now%motion)
     call now%shear%to_plane(x, now%q)

@@ -54,7 +54,7 @@ contains
     logical, allocatable, intent(out) :: active(:)
     integer, allocatable :: zone(:)
     real(wp) :: ds(now%problem%lattice%extent(1), 2), r, bound, largest, across, e(2)
-    integer :: n, n_stick, row, col, i
+    integer :: n, row, col, i
 
     n = size(now%p)
     allocate (zone(n), active(2*n))
@@ -62,8 +62,7 @@ contains
     if (now%first .and. .not. any(abs(now%q) > 0.0_wp)) r = cautious*r
     associate (friction => now%problem%friction)
       largest = friction%bound(maximum(now%p, now%operators%n_threads))
-      n_stick = 0
-      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(ds, col, i) reduction(+: n_stick)
+      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(ds, col, i)
       do row = 1, now%problem%lattice%extent(2)
         call now%slip_row(row, ds(:, 1), ds(:, 2))
         do col = 1, size(ds, 1)
@@ -71,7 +70,6 @@ contains
           if (now%contact(i)) then
             call linearize([now%q(i), now%q(n + i)], ds(col, :), friction%bound(now%p(i)), largest, r, zone(i), &
                            now%shear%direction(:, i), now%shear%compliance(i))
-            if (zone(i) == stick) n_stick = n_stick + 1
           else
             zone(i) = separated
             now%q([i, n + i]) = 0.0_wp
@@ -81,7 +79,7 @@ contains
         end do
       end do
       !$omp end parallel do
-      now%held = holding .and. n_stick == 0
+      now%held = holding
       if (now%held) call hold(now%shear%compliance, zone)
 
       !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(bound, across, e)

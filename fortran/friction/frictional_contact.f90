@@ -147,7 +147,7 @@ contains
     type(contact_state_t) :: guess
     real(wp) :: work
     integer :: sweeps
-    logical :: predicted
+    logical :: guessed
 
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
@@ -155,27 +155,44 @@ contains
     end if
     work = 0.0_wp
     call take_tractions(start, guess, self%problem%n_threads)
-    predicted = .false.
+    guessed = .false.
     if (size(self%operators) > 1) then
       if (any(start%pressure > 0.0_wp)) then
-        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, predicted, work, error)
+        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, guessed, work, error)
       else
         call coarse_guess(self, reference, target, max_sweeps, guess, work, error)
+        guessed = .not. allocated(error)
+        if (guessed) guessed = any(guess%pressure > 0.0_wp)
       end if
       if (allocated(error)) return
     end if
-    call solve_level(self%problem, self%operators(1), guess, reference, target, tolerance, max_sweeps, state, error)
+    sweeps = 0
+    call attempt(guess)
     if (allocated(error)) return
-    work = work + state%operator_applications
-    if (predicted .and. .not. (state%converged .or. state%sliding)) then
-      ! the prediction led astray: the old state is a start as good
-      sweeps = state%sweeps
-      call solve_level(self%problem, self%operators(1), start, reference, target, tolerance, max_sweeps, state, error)
+    ! what coarse lattices found may lead astray: the old state is a start as good
+    if (guessed .and. .not. (state%converged .or. state%sliding)) call attempt(start)
+    if (allocated(error)) return
+    ! a first step has no state to fall back on: it goes on from where it stands
+    if (.not. (state%converged .or. state%sliding .or. any(start%pressure > 0.0_wp))) then
+      call take_tractions(state, guess, self%problem%n_threads)
+      call attempt(guess)
       if (allocated(error)) return
-      state%sweeps = state%sweeps + sweeps
-      work = work + state%operator_applications
     end if
+    state%sweeps = sweeps
     state%operator_applications = work
+
+  contains
+
+    !> Solve on the finest lattice, and count what it takes.
+    subroutine attempt(from)
+      !> State to start from
+      type(contact_state_t), intent(in) :: from
+
+      call solve_level(self%problem, self%operators(1), from, reference, target, tolerance, max_sweeps, state, error)
+      sweeps = sweeps + state%sweeps
+      work = work + state%operator_applications
+    end subroutine attempt
+
   end subroutine solve_step
 
   !> A first guess from the coarser lattices.
@@ -217,6 +234,8 @@ contains
                          coarser, error)
         if (allocated(error)) return
         work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()
+        ! what is no solution is no start
+        if (.not. coarser%converged) deallocate (coarser%pressure)
       end associate
     end do
     if (allocated(coarser%pressure)) call prolong_state(self%coarse(2), coarser, self%problem, guess)

@@ -149,13 +149,17 @@ contains
     real(wp), intent(out), contiguous :: traction(:, :, :)
     !> Continuation beyond the nodes where displacements are given
     type(edge_extension_t), intent(in), optional :: edge
+    real(sp), allocatable :: given(:, :, :), wanted(:, :, :)
     integer :: row, m
 
-    if (.not. allocated(self%given)) then
-      allocate (self%given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
-      allocate (self%wanted, mold=self%given)
+    ! out of `self`, which the product changes
+    call move_alloc(self%given, given)
+    call move_alloc(self%wanted, wanted)
+    if (.not. allocated(given)) then
+      allocate (given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
+      allocate (wanted, mold=given)
     end if
-    associate (n_threads => self%convolution%n_threads, given => self%given, wanted => self%wanted)
+    associate (n_threads => self%convolution%n_threads)
       !$omp parallel do collapse(2) schedule(static) num_threads(n_threads)
       do m = 1, size(given, 3)
         do row = 1, size(given, 2)
@@ -172,6 +176,8 @@ contains
       end do
       !$omp end parallel do
     end associate
+    call move_alloc(given, self%given)
+    call move_alloc(wanted, self%wanted)
   end subroutine apply
 
   subroutine apply_single(self, displacement, traction, edge, on_springs)

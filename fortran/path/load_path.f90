@@ -104,6 +104,8 @@ contains
       else
         ! where an attempt that failed has pressure means nothing
         next%clipped = .false.
+        ! no path leads to loads that full sliding does not carry
+        if (next%sliding .and. done + part >= 1.0_wp) exit
         if (cuts >= max_cuts) then
           ! where smaller loads are no starts that help, they are a path, unless the load cannot be carried anyway
           if (static .or. .not. at_once .or. max_cuts == 0 .or. next%sliding) exit

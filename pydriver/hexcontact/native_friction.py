@@ -92,7 +92,7 @@ class ContactState:
     converged : bool
         All residuals are within the tolerance, in each part of a step that was halved.
     sliding : bool
-        No node sticks, and the tangential load cannot be carried.
+        The tangential loads are more than full sliding carries.
     touches_rim : bool
         There is contact at the rim of the window, at the end of the step or of a part of it.
     stopped : str

@@ -130,15 +130,13 @@ def _sliding(
     shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
     bound = case.friction_coefficient * values[0] if z else math.nan
     seen = bool(getattr(solution, "sliding", False))
-    # below the bound a force alone always finds a balance, whatever an attempt that failed looks like
     doubtful = bool(torque or shear > _NEAR_SLIDING * bound or (shear and not z))
-    if not case.frictional or not ((seen and doubtful) or (shear and shear >= _SLIDING * bound)):
+    if not case.frictional or not (seen or (shear and shear >= _SLIDING * bound)):
         return doubtful and math.isfinite(case.friction_coefficient), ""
     wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})" if z else ""
-    none_sticks = "no sticking node is left and " * seen
-    return True, f"{none_sticks}friction cannot carry the {listed(wanted, 'and the')}{known}"
+    return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}"
 
 
 def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:

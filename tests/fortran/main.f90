@@ -17,6 +17,7 @@ program tester
   use test_normal_contact, only: collect_normal_contact
   use test_friction, only: collect_friction
   use test_friction_predictor, only: collect_friction_predictor
+  use test_friction_sweeps, only: collect_friction_sweeps
   use test_load_path, only: collect_load_path
   use test_direct_friction, only: collect_direct_friction
   implicit none
@@ -38,6 +39,7 @@ program tester
     new_suite('normal_contact', collect_normal_contact), &
     new_suite('friction', collect_friction), &
     new_suite('friction_predictor', collect_friction_predictor), &
+    new_suite('friction_sweeps', collect_friction_sweeps), &
     new_suite('load_path', collect_load_path), &
     new_suite('direct_friction', collect_direct_friction) &
   ]

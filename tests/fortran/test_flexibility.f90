@@ -51,6 +51,7 @@ contains
       new_test('threads', test_threads), &
       new_test('nothing_left_behind', test_nothing_left_behind), &
       new_test('shared_spectra', test_shared_spectra), &
+      new_test('copies', test_copies), &
       new_test('wrong_shapes', test_wrong_shapes), &
       new_test('self_compliance', test_self_compliance), &
       new_test('symbol', test_symbol), &
@@ -314,10 +315,48 @@ contains
     call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'three threads')
   end subroutine test_threads
 
+  !> Copies of operators, and of what holds them, go without taking anything with them; nothing is freed twice.
+  subroutine test_copies(error)
+    type(error_t), allocatable, intent(out) :: error
+    type :: holder_t
+      type(fft_flexibility_t) :: flexibility
+      type(fft_flexibility_t), allocatable :: others(:)
+    end type holder_t
+    type(holder_t) :: first
+    type(holder_t), allocatable :: second, third(:)
+    type(lattice_t) :: lattice
+    real(wp) :: traction(23, 21, 3), u(23, 21, 3), v(23, 21, 3)
+    type(elastic_pair_t), parameter :: pair = elastic_pair_t(3.0_wp, 0.6_wp, 1.5_wp)
+    integer :: i
+
+    call new_lattice(lattice, equilateral_basis(0.7_wp), [0, 0], [23, 21], error)
+    if (allocated(error)) return
+    allocate (first%others(2), second, third(2))
+    call new_fft_flexibility(first%flexibility, lattice, pair, error)
+    if (allocated(error)) return
+    call new_fft_flexibility(first%others(2), lattice, pair, error)
+    if (allocated(error)) return
+    traction = reshape([(sin(1.3_wp*i), i=1, size(traction))], shape(traction))
+    second = first
+    third(1) = second
+    third(2) = first
+    call third(1)%others(2)%apply(all_components, traction, all_components, u, error)
+    if (allocated(error)) return
+    deallocate (second, third)
+    do i = 1, 2
+      if (i == 1) call first%flexibility%apply(all_components, traction, all_components, v, error)
+      if (i == 2) call first%others(2)%apply(all_components, traction, all_components, v, error)
+      if (allocated(error)) return
+      call check(error, reshape(v, [size(v)]), reshape(u, [size(u)]), 0.0_wp, 'the operator that was copied')
+      if (allocated(error)) return
+    end do
+  end subroutine test_copies
+
   !> Operators of one window share their spectra, on any spacing; with a cache they give the same bits as without.
   subroutine test_shared_spectra(error)
     type(error_t), allocatable, intent(out) :: error
     type(kernel_cache_t), pointer :: cache
+    type(kernel_cache_t) :: other
     type(lattice_t) :: lattice, finer, oblique
     type(fft_flexibility_t) :: alone, shared(5)
     real(wp) :: traction(23, 21, 3), u(23, 21, 3), v(23, 21, 3), basis(2, 2)
@@ -351,6 +390,9 @@ contains
     call new_fft_flexibility(shared(5), lattice, pair, error, normal_only=.true., cache=cache)
     if (allocated(error)) return
     call check_true(error, cache%found == 2 .and. cache%missed == 3, 'another lattice, other components')
+    if (allocated(error)) return
+    other = cache
+    call check_true(error, other%bound == cache%bound .and. other%held == 0, 'a copy of a cache begins empty')
     if (allocated(error)) return
     ! what is in use stays when the cache goes
     deallocate (cache)

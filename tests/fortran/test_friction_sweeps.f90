@@ -1,0 +1,165 @@
+!> What every step of the algorithm with friction leaves behind, and what full sliding carries.
+module test_friction_sweeps
+  use hc_precision, only: wp, pi
+  use hc_error, only: error_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
+  use hc_friction_law, only: coulomb_t
+  use hc_friction_operators, only: operators_t, new_operators
+  use hc_friction_iterate, only: iterate_t
+  use hc_friction_sweep, only: staggered_sweep
+  use hc_friction_newton, only: coupled_sweep
+  use hc_driven_motions, only: overloads
+  use hc_frictional_contact, only: frictional_contact_t
+  use test_friction, only: new_sphere
+  use testing, only: test_t, new_test, check_true
+  implicit none
+  private
+
+  public :: collect_friction_sweeps
+
+  integer, parameter :: f = force_control, d = displacement_control
+  !> Loads of a contact of radius one
+  real(wp), parameter :: load = 4.0_wp/3.0_wp
+
+contains
+
+  subroutine collect_friction_sweeps(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('any_order', test_any_order), &
+      new_test('load_factor', test_load_factor), &
+      new_test('load_factor_of_shifts', test_load_factor_of_shifts) &
+    ]
+  end subroutine collect_friction_sweeps
+
+  !> Displacements are those of the tractions after each sweep, whichever came before.
+  subroutine test_any_order(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(operators_t) :: operators
+    type(contact_state_t) :: state
+    type(iterate_t) :: now
+    real(wp) :: before
+    integer :: sweep
+    logical :: failed
+    character(len=*), parameter :: order = 'sscsccss'
+
+    call new_sphere(contact, 10, 0.0_wp, 0.5_wp, coulomb_t(1.0_wp), error, n_threads=1)
+    if (allocated(error)) return
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, error, n_threads=1)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call now%begin(contact%problem, operators, state, state%relative_displacement, &
+                   load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+    if (allocated(error)) return
+    before = huge(1.0_wp)
+    do sweep = 1, len(order)
+      if (order(sweep:sweep) == 'c') then
+        call coupled_sweep(now, failed, error)
+      else
+        call staggered_sweep(now, error)
+      end if
+      if (allocated(error)) return
+      call now%check_displacements(error)
+      if (allocated(error)) return
+      call check_true(error, 0.2_wp*now%residual_normal < before, 'the residual of the pressure stays low')
+      if (allocated(error)) return
+      before = now%residual_normal
+    end do
+    ! products that nobody made are found out
+    now%w = now%w*(1.0_wp + 1.0e-5_wp)
+    call now%check_displacements(error)
+    failed = allocated(error)
+    if (failed) deallocate (error)
+    call check_true(error, failed, 'displacements of other tractions')
+  end subroutine test_any_order
+
+  !> Shift and torque on Hertz' pressure: too much by a thousandth, and not quite.
+  !>
+  !> The motion that the least load drives is a rotation about some point of the axis across the shift; all of them
+  !> are tried. Full sliding carries the torque 3 pi/16 mu P a.
+  subroutine test_load_factor(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    real(wp), allocatable :: pressure(:, :)
+    real(wp), parameter :: mu = 0.3_wp, shares(5) = [0.0_wp, 0.1_wp, 0.5_wp, 2.0_wp, 100.0_wp]
+    real(wp) :: force, torque, factor, least
+    integer :: i, k
+
+    call new_sphere(contact, 20, 0.0_wp, 0.0_wp, coulomb_t(mu), error, n_threads=1)
+    if (allocated(error)) return
+    associate (x => contact%problem%x, y => contact%problem%y, cell => contact%problem%lattice%cell_area())
+      pressure = sqrt(max(1.0_wp - x**2 - y**2, 0.0_wp))
+      pressure = pressure*load/(cell*sum(pressure))
+      do i = 1, size(shares)
+        force = shares(i)*mu*load
+        torque = mu*load
+        least = mu*load/max(force, 1.0e-9_wp)
+        do k = 0, 20000
+          associate (away => -10.0_wp + 0.001_wp*k)
+            factor = mu*cell*sum(pressure*sqrt(x**2 + (y - away)**2))/max(torque + away*force, 1.0e-9_wp)
+          end associate
+          least = min(least, factor)
+        end do
+        if (i == 1) call check_true(error, abs(least - 3.0_wp*pi/16.0_wp) < 1.0e-3_wp, 'torque alone')
+        if (allocated(error)) return
+        call check_true(error, said(0.999_wp*least, 0.0_wp) .eqv. .false., 'not quite too much')
+        if (allocated(error)) return
+        call check_true(error, said(1.001_wp*least, 0.0_wp), 'too much')
+        if (allocated(error)) return
+        call check_true(error, said(1.05_wp*least, 0.04_wp) .and. .not. said(1.05_wp*least, 0.06_wp) .and. &
+                        .not. said(1.5_wp*least, 0.5_wp), 'by more than the error of the pressure')
+        if (allocated(error)) return
+      end do
+    end associate
+
+  contains
+
+    logical function said(share, residual)
+      real(wp), intent(in) :: share, residual
+
+      said = overloads(contact%problem, load_target_t([f, f, f, f], [load, share*force, 0.0_wp, share*torque]), pressure, &
+                       residual)
+    end function said
+
+  end subroutine test_load_factor
+
+  !> Without a torque mu P is all that counts, wherever the pressure is; without friction nothing is carried.
+  subroutine test_load_factor_of_shifts(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    real(wp), parameter :: mu = 0.3_wp
+    integer, parameter :: held(4) = [f, f, f, d], along(4) = [f, f, d, d], none(4) = [f, d, d, d]
+
+    call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(mu), error, n_threads=1)
+    if (allocated(error)) return
+    associate (problem => contact%problem, pressure => 1.0_wp + contact%problem%x)
+      call check_true(error, overloads(problem, target(held, 0.61_wp, 0.8_wp), pressure, 1.0_wp) .and. &
+                      .not. overloads(problem, target(held, 0.59_wp, 0.8_wp), pressure, 0.0_wp) .and. &
+                      .not. overloads(problem, target(along, 0.99_wp, 5.0_wp), pressure, 0.0_wp) .and. &
+                      overloads(problem, target(along, 1.01_wp, 0.0_wp), pressure, 1.0_wp) .and. &
+                      .not. overloads(problem, target(none, 1.1_wp, 1.1_wp), pressure, 0.0_wp), 'mu P')
+      if (allocated(error)) return
+      problem%friction = coulomb_t(0.0_wp)
+      call check_true(error, overloads(problem, target(held, 1.0e-9_wp, 0.0_wp), pressure, 0.0_wp) .and. &
+                      .not. overloads(problem, target(held, 0.0_wp, 0.0_wp), pressure, 0.0_wp), 'no friction')
+      if (allocated(error)) return
+      problem%friction = coulomb_t(no_slip=.true.)
+      call check_true(error, .not. overloads(problem, target(held, 100.0_wp, 0.0_wp), pressure, 0.0_wp), 'no slip')
+    end associate
+
+  contains
+
+    !> Loads along x and y as shares of mu P.
+    type(load_target_t) function target(control, share_x, share_y)
+      integer, intent(in) :: control(4)
+      real(wp), intent(in) :: share_x, share_y
+
+      target = load_target_t(control, [load, share_x*mu*load, share_y*mu*load, 0.0_wp])
+    end function target
+
+  end subroutine test_load_factor_of_shifts
+
+end module test_friction_sweeps

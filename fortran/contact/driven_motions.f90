@@ -6,7 +6,7 @@
 !> known too: a contact far from the origin would not tell a twist from a shift.
 module hc_driven_motions
   use hc_precision, only: wp, pi
-  use hc_lapack, only: dgesv
+  use hc_lapack, only: eliminate
   use hc_contact_state, only: load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_friction_problem, only: friction_problem_t
   implicit none
@@ -172,7 +172,7 @@ contains
   !> with u the displacement of any motion that they drive (upper bound of limit analysis). For shifts alone the
   !> least is mu P/|Q|. With a torque, or without a prescribed P, it depends on the pressure: a gap that makes the
   !> residual R_n moves it by that share of its largest value where it acts on single nodes, by less where it is smooth.
-  logical function overloads(problem, target, pressure, residual_normal)
+  pure logical function overloads(problem, target, pressure, residual_normal)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> Loads or motions to be reached
@@ -217,7 +217,7 @@ contains
   end function overloads
 
   !> Try the motion that nodes with springs of stiffness bound/length would make: what slips far resists the less.
-  subroutine lower(u, bound, load, length, factor)
+  pure subroutine lower(u, bound, load, length, factor)
     !> Displacements of unit motions (n, 2, motion)
     real(wp), intent(in) :: u(:, :, :)
     !> Largest traction of each node, and load of each motion over the cell area [Pa]
@@ -227,7 +227,7 @@ contains
     !> Least load factor so far
     real(wp), intent(inout) :: factor
     real(wp) :: stiffness(size(load), size(load)), motion(size(load), 1), moved(size(bound), 2)
-    integer :: i, k, info, pivot(size(load))
+    integer :: i, k
 
     do k = 1, size(load)
       do i = 1, size(load)
@@ -235,8 +235,8 @@ contains
       end do
     end do
     motion(:, 1) = load
-    call dgesv(size(load), 1, stiffness, size(load), pivot, motion, size(load), info)
-    if (info /= 0) return
+    ! any motion gives an upper bound, also what is left of a singular matrix
+    call eliminate(stiffness, motion)
     associate (work => dot_product(load, motion(:, 1)))
       if (.not. work > 0.0_wp) return
       motion = motion/work

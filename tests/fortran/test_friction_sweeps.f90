@@ -117,7 +117,7 @@ contains
 
   contains
 
-    logical function said(share, residual)
+    pure logical function said(share, residual)
       real(wp), intent(in) :: share, residual
 
       said = overloads(contact%problem, load_target_t([f, f, f, f], [load, share*force, 0.0_wp, share*torque]), pressure, &

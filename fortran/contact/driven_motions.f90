@@ -172,7 +172,7 @@ contains
   !> with u the displacement of any motion that they drive (upper bound of limit analysis). For shifts alone the
   !> least is mu P/|Q|. With a torque, or without a prescribed P, it depends on the pressure: a gap that makes the
   !> residual R_n moves it by that share of its largest value where it acts on single nodes, by less where it is smooth.
-  pure logical function overloads(problem, target, pressure, residual_normal)
+  logical function overloads(problem, target, pressure, residual_normal)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> Loads or motions to be reached

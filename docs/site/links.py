@@ -63,6 +63,7 @@ def faults_of(path: Path, tag: str, address: str) -> list[str]:
         target /= "index.html"
     if not target.exists():
         return [f"{address} is not there"]
-    if parts.fragment and target.suffix == ".html" and unquote(parts.fragment) not in page_of(target).anchors:
+    written = {parts.fragment, unquote(parts.fragment)}  # as browsers look for it
+    if parts.fragment and target.suffix == ".html" and not written & page_of(target).anchors:
         return [f"{address}: no such place in the page"]
     return []

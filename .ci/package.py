@@ -33,7 +33,7 @@ SESSION = [  # words of the command, and a file that it leaves
     (["report", "sphere.nc"], "sphere.html"),
     (["new", "fretting", "-o", "fretting.toml"], "fretting.toml"),
     (["run", "fretting.toml", "--quiet"], "fretting.nc"),
-    (["verify", "kernels", "materials", "table-9.2"], None),
+    (["verify", "spheres", "shear"], None),
 ]
 
 

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import DeckError
-from .lock import LONGEST, holder_of
 from .netcdf import reading
 from .record import SUFFIX, begins_like_record, fault_of_sequence, read_record
 from .result import Metadata, Result, Step, assemble
@@ -107,13 +106,6 @@ class Journal:
         """Delete why the steps are not all, and what an interrupted write left."""
         for path in Journal(self.folder)._besides:
             path.unlink(missing_ok=True)
-
-
-def names_a_run(lock: Path) -> bool:
-    """Tell whether a run has written this lock, or made it: it is blank for a moment."""
-    with contextlib.suppress(OSError), lock.open("rb") as file:
-        return holder_of(file.read(LONGEST + 1)) is not None
-    return False
 
 
 def _is_temporary(name: str, folder: Path) -> bool:

@@ -17,7 +17,7 @@ from typing import Any
 from .errors import DeckError
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
-LONGEST = 1000  # bytes of a lock
+_LONGEST = 1000  # bytes of a lock
 
 
 class Lock:
@@ -83,7 +83,7 @@ class Lock:
 
     def _holder(self) -> dict[str, Any] | None:
         """Return who has written the lock, nobody if it is blank; None if it is no lock."""
-        return holder_of(os.pread(self._descriptor, LONGEST + 1, 0))
+        return holder_of(os.pread(self._descriptor, _LONGEST + 1, 0))
 
     def release(self) -> None:
         """Let go of the lock; a file that came in its place stays."""
@@ -99,7 +99,19 @@ def holder_of(text: bytes) -> dict[str, Any] | None:
     with contextlib.suppress(ValueError, RecursionError):
         holder = json.loads(text)
         return holder if isinstance(holder, dict) and holder.keys() >= {"process", "host"} else None
-    return {} if text.startswith(b'{"process": ') and len(text) <= LONGEST else None
+    return {} if text.startswith(b'{"process": ') and len(text) <= _LONGEST else None
+
+
+def names_a_run(path: Path) -> bool:
+    """Tell whether a run has written this lock, or made it: it is blank for a moment."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)  # a pipe would block
+        try:
+            regular = stat.S_ISREG(os.fstat(descriptor).st_mode)
+            return regular and holder_of(os.pread(descriptor, _LONGEST + 1, 0)) is not None
+        finally:
+            os.close(descriptor)
+    return False
 
 
 def _opened(path: Path) -> int:

@@ -18,7 +18,7 @@ module hc_flexibility
   implicit none
   private
 
-  public :: flexibility_t, check_operator, normal, along_x, along_y
+  public :: flexibility_t, check_operator, most_threads, normal, along_x, along_y
   public :: n_block, first_odd_block, blocks, block_index
 
   !> Components of a traction and of a relative displacement.

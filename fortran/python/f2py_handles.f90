@@ -10,7 +10,7 @@ module hc_f2py_handles
   use hc_lock, only: lock, unlock, handle_table
   use hc_memory, only: require_memory
   use hc_lattice, only: lattice_t
-  use hc_flexibility, only: flexibility_t
+  use hc_flexibility, only: flexibility_t, most_threads
   use hc_convolution, only: threads_for
   use hc_normal_contact, only: normal_contact_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -108,6 +108,8 @@ contains
     integer(c_int), intent(in) :: n_threads
     type(error_t), allocatable, intent(out) :: error
 
+    ! such a number is refused by what is set up next
+    if (n_threads < 0 .or. n_threads > most_threads) return
     slot%n_threads = threads_for(slot%lattice%extent, n_threads)
     ! a fifth at least, mostly a quarter, are operators and fields that are there from the beginning on
     slot%working = 4*bytes/5

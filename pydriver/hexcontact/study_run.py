@@ -81,6 +81,8 @@ def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> 
         with contextlib.ExitStack() as stack:
             restart = _interrupted(job, case, stack)
             if restart is None:
+                if own.is_file():  # damaged, or of another case, under a name that the index gave to this one
+                    own.unlink()
                 store = stack.enter_context(Store(own, metadata_of(case), overwrite=True))
                 began = True
                 before: Sequence[Step] = ()

@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import inspect
 import io
 import json
 import re
@@ -10,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import click
 import typer
 
 CLEAN = {0, 2, 3, 4}  # exit codes of the documentation: done, input, no convergence, resources
@@ -52,6 +54,8 @@ def ending(command: Callable[..., Any], **options: Any) -> Ending:
     out, error, code = io.StringIO(), io.StringIO(), 0
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), time_limit():
         try:
+            if "context" in inspect.signature(command).parameters:
+                options["context"] = click.Context(click.Command("fuzz"))
             command(**options)
         except typer.Exit as exit_:
             code = exit_.exit_code

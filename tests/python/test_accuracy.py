@@ -204,9 +204,10 @@ def test_what_is_refused(keys: dict[str, Any], message: str) -> None:
 
 
 def test_gap_of_an_array_cannot_be_refined() -> None:
-    gap = made().initial_gap(made().lattice)[0]
+    lattice = made().lattice
+    gap = made().initial_gap(lattice)[0]
     with pytest.raises(DeckError, match="not an array over nodes"):
-        Case(body_1=STEEL, body_2=STEEL, gap=gap, spacing=1e-5, normal_load=1.0, accuracy=0.1)
+        Case(body_1=STEEL, body_2=STEEL, gap=gap, lattice=lattice, normal_load=1.0, accuracy=0.1)
 
 
 @pytest.mark.parametrize(

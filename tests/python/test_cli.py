@@ -145,7 +145,10 @@ def test_an_existing_output_needs_overwrite(deck: Path) -> None:
     out = deck.with_suffix(".nc")
     out.write_text("CDF\x01precious")
     refused(inside(deck.parent, "run", "sphere.toml"), 2, r"sphere\.nc exists already; --overwrite")
+    foreign = r"sphere\.nc is not a result of hexcontact"
+    refused(inside(deck.parent, "run", "sphere.toml", "--overwrite"), 2, foreign)
     assert out.read_text() == "CDF\x01precious"
+    out.write_text("")
     assert inside(deck.parent, "run", "sphere.toml", "--overwrite", "-q").returncode == 0
     assert len(open_result(out)) == 2
 
@@ -447,7 +450,7 @@ def test_overwrite_replaces_results_only(deck: Path) -> None:
     before = deck.read_text()
     done = hexcontact_(deck.parent, "run", "sphere.toml", "--output", "sphere.toml", "--overwrite")
     assert (done.returncode, deck.read_text()) == (2, before)
-    assert "sphere.toml is not a netCDF file" in done.stderr
+    assert "sphere.toml is not a result of hexcontact" in done.stderr
     done = hexcontact_(deck.parent, "run", "sphere.toml", "--output", "a.png", "--plot")
     assert done.returncode == 2
     assert "output a.png: expected a netCDF file, such as a.nc" in done.stderr

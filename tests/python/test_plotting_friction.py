@@ -27,9 +27,9 @@ from hexcontact.analytic import shear as closed_forms
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
 from hexcontact.analytic.shear import ClosedForms
 from hexcontact.lattice import Lattice
-from hexcontact.plotting import zones as plotting_zones
-from hexcontact.plotting.compliance import initial_compliance
-from hexcontact.plotting.history import panels_of
+from hexcontact.plotting import zone_maps
+from hexcontact.plotting.compliance_curve import initial_compliance
+from hexcontact.plotting.histories import panels_of
 from hexcontact.plotting.style import SLIP, STICK
 from hexcontact.result import Metadata, Step, assemble
 from hexcontact.step_view import StepView
@@ -489,7 +489,7 @@ BASIS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
 @settings(max_examples=60, deadline=None)
 @given(arrays.arrays(bool, arrays.array_shapes(min_dims=2, max_dims=2, max_side=9)))
 def test_outline_encloses_the_cells_of_the_zone(zone: np.ndarray) -> None:
-    polygons = plotting_zones.cell_outline(zone, BASIS, (3.0, -2.0))
+    polygons = zone_maps.cell_outline(zone, BASIS, (3.0, -2.0))
     assert area(polygons) == pytest.approx(zone.sum() * np.sqrt(0.75), abs=1e-9)
     for polygon in polygons:
         assert polygon[0] == pytest.approx(polygon[-1])

@@ -29,7 +29,7 @@ WIDTH = "88"
 NAME = re.compile(r"# (\w+\.(?:toml|py))\n")
 BLOCK = re.compile(r"^```(console|toml|python)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 PICTURE = re.compile(r"!\[[^\]]*\]\((images/\w+/(\w+\.png))\)")
-# What differs between runs: times, memory with all that a process has loaded, and the widths of their columns.
+# What differs between runs: times, memory of the process with its libraries, the widths of their columns.
 VOLATILE = re.compile(r"\b[\d.]+ (?:ms|µs|s|MB|GB)\b|(?<= started )\S+|─+|\s+")
 # Residuals within the tolerance are rounding errors of one machine or another.
 RESIDUAL = re.compile(r"\b\d\.\de[+-]\d\d\b")

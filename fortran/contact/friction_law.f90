@@ -81,10 +81,12 @@ contains
     real(wp), intent(out) :: direction(2)
     !> Compliance D across that direction [m/Pa]; 0 in stick
     real(wp), intent(out) :: compliance
-    real(wp) :: d(2), length
+    real(wp) :: d(2), length, least
 
     d = traction - r*slip_increment
     length = magnitude(d)
+    least = smallest_bound*largest_bound
+    if (least <= 0.0_wp) least = smallest_bound*length  ! no pressure at all
     if (length <= bound) then
       zone = stick
       direction = [1.0_wp, 0.0_wp]
@@ -92,7 +94,7 @@ contains
     else
       zone = slip
       direction = d/length
-      compliance = (length - bound)/(r*max(bound, smallest_bound*largest_bound))
+      compliance = (length - bound)/(r*max(bound, least))
     end if
   end subroutine linearize
 

@@ -10,6 +10,7 @@ module hc_f2py_api
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: along_x, along_y
+  use hc_convolution, only: threads_for
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
   use hc_contact_state, only: contact_state_t, normal
@@ -114,7 +115,7 @@ contains
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, [0, 0], extent, error)
     if (.not. allocated(error)) then
       bytes = dense_fields*product(int(extent, c_int64_t))
-      if (method /= direct) bytes = fft_memory(extent, .false., max(n_threads, 1)) + fft_setup_memory(extent)
+      if (method /= direct) bytes = fft_memory(extent, .false., threads_for(extent, n_threads)) + fft_setup_memory(extent)
       call secure(slot, bytes, n_threads, error)
     end if
     if (.not. allocated(error)) then
@@ -201,7 +202,7 @@ contains
     if (.not. allocated(error)) call check_size(slot, n_node, error)
     if (.not. allocated(error)) then
       bytes = dense_fields*product(int(extent, c_int64_t))
-      if (method /= direct) bytes = normal_contact_memory(extent, max(n_threads, 1))
+      if (method /= direct) bytes = normal_contact_memory(extent, threads_for(extent, n_threads))
       call secure(slot, bytes, n_threads, error)
     end if
     if (.not. allocated(error)) then

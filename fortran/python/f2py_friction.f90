@@ -13,6 +13,7 @@ module hc_f2py_friction
   use hc_friction_problem, only: friction_problem_t, new_friction_problem
   use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
+  use hc_convolution, only: threads_for
   use hc_flexibility_dense, only: dense_memory
   use hc_load_path, only: advance
   implicit none
@@ -103,7 +104,7 @@ contains
     if (.not. allocated(error)) then
       bytes = dense_fields*product(int(extent, c_int64_t))
       ! of the largest contact there can be, with all loads prescribed
-      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_motion, goodman == 0, max(n_threads, 1))
+      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_motion, goodman == 0, threads_for(extent, n_threads))
       call secure(slot, bytes, n_threads, error)
     end if
     if (.not. allocated(error)) then

@@ -38,6 +38,7 @@ S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
 _WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
+_LOADED = 3 * 2**20  # bytes of modules that a run imports on its way
 _LEFT = 0.7  # share of what solving takes that the system does not have back by then, as measured
 _COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
 _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
@@ -72,7 +73,7 @@ def memory_needed(case: Problem, lattice: Lattice) -> int:
     if bodies:
         # beside a solver with friction, whose vectors are gone by then, the set-up needs nothing more
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
-    return max(needed, int(_LEFT * needed) + _WRITING)
+    return _LOADED + max(needed, int(_LEFT * needed) + _WRITING)
 
 
 def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:

@@ -134,7 +134,7 @@ contains
       call check_true(error, norm2(guess%traction - after%traction) < 0.58_wp*norm2(state%traction - after%traction), &
                       'shear traction')
       if (allocated(error)) return
-      call check_true(error, norm2(guess%motion - after%motion) < 0.0073_wp*norm2(state%motion - after%motion), 'motions')
+      call check_true(error, norm2(guess%motion - after%motion) < 0.01_wp*norm2(state%motion - after%motion), 'motions')
       if (allocated(error)) return
       if (i > 1) cycle
       ! where the slip zone only grows

@@ -17,11 +17,15 @@ SPACING = 2e-6
 MB = 1_000_000
 
 
+KIND = sys.argv[1]
+half = 10 if KIND == "direct" else 40
+# before memory is short: numpy itself ends a process that has less than half a megabyte left
+lattice = Lattice(SPACING, -half, -half, 2 * half, 2 * half)
+gap = (lattice.x**2 + lattice.y**2) / (400 * SPACING)
+
+
 def attempt(kind: str) -> None:
     """Set a problem up and solve it twice."""
-    half = 10 if kind == "direct" else 40
-    lattice = Lattice(SPACING, -half, -half, 2 * half, 2 * half)
-    gap = (lattice.x**2 + lattice.y**2) / (400 * SPACING)
     approach = (0.7 * half * SPACING) ** 2 / (200 * SPACING)
     if kind == "normal":
         contact = NormalContact(lattice, PAIR, gap)
@@ -57,8 +61,8 @@ def limited(kind: str, spare: int) -> int:
 
 kernel_cache.configure(memory=0)
 np.linalg.norm(np.ones(3))
-step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB}[sys.argv[1]]
+step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB}[KIND]
 codes: list[int] = []
 while codes[-2:] != [0, 0] and len(codes) < 60:
-    codes.append(limited(sys.argv[1], step * len(codes)))
+    codes.append(limited(KIND, MB + step * len(codes)))
 print(*codes)

@@ -85,6 +85,14 @@ def test_every_file_of_the_package_is_installed() -> None:
     assert {path.relative_to(ROOT / "pydriver").as_posix() for path in sources} == set(listed)
 
 
+def test_every_quick_test_is_there() -> None:
+    listed = (ROOT / "tests/check.txt").read_text().split()
+    assert listed
+    for entry in listed:
+        file, _, name = entry.partition("::")
+        assert not name or f"def {name.partition('[')[0]}(" in (ROOT / file).read_text(), entry
+
+
 def test_links_between_pages_lead_somewhere() -> None:
     dead = []
     for page in PAGES:

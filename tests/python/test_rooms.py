@@ -19,14 +19,15 @@ Arrows = set[tuple[str, str]]  # (user, used): module names, for Python dotted b
 
 def fortran_arrows() -> tuple[dict[str, str], Arrows]:
     """Room of each module, and who uses whom; copies in another precision count as their original."""
-    files = sorted(FORTRAN.rglob("*.f90"))
-    rooms = {path.stem: path.stem if path.parent == FORTRAN else path.parent.name for path in files}
+    files = sorted(FORTRAN.rglob("*.f90*"))  # some with settings of the build to be filled in
+    names = {path: path.name.partition(".")[0] for path in files}
+    rooms = {name: name if path.parent == FORTRAN else path.parent.name for path, name in names.items()}
     arrows = set()
     for path in files:
         for used in re.findall(r"^ *use +hc_(\w+)", path.read_text(), re.MULTILINE | re.IGNORECASE):
             used = re.sub(r"_(extended|single)$", "", used.lower())
-            if used != path.stem:
-                arrows.add((path.stem, used))
+            if used != names[path]:
+                arrows.add((names[path], used))
     return rooms, arrows
 
 

@@ -52,10 +52,11 @@ def time_limit() -> Iterator[None]:
 def ending(command: Callable[..., Any], **options: Any) -> Ending:
     """Run a command as the command line would, but for reading the arguments."""
     out, error, code = io.StringIO(), io.StringIO(), 0
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), time_limit():
+    context = click.Context(click.Command("fuzz"))
+    if "context" in inspect.signature(command).parameters:
+        options["context"] = context
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), time_limit(), context:
         try:
-            if "context" in inspect.signature(command).parameters:
-                options["context"] = click.Context(click.Command("fuzz"))
             command(**options)
         except typer.Exit as exit_:
             code = exit_.exit_code

@@ -91,7 +91,7 @@ class Lattice:
     @cached_property
     def basis(self) -> NDArray[np.float64]:
         """Basis vectors, one a row [m]."""
-        basis: NDArray[np.float64] = np.ascontiguousarray(_core.hc_f2py_api.lattice_basis(self.spacing).T)
+        basis: NDArray[np.float64] = np.ascontiguousarray(_core.hc_f2py_normal.lattice_basis(self.spacing).T)
         return basis
 
     @property

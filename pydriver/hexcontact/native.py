@@ -17,7 +17,7 @@ from .arguments import integer, number, reals, word
 from .errors import ConvergenceError, DeckError, HexcontactError, ResourceError
 from .lattice import Lattice
 
-_api = _core.hc_f2py_api
+_api = _core.hc_f2py_normal
 
 Method = Literal["direct", "fft"]
 MOST_IN_CONTACT = 10**8  # nodes of which memory is asked; the square of more would overflow, and fits nowhere

@@ -338,7 +338,7 @@ class FrictionalContact:
 
 
 def _api_free(handle: int) -> None:
-    _core.hc_f2py_api.free_handle(handle)
+    _core.hc_f2py_normal.free_handle(handle)
 
 
 def memory_needed(

@@ -1,27 +1,27 @@
 !> What a coarser lattice predicts of a load step.
-module test_friction_predictor
+module test_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, slip, force_control, displacement_control
-  use hc_friction_law, only: coulomb_t
-  use hc_friction_problem, only: friction_problem_t
-  use hc_friction_operators, only: operators_t, new_operators
-  use hc_friction_level, only: solve_level
-  use hc_friction_predictor, only: predict
+  use hc_coulomb, only: coulomb_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_elastic_operators, only: operators_t, new_operators
+  use hc_lattice_solver, only: solve_level
+  use hc_fas_predictor, only: predict
   use hc_frictional_contact, only: frictional_contact_t
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
 
-  public :: collect_friction_predictor
+  public :: collect_fas_predictor
 
   integer, parameter :: f = force_control, d = displacement_control
   real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.3_wp
 
 contains
 
-  subroutine collect_friction_predictor(tests)
+  subroutine collect_fas_predictor(tests)
     !> Tests of this suite
     type(test_t), allocatable, intent(out) :: tests(:)
 
@@ -32,7 +32,7 @@ contains
       new_test('astray', test_astray), &
       new_test('cold_start', test_cold_start) &
     ]
-  end subroutine collect_friction_predictor
+  end subroutine collect_fas_predictor
 
   !> A sphere that was pressed and pushed, and its coarser lattice.
   subroutine set_up(n, contact, state, coarse, operators, error)
@@ -221,4 +221,4 @@ contains
     call check_true(error, cold%operator_applications < 0.66_wp*alone%operator_applications, 'less work')
   end subroutine test_cold_start
 
-end module test_friction_predictor
+end module test_fas_predictor

@@ -1,12 +1,12 @@
 !> What the tractions of an iterate call for: contact area, stick and slip, and loads as constraints.
-module hc_friction_zones
+module hc_active_zones
   use hc_precision, only: wp, pi
   use hc_contact_state, only: separated, stick, slip, along_x, along_y, about_z, n_motion, force_control
-  use hc_friction_law, only: linearize, normal_to
-  use hc_friction_problem, only: classification_scale
+  use hc_coulomb, only: linearize, normal_to
+  use hc_contact_problem, only: classification_scale
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_spring_blend, only: soft
-  use hc_driven_motions, only: driven_motions_t, new_driven_motions
+  use hc_load_constraints, only: driven_motions_t, new_driven_motions
   use hc_vectors, only: maximum
   implicit none
   private
@@ -188,4 +188,4 @@ contains
     !$omp end parallel do
   end subroutine find_wanted
 
-end module hc_friction_zones
+end module hc_active_zones

@@ -1,5 +1,5 @@
 !> Spectra of kernels that several problems may share, and what they depend on.
-module hc_kernel_spectrum
+module hc_spectrum
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
   use hc_lock, only: lock, unlock, spectrum_users
@@ -146,4 +146,4 @@ contains
     if (stat == 0) values => self%single
   end subroutine reserve_single
 
-end module hc_kernel_spectrum
+end module hc_spectrum

@@ -1,15 +1,15 @@
 !> Operator and preconditioners of a contact with friction, on vectors, and the work they do.
 !>
 !> A field with several components is one vector, one component after the other.
-module hc_friction_operators
+module hc_elastic_operators
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
-  use hc_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
-  use hc_kernel_cache, only: kernel_cache_t
-  use hc_edge_extension, only: edge_extension_t
+  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_preconditioner_extension, only: edge_extension_t
   implicit none
   private
 
@@ -138,4 +138,4 @@ contains
     self%preconditioning = self%preconditioning + self%tangential%cost
   end subroutine precondition_shear
 
-end module hc_friction_operators
+end module hc_elastic_operators

@@ -13,7 +13,7 @@
 !> the waves along the edge are. Here each ring of nodes around the active ones takes the
 !> mean of its neighbours in the ring before, smoothed along the ring, and falls off like
 !> 1 - sqrt(ring/(rings + 1)).
-module hc_edge_extension
+module hc_preconditioner_extension
   use hc_precision, only: wp, sp
   use hc_lattice, only: neighbors
   implicit none
@@ -340,4 +340,4 @@ contains
     end do
   end function sum_of
 
-end module hc_edge_extension
+end module hc_preconditioner_extension

@@ -6,16 +6,16 @@
 !>
 !> For shear tractions there is a second one, of a body whose every node has a soft
 !> spring (see spring_blend).
-module hc_preconditioner
+module hc_symbol_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
-  use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
-  use hc_kernel_cache, only: kernel_cache_t
-  use hc_edge_extension, only: edge_extension_t
+  use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_preconditioner_extension, only: edge_extension_t
   use hc_spring_blend, only: node_ratio, soft
   use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
@@ -213,4 +213,4 @@ contains
     end do
   end subroutine apply_single
 
-end module hc_preconditioner
+end module hc_symbol_preconditioner

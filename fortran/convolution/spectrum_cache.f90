@@ -3,11 +3,11 @@
 !> They are found by everything that they depend on, so that a problem gets the same bits with them as without.
 !> Problems share what they find: a spectrum is in memory once. The least recently used ones go first.
 !> Several threads may use one cache.
-module hc_kernel_cache
+module hc_spectrum_cache
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_lock, only: lock, unlock, kernel_table
-  use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, release
-  use hc_kernel_file, only: read_kernels, write_kernels, file_name
+  use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, release
+  use hc_spectrum_file, only: read_kernels, write_kernels, file_name
   implicit none
   private
 
@@ -272,4 +272,4 @@ contains
     end if
   end subroutine complain
 
-end module hc_kernel_cache
+end module hc_spectrum_cache

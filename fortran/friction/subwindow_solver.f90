@@ -4,13 +4,13 @@
 !> windows) is solved on the part around it. What the tractions do elsewhere follows from one
 !> product over the window, which also judges the state. Should the contact reach
 !> the rim of the part, or the bodies overlap outside, the step is solved on the whole window.
-module hc_windowed_friction
+module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
-  use hc_friction_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t, friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
-  use hc_kernel_cache, only: kernel_cache_t
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_window_part, only: frame, is_worth, part_of, worth
   implicit none
   private
@@ -206,4 +206,4 @@ contains
     end associate
   end function reaches_rim
 
-end module hc_windowed_friction
+end module hc_subwindow_solver

@@ -12,15 +12,15 @@
 !> tractions and motions is added to the fine ones. Nodes between coarse ones that slip are put
 !> onto the cone. The fronts of contact, stick and slip are where
 !> they should be then but for a node or two, and no history has to be kept for it.
-module hc_friction_predictor
+module hc_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t, slip, normal, force_control
-  use hc_friction_law, only: magnitude
-  use hc_friction_problem, only: friction_problem_t
-  use hc_friction_operators, only: operators_t
-  use hc_friction_level, only: solve_level
-  use hc_multilevel, only: prolong, prolong_vector, restrict_field, restrict_vector
+  use hc_coulomb, only: magnitude
+  use hc_contact_problem, only: friction_problem_t
+  use hc_elastic_operators, only: operators_t
+  use hc_lattice_solver, only: solve_level
+  use hc_transfer, only: prolong, prolong_vector, restrict_field, restrict_vector
   implicit none
   private
 
@@ -153,4 +153,4 @@ contains
     state%motion = state%motion + (after%motion - before%motion)
   end subroutine add_change
 
-end module hc_friction_predictor
+end module hc_fas_predictor

@@ -11,11 +11,11 @@
 !> d^(3/2), C, as it sticks. The gap at the beginning of the step measures both without any geometry: m_1 is its power
 !> 2/3, m_2 the gap itself; M_1, M_2 are what they lose during the step outside. How much there is of C shows in how D
 !> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory.md, section 11).
-module hc_entry_state
+module hc_contact_entry
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, normal, force_control
-  use hc_friction_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t, friction_solver_t
   implicit none
   private
 
@@ -445,4 +445,4 @@ contains
 
   end function by_falling_gap
 
-end module hc_entry_state
+end module hc_contact_entry

@@ -2,7 +2,7 @@
 !>
 !> Corrections are multiplied in single precision, in units of displacement and pressure
 !> whose ratio is that of the preconditioner; the exact operator is there where it is wanted.
-module hc_normal_level
+module hc_normal_lattice
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
@@ -10,14 +10,14 @@ module hc_normal_level
   use hc_flexibility, only: normal
   use hc_fftw, only: good_size
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_normal_kernel, only: normal_kernel_t
-  use hc_kernel_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
-  use hc_kernel_cache, only: kernel_cache_t
+  use hc_pressure_kernel, only: normal_kernel_t
+  use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t, threads_for
   use hc_contact_state, only: contact_state_t
   use hc_contact_residuals, only: conclude, normal_self_compliance
-  use hc_preconditioner, only: preconditioner_t, new_preconditioner, single_cost
-  use hc_edge_extension, only: edge_extension_t
+  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner, single_cost
+  use hc_preconditioner_extension, only: edge_extension_t
   implicit none
   private
 
@@ -205,4 +205,4 @@ contains
     k = real(row, sp)
   end subroutine rounded_row
 
-end module hc_normal_level
+end module hc_normal_lattice

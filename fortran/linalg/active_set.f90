@@ -3,7 +3,7 @@
 !> A contact fills less than half of its window: vectors of the unknowns alone save
 !> as much of the work on them. Active nodes come in runs along the rows of the window, so
 !> that packing is a copy of a few hundred pieces.
-module hc_packing
+module hc_active_set
   use hc_precision, only: wp
   implicit none
   private
@@ -166,4 +166,4 @@ contains
     !$omp end parallel do
   end subroutine unpack_field
 
-end module hc_packing
+end module hc_active_set

@@ -3,12 +3,12 @@
 !> A file is written under another name and renamed; its head says what it holds and who made it, and has a hash
 !> of all of it. What is not as expected is not taken, nor what another user may have written, unless files are
 !> shared. Files are written by C, since Fortran's run-time library does not tell of a full disk.
-module hc_kernel_file
+module hc_spectrum_file
   use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char, c_size_t, c_int64_t, c_ptr, &
                                          c_null_ptr, c_loc, c_associated, c_f_pointer
   use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp, sp
-  use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, kind_name
+  use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, kind_name
   implicit none
   private
 
@@ -247,4 +247,4 @@ contains
     hash_of = xxh64(words, 8*size(words, kind=c_size_t), before)
   end function hash_of
 
-end module hc_kernel_file
+end module hc_spectrum_file

@@ -5,14 +5,14 @@
 !> edge of the contact. Here contact area, stick, slip and both tractions come from
 !> one linear problem with the rigid motions, solved by GMRES. It is not
 !> symmetric, because the pressure of a slipping node carries mu p e along.
-module hc_friction_newton
+module hc_coupled_newton
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: normal, force_control
-  use hc_driven_motions, only: driven_motions_t
-  use hc_friction_zones, only: find_contact, classify, find_constraints, find_wanted
+  use hc_load_constraints, only: driven_motions_t
+  use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t
-  use hc_friction_sweep, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
+  use hc_staggered_newton, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
   use hc_friction_systems, only: coupled_system_t
   use hc_krylov, only: projected_gmres, fulfil
   implicit none
@@ -138,4 +138,4 @@ contains
     now%first = .false.
   end subroutine coupled_sweep
 
-end module hc_friction_newton
+end module hc_coupled_newton

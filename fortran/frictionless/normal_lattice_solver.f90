@@ -11,12 +11,12 @@
 !> What is added to the pressure is multiplied in single precision, and pressure and gap are
 !> summed up in double precision. The error that this can have left in the gap is kept
 !> account of; before it matters the gap is found anew from the pressure, in double precision.
-module hc_normal_steps
+module hc_normal_lattice_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
   use hc_contact_residuals, only: conclude
-  use hc_normal_level, only: normal_level_t
+  use hc_normal_lattice, only: normal_level_t
   use hc_normal_iterate, only: iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, &
                                push_only
   use hc_normal_directions, only: find_residual, projected_step, next_direction, step_share
@@ -198,4 +198,4 @@ contains
     now%stale = 0.0_wp
   end subroutine find_closing
 
-end module hc_normal_steps
+end module hc_normal_lattice_solver

@@ -13,7 +13,7 @@
 !>
 !> where D tends to |ds|/(mu p). The direction of slip is thus that of -ds, and
 !> it converges quadratically.
-module hc_friction_law
+module hc_coulomb
   use hc_precision, only: wp
   use hc_contact_state, only: stick, slip
   implicit none
@@ -134,4 +134,4 @@ contains
     t = [-direction(2), direction(1)]
   end function normal_to
 
-end module hc_friction_law
+end module hc_coulomb

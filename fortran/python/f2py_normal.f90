@@ -2,7 +2,7 @@
 !>
 !> Objects live in the table of f2py_handles.f90. Creating and freeing happen
 !> under Python's interpreter lock; the procedures marked threadsafe release it.
-module hc_f2py_api
+module hc_f2py_normal
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -291,4 +291,4 @@ contains
     call free_slot(handle)
   end subroutine free_handle
 
-end module hc_f2py_api
+end module hc_f2py_normal

@@ -4,11 +4,11 @@
 !> the unit motion does along x and y, summed over the traction, is the load. A torque is
 !> taken about the middle of the contact, as far as the tangential loads are
 !> known too: a contact far from the origin would not tell a twist from a shift.
-module hc_driven_motions
+module hc_load_constraints
   use hc_precision, only: wp, pi
   use hc_lapack, only: eliminate
   use hc_contact_state, only: load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
-  use hc_friction_problem, only: friction_problem_t
+  use hc_contact_problem, only: friction_problem_t
   implicit none
   private
 
@@ -250,4 +250,4 @@ contains
     length = max(length, no_gain*maxval(length))
   end subroutine lower
 
-end module hc_driven_motions
+end module hc_load_constraints

@@ -6,12 +6,12 @@
 !> iterate (see friction_law). Both linear problems are solved by projected
 !> conjugate gradients, no more accurately than the sets deserve; the rigid motions
 !> come out as multipliers of the prescribed loads.
-module hc_friction_sweep
+module hc_staggered_newton
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
-  use hc_driven_motions, only: driven_motions_t
-  use hc_friction_zones, only: find_contact, classify, find_constraints, find_wanted
+  use hc_load_constraints, only: driven_motions_t
+  use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
   use hc_vectors, only: copy, maximum, total
@@ -328,4 +328,4 @@ contains
     end if
   end subroutine drag_shear
 
-end module hc_friction_sweep
+end module hc_staggered_newton

@@ -1,12 +1,12 @@
 !> Files of kernels: the hash that tells whether one is whole.
-module test_kernel_file
+module test_spectrum_file
   use, intrinsic :: iso_c_binding, only: c_char, c_int64_t, c_size_t
   use hc_error, only: error_t
   use testing, only: test_t, new_test, check_true
   implicit none
   private
 
-  public :: collect_kernel_file
+  public :: collect_spectrum_file
 
   interface
     pure integer(c_int64_t) function xxh64(text, bytes, seed) bind(c, name='hexcontact_xxh64')
@@ -19,12 +19,12 @@ module test_kernel_file
 
 contains
 
-  subroutine collect_kernel_file(tests)
+  subroutine collect_spectrum_file(tests)
     !> Tests of this suite
     type(test_t), allocatable, intent(out) :: tests(:)
 
     tests = [new_test('hash', test_hash)]
-  end subroutine collect_kernel_file
+  end subroutine collect_spectrum_file
 
   !> Values of libxxhash 0.8.4, for texts that take each way through the algorithm.
   subroutine test_hash(error)
@@ -52,4 +52,4 @@ contains
 
   end subroutine test_hash
 
-end module test_kernel_file
+end module test_spectrum_file

@@ -3,7 +3,7 @@
 !> Node (i, j) of the coarse lattice is node (2 i, 2 j) of the fine one. The
 !> interpolation is that of the piecewise linear pyramids themselves: the other
 !> fine nodes are the midpoints of coarse edges.
-module hc_multilevel
+module hc_transfer
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t, neighbors
   implicit none
@@ -265,4 +265,4 @@ contains
     coarse = fine(start(1)::2, start(2)::2)
   end function restrict_mask
 
-end module hc_multilevel
+end module hc_transfer

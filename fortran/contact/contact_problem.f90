@@ -7,7 +7,7 @@
 !>
 !> where w, u1 - u2 are the flexibility operator's. `friction_solver_t` is what
 !> both methods, on LAPACK and on FFTs, look like from outside.
-module hc_friction_problem
+module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
@@ -19,9 +19,9 @@ module hc_friction_problem
     loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
     tangential_residual, largest_pressure, force_residual, least_traction
-  use hc_friction_law, only: coulomb_t
+  use hc_coulomb, only: coulomb_t
   use hc_friction_rows, only: zone_row
-  use hc_multilevel, only: restrict_field, restrict_mask
+  use hc_transfer, only: restrict_field, restrict_mask
   implicit none
   private
 
@@ -398,4 +398,4 @@ contains
     end if
   end function relative
 
-end module hc_friction_problem
+end module hc_contact_problem

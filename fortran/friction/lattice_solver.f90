@@ -1,19 +1,19 @@
 !> A load step with friction on one lattice.
 !>
-!> Sweeps that find pressure and shear traction one after the other (friction_sweep),
-!> and where that is not enough both together (friction_newton).
-module hc_friction_level
+!> Sweeps that find pressure and shear traction one after the other (staggered_newton),
+!> and where that is not enough both together (coupled_newton).
+module hc_lattice_solver
   use hc_precision, only: wp
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
-  use hc_friction_problem, only: friction_problem_t
-  use hc_driven_motions, only: overloads
-  use hc_friction_operators, only: operators_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_load_constraints, only: overloads
+  use hc_elastic_operators, only: operators_t
   use hc_friction_iterate, only: iterate_t, cautious
-  use hc_friction_sweep, only: staggered_sweep
-  use hc_friction_newton, only: coupled_sweep
+  use hc_staggered_newton, only: staggered_sweep
+  use hc_coupled_newton, only: coupled_sweep
   use hc_krylov, only: solution_broke_off
   implicit none
   private
@@ -129,4 +129,4 @@ contains
     !$omp end parallel do
   end subroutine record
 
-end module hc_friction_level
+end module hc_lattice_solver

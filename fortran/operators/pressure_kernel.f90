@@ -3,7 +3,7 @@
 !> On the equilateral lattice it has twelve symmetries: only offsets with
 !> 0 <= j <= i are evaluated. Over the spacing the kernel is the same at the same
 !> indices of any lattice, so that one table serves a whole hierarchy of lattices.
-module hc_normal_kernel
+module hc_pressure_kernel
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
@@ -86,4 +86,4 @@ contains
     end do
   end subroutine kernel_row
 
-end module hc_normal_kernel
+end module hc_pressure_kernel

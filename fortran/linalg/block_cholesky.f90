@@ -6,7 +6,7 @@
 !> the operations of LU. Each correction leaves a share of the error that grows with the coupling: 0.035 for
 !> beta = -0.19 and a coefficient of friction of 0.1, 0.09 for one of 0.6, next to nothing where shear does not
 !> move the pressure.
-module hc_block_solve
+module hc_block_cholesky
   use, intrinsic :: iso_fortran_env, only: real32
   use hc_precision, only: wp
   use hc_lapack, only: dgemm, spotrf, spotrs
@@ -97,4 +97,4 @@ contains
     end do
   end subroutine solve_blocks
 
-end module hc_block_solve
+end module hc_block_cholesky

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from hexcontact.cli import app
+from hexcontact.cli.app import app
 
 DOCS = Path(__file__).parents[1]
 PAGES = ("tutorial", "lattice", "surfaces", "reading", "../README")

@@ -13,10 +13,10 @@ import pytest
 
 import hexcontact
 from hexcontact import Case
-from hexcontact import store as store_module
-from hexcontact.netcdf import read_output
-from hexcontact.result import Step
-from hexcontact.store import journal_of, open_result
+from hexcontact.result import store as store_module
+from hexcontact.result.netcdf import read_output
+from hexcontact.result.result import Step
+from hexcontact.result.store import journal_of, open_result
 
 DECK = """
 title = "A sphere"

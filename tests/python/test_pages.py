@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact.cli import app
+from hexcontact.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

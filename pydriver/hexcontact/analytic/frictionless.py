@@ -21,7 +21,7 @@ import numpy as np
 import scipy  # its parts are loaded when they are first used: a fifth of a second
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import number, reals
+from ..arrays import number, reals
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array], Array]

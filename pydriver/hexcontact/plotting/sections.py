@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, PartialSlip
-from ..step_view import StepView, dataset_of, scaled, title_of, worded
+from ..result.view import StepView, dataset_of, scaled, title_of, worded
 from .maps import step_label
 from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, legend_below, new_figure, set_title, shades
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
 
-    from ..result import Result
+    from ..result.result import Result
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]

@@ -45,7 +45,8 @@ ENVIRONMENT = os.environ | {
 
 LATE = """
 import atexit, os, sys, time
-from hexcontact import cli, json_output, run_command, solve, store, study_run
+from hexcontact.cli import app as cli, json_output, run_command
+from hexcontact.result import store
 
 number, sent = int(sys.argv.pop(1)), []
 def signaled(module, name):

@@ -21,7 +21,7 @@ from .problem.settings import Body, OutputSettings, SolverSettings
 if TYPE_CHECKING:
     from .result.result import Result
     from .result.step import Step
-    from .solve.progress import Reporter
+    from .solve.events import Listener
     from .solve.session import Session
 
 __all__ = ["Body", "Case", "LoadStep", "OutputSettings", "SolverSettings", "Target"]
@@ -162,7 +162,7 @@ class Case(Problem):
         output: str | Path | None = None,
         overwrite: bool = False,
         on_step: Callable[[Step], object] | None = None,
-        progress: Reporter | bool | None = None,
+        progress: Listener | bool | None = None,
     ) -> Result:
         """Solve the case.
 
@@ -176,7 +176,7 @@ class Case(Problem):
         on_step : callable, optional
             Called with each finished `Step`. If it returns something true, or raises `hexcontact.StopRun`,
             the run ends there.
-        progress : Reporter or bool, optional
+        progress : Listener or bool, optional
             True: a bar on a terminal, lines otherwise.
 
         Returns
@@ -213,7 +213,8 @@ class Case(Problem):
         return Session(self, output, overwrite)
 
     def _repr_html_(self) -> str:
-        from .solve.overview import case_rows
+        from .problem.overview import case_rows
+        from .solve.frictionless import peak_memory
         from .text import html_table
 
-        return html_table(self.title or "Case", ("", ""), case_rows(self))
+        return html_table(self.title or "Case", ("", ""), case_rows(self, peak_memory))

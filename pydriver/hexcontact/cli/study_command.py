@@ -127,7 +127,7 @@ def interrupted(study: Study) -> str:
     )
 
 
-def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard: tuple[int, int]) -> Outcome:
+def run_case(study: Study, number: int, retry: bool, listeners: Listeners, pipe: tuple[int, int]) -> Outcome:
     """Run one case for a job array; signals end the process unless it is done, and what is finished stays."""
     from ..solve.progress import reporter
 
@@ -136,7 +136,7 @@ def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard
     try:
         in_background(
             lambda: outcomes.append(study.run_case(number, retry, shown)),
-            heard,
+            pipe,
             lambda _: not outcomes,
         )
     except Interrupted as signaled:

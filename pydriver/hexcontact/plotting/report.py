@@ -21,10 +21,10 @@ import numpy as np
 from .._version import __version__
 from ..cli import tables as summary
 from ..errors import DeckError
+from ..problem.overview import case_rows
 from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, step_rows, worth_showing
 from ..result.remarks import remarks
 from ..result.view import scaled
-from ..solve.overview import case_rows
 from ..text import escaped, quantity
 from ..variables import VARIABLES
 from .report_fields import kept_steps, maps_of, rounded

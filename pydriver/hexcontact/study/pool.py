@@ -27,7 +27,7 @@ from .folder import Outcome
 if TYPE_CHECKING:
     from ..case import Case
     from ..result.step import Step
-    from ..solve.progress import Reporter
+    from ..solve.events import Listener
     from ..solve.restart import Restart
 
 _POLL = 0.2  # s between looks at whether to stop
@@ -43,7 +43,7 @@ class Job:
     path: str
 
 
-def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> Outcome:
+def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:
     """Run one case into its file.
 
     Parameters
@@ -52,8 +52,8 @@ def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> 
         The case.
     apart : bool
         Write under a name of this attempt's own first, for when another attempt may still be under way.
-    shown : Reporter, optional
-        Who is told about each load step.
+    listener : Listener, optional
+        Follows the run, besides the log.
 
     Returns
     -------
@@ -62,10 +62,9 @@ def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> 
     """
     from ..case import Case
     from ..result.store import Store
-    from ..solve.progress import Reporter
-    from ..solve.run import metadata_of, record
+    from ..solve.run import listeners, metadata_of, record
 
-    started, shown = time.perf_counter(), shown or Reporter()
+    started = time.perf_counter()
     target = Path(job.path)
     own = target.with_name(f"{target.stem}.{uuid.uuid4().hex[:8]}.nc") if apart else target
 
@@ -88,8 +87,9 @@ def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> 
                 before: Sequence[Step] = ()
             else:
                 own, began, store, before = restart.store.path, True, restart.store, restart.before
-            with shown.watching(case.title or target.stem, case.planned_steps):
-                record(case, store, shown, before=before)
+            follower = listeners(case, listener)
+            with follower.following(case.title or target.stem, case.planned_steps):
+                record(case, store, follower, before)
         apart = own != target
         if apart:
             os.replace(own, target)

@@ -30,7 +30,7 @@ from .tables import Dask, StudyFile
 if TYPE_CHECKING:
     import xarray
 
-    from ..solve.progress import Reporter
+    from ..solve.events import Listener
     from .dask import DaskPool
     from .pool import Job, LocalPool
 
@@ -274,7 +274,7 @@ class Study:
         """Return the Dask cluster that `run` would use; None: processes of this machine."""
         return Dask(address=dask) if dask else self.file.dask if jobs is None else None
 
-    def run_case(self, number: int, retry: bool = False, shown: Reporter | None = None) -> Outcome:
+    def run_case(self, number: int, retry: bool = False, listener: Listener | None = None) -> Outcome:
         """Run one case here, unless it is done; for job arrays.
 
         Parameters
@@ -283,8 +283,8 @@ class Study:
             Number of the case, as in the names of the files.
         retry : bool
             Also if it failed by itself before.
-        shown : Reporter, optional
-            Who is told about each load step.
+        listener : Listener, optional
+            Follows the run, besides the log.
 
         Returns
         -------
@@ -301,7 +301,7 @@ class Study:
         if number not in missing:
             return self.folder.failure(case) or Outcome(case.hash)
         job = Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))
-        outcome = solve_case(job, shown=shown)
+        outcome = solve_case(job, listener=listener)
         self.folder.note(case, outcome)
         return outcome
 

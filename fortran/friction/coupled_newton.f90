@@ -55,7 +55,7 @@ contains
     system%shear => now%shear
     call now%pressure%take(now%contact)
     system%edge = now%pressure%edge
-    system%n_threads = now%operators%n_threads
+    system%space = now%operators%space
     allocate (active(3*n), x(3*n), ax(3*n), rhs(3*n), weight(3*n), plane(2*n))
     active(:n) = now%contact
     active(n + 1:) = shear_active
@@ -98,7 +98,7 @@ contains
       if (allocated(error)) return
       mb(:n, m:) = part
     end if
-    call fulfil(rows, mb, missing(:m), x, independent, system%n_threads)
+    call fulfil(rows, mb, missing(:m), x, independent, system%space)
     if (independent) then
       call system%product(x, ax, error)
       if (allocated(error)) return

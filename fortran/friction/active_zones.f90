@@ -7,7 +7,6 @@ module hc_active_zones
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_spring_blend, only: soft
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
-  use hc_field_space, only: field_space_t
   implicit none
   private
 
@@ -30,7 +29,7 @@ contains
     integer :: i, n_contact
 
     r = classification_scale/(2.0_wp*pi*now%problem%pair%lambda_1 &
-                              *sqrt(now%problem%lattice%cell_area()*max(count(now%contact), 1)/pi))
+                              *sqrt(now%problem%lattice%cell_area()*max(now%operators%space%count(now%contact), 1)/pi))
     allocate (contact(size(gap)))
     n_contact = 0
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) reduction(+: n_contact)
@@ -58,7 +57,7 @@ contains
 
     n = size(now%p)
     allocate (zone(n), active(2*n))
-    r = now%caution*now%problem%classification_parameter(count(now%contact))
+    r = now%caution*now%problem%classification_parameter(now%operators%space%count(now%contact))
     if (now%first .and. .not. any(abs(now%q) > 0.0_wp)) r = cautious*r
     associate (friction => now%problem%friction)
       largest = friction%bound(now%operators%space%max(now%p))

@@ -104,11 +104,11 @@ contains
       if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
       call find_wanted(now, rhs(n + 1:))
-      weight(:n) = 1.0_wp/(now%problem%normal_compliance*maxval(now%p))
+      weight(:n) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
       weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
                  final_accuracy*now%tolerance)
-      goal = goal*real(count(active), wp)**0.25_wp
+      goal = goal*real(system%space%count(active), wp)**0.25_wp
       call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
                            independent, residual, iterations, now%outcome, error)
       if (allocated(error)) return

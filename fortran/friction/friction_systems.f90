@@ -20,7 +20,6 @@ module hc_friction_systems
   use hc_friction_rows, only: soften_row
   use hc_krylov, only: linear_system_t
   use hc_active_set, only: packing_t, new_packing
-  use hc_field_space, only: field_space_t
   implicit none
   private
 

@@ -14,7 +14,6 @@ module hc_staggered_newton
   use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
-  use hc_field_space, only: field_space_t
   implicit none
   private
 

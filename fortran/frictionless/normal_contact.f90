@@ -180,6 +180,7 @@ contains
     class(normal_contact_t), intent(in) :: self
     type(lattice_t), intent(in) :: lattice
 
+    space_of%threads = 1
     if (self%n_threads > 0 .or. lattice%size() >= worth_sharing) space_of = space_over(lattice%extent, self%n_threads)
   end function space_of
 

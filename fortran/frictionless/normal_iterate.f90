@@ -114,7 +114,7 @@ contains
     call advance(level, now, 1.0_wp)
     if (.not. by_load) then
       call rescale(level, now)
-      now%p_unit = maxval(now%p)
+      now%p_unit = level%space%max(now%p)
       now%w_unit = now%p_unit*level%preconditioner%unit
     end if
   end subroutine begin
@@ -136,7 +136,7 @@ contains
     end do
     !$omp end parallel do
     factor = sum(overlap)/sum(resistance)
-    if (.not. factor > 0.0_wp) factor = now%approach/maxval(now%w)
+    if (.not. factor > 0.0_wp) factor = now%approach/level%space%max(now%w)
     now%p = factor*now%p
     now%w = factor*now%w
     now%stale = factor*now%stale

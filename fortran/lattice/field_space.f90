@@ -29,6 +29,8 @@ module hc_field_space
     !> Sum and largest element of a vector or of a field over the window; of nothing, zero and the least number there is
     generic :: sum => vector_sum, window_sum, window_sum_single
     generic :: max => vector_max, window_max
+    !> Number of nodes of a set
+    procedure :: count => count_nodes
     !> Threads for a field of some nodes, one for a small field
     procedure :: threads_for
     procedure, private :: vector_sum, window_sum, window_sum_single, vector_max, window_max
@@ -53,6 +55,7 @@ contains
     !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
     integer, intent(in), optional :: n_threads
 
+    space%threads = 1
     !$ if (product(extent) >= worth_sharing) space%threads = min(omp_get_max_threads(), most_threads)
     if (present(n_threads)) then
       !$ if (n_threads > 0) space%threads = n_threads
@@ -145,6 +148,21 @@ contains
     end do
     !$omp end parallel do
   end function window_max
+
+  !> Number of nodes of a set.
+  integer function count_nodes(self, nodes)
+    class(field_space_t), intent(in) :: self
+    !> Vector, true on the nodes of the set
+    logical, intent(in), contiguous :: nodes(:)
+    integer :: i
+
+    count_nodes = 0
+    !$omp parallel do simd schedule(static) num_threads(self%threads) reduction(+: count_nodes)
+    do i = 1, size(nodes)
+      count_nodes = count_nodes + merge(1, 0, nodes(i))
+    end do
+    !$omp end parallel do simd
+  end function count_nodes
 
   !> Sum of the elements.
   real(wp) function vector_sum(self, x)

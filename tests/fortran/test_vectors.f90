@@ -95,6 +95,8 @@ contains
       if (allocated(error)) return
       call check(error, space%max(-abs(window) - 1.0_wp), -minval(abs(window)) - 1.0_wp, 0.0_wp, 'the same over a window')
       if (allocated(error)) return
+      call check_true(error, space%count(x > 0.2_wp) == count(x > 0.2_wp), 'number of nodes')
+      if (allocated(error)) return
       call space%fill(y, 0.25_wp)
       call space%add(x, y)
       call space%add_columns(b, [2.0_wp, -3.0_wp], y)
@@ -121,6 +123,8 @@ contains
     call check(error, [alone%sum(none), alone%sum(no_window), alone%dot(none, none)], spread(0.0_wp, 1, 3), 0.0_wp, 'nothing')
     if (allocated(error)) return
     call check_true(error, max(alone%max(none), alone%max(no_window)) <= -huge(1.0_wp), 'largest of nothing')
+    if (allocated(error)) return
+    call check_true(error, alone%count(none > 0.0_wp) == 0, 'no nodes')
     if (allocated(error)) return
     call check_true(error, size(alone%dots(no_columns, [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp])) == 0, 'no products')
   end subroutine test_odd_fields

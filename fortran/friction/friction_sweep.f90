@@ -12,7 +12,7 @@ module hc_friction_sweep
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_driven_motions, only: driven_motions_t
   use hc_friction_zones, only: find_contact, classify, find_constraints, find_wanted
-  use hc_friction_iterate, only: iterate_t, cautious
+  use hc_friction_iterate, only: iterate_t, cautious, rounding
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
   use hc_vectors, only: copy, maximum, total
   implicit none
@@ -85,7 +85,7 @@ contains
 
     real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
     logical, allocatable :: contact(:)
-    real(wp) :: goal, residual, multiplier(1), missing(1), cell_area, carried, level
+    real(wp) :: goal, scale, residual, drift, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations, outcome
     logical :: changed, independent, searching
 
@@ -133,9 +133,11 @@ contains
       end if
       goal = final_accuracy*now%tolerance
       if (changed .or. now%pressing) goal = max(press_accuracy*min(now%residual_normal, 1.0_wp), goal)
-      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, &
-                        goal*now%problem%normal_compliance*maximum(now%p, now%pressure%n_threads), max_iterations, &
-                        multiplier(:n_constraint), residual, iterations, outcome, error)
+      scale = now%problem%normal_compliance*maximum(now%p, now%pressure%n_threads)
+      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, goal*scale, max_iterations, &
+                        multiplier(:n_constraint), residual, iterations, outcome, error, drift)
+      if (allocated(error)) return
+      if (drift > rounding*scale) call now%pressure%product(now%p, now%w, error)
       if (allocated(error)) return
       now%outcome = max(now%outcome, outcome)
       if (n_constraint == 1) now%motion(normal) = multiplier(1)
@@ -153,7 +155,7 @@ contains
     logical, allocatable :: active(:)
     real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
-    real(wp) :: goal, residual, motion(n_motion)
+    real(wp) :: goal, scale, residual, drift, motion(n_motion)
     integer :: n, iterations, outcome
     logical :: independent, holding
 
@@ -187,9 +189,11 @@ contains
         goal = min(now%residual_tangential, 1.0_wp)
         goal = goal*min(inner_accuracy, max(goal, merge(late_accuracy, 1.0e-3_wp, now%pressing)))
         goal = max(goal, final_accuracy*now%tolerance)
-        goal = goal*now%problem%tangential_compliance*now%traction_scale()
-        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal, max_iterations, multiplier, &
-                          residual, iterations, outcome, error)
+        scale = now%problem%tangential_compliance*now%traction_scale()
+        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal*scale, max_iterations, multiplier, &
+                          residual, iterations, outcome, error, drift)
+        if (allocated(error)) return
+        if (drift > rounding*scale) call displace(now, x, ax, error)
         if (allocated(error)) return
         now%outcome = max(now%outcome, outcome)
       end if

@@ -10,9 +10,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from hexcontact import deck, load_series, study_deck, surfaces
-from hexcontact.text import shown
-from hexcontact.validation import (
+from hexcontact.deck import series as load_series
+from hexcontact.deck import surfaces
+from hexcontact.deck import tables as deck
+from hexcontact.deck.kinds import (
     Flag,
     Kind,
     Quantity,
@@ -25,6 +26,8 @@ from hexcontact.validation import (
     expectation,
     kind_of,
 )
+from hexcontact.study import tables as study_deck
+from hexcontact.text import shown
 
 PAGE = Path(__file__).with_name("deck.md")
 PAGES = (PAGE, PAGE.with_name("studies.md"))

@@ -17,19 +17,19 @@ module hexcontact
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
-  use hc_kernel_cache, only: kernel_cache_t
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
   use hc_contact_state, only: contact_state_t, new_friction_state, separated, stick, slip, &
                               load_target_t, force_control, displacement_control, about_z, n_motion, touches_rim, &
                               not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, &
                               out_of_range
-  use hc_friction_law, only: coulomb_t
+  use hc_coulomb, only: coulomb_t
   use hc_contact_residuals, only: normal_residual, tangential_residual, force_residual
-  use hc_friction_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
-  use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_load_path, only: advance
   implicit none

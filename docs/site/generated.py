@@ -11,7 +11,7 @@ import typer.cli
 import typer.main
 from sphinx.application import Sphinx
 
-from hexcontact.cli import app as hexcontact
+from hexcontact.cli.app import app as hexcontact
 
 
 def commands() -> str:

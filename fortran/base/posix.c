@@ -39,7 +39,7 @@ size_t hexcontact_stack_size(void)
 }
 
 /* Open a file for reading: a regular one that, unless it is shared, nobody but this user and root may have written.
-   Returns NULL with a status of kernel_file.f90 if it cannot be had. */
+   Returns NULL with a status of spectrum_file.f90 if it cannot be had. */
 FILE *hexcontact_open(const char *path, int shared, int64_t *size, int *status)
 {
   enum { absent = 1, unreadable = 2, foreign = 3 };

@@ -14,8 +14,8 @@ module hc_convolution
   use hc_error, only: error_t, status, raise
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
   use hc_lock, only: lock, unlock, fftw_planner
-  use hc_kernel_spectrum, only: kernel_spectrum_t, kernel_key_t, release
-  use hc_kernel_cache, only: kernel_cache_t
+  use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, release
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_row_pairs, only: split_rows, join_rows
   use hc_column_blocks, only: gather_columns, scatter_columns
   use hc_spectral_product, only: multiply, multiply_one

@@ -5,7 +5,7 @@
 !> Figures 8.3 and 12.1): it solves one linear system for the tractions and the
 !> rigid motions, nodes in tension leave and nodes that penetrate enter. The
 !> area of a step starts from the last one with a ring of nodes around it. Stick and
-!> slip follow from q - r ds, and slip is linearised as in hc_friction_law, so
+!> slip follow from q - r ds, and slip is linearised as in hc_coulomb, so
 !> that the whole is a Newton method for pressure, traction and motions at once.
 module hc_direct_friction
   use hc_precision, only: wp
@@ -13,9 +13,9 @@ module hc_direct_friction
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
     normal, along_x, force_control, displacement_control, loads_not_carried
-  use hc_friction_law, only: linearize, on_cone
-  use hc_friction_problem, only: friction_problem_t, friction_solver_t
-  use hc_driven_motions, only: overloads
+  use hc_coulomb, only: linearize, on_cone
+  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_load_constraints, only: overloads
   use hc_direct_contact, only: first_guess, exchange, patience
   use hc_direct_system, only: iterate_t, infinite, unloaded, solve_area
   implicit none

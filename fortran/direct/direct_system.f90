@@ -4,12 +4,12 @@ module hc_direct_system
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: dsgesv, dgelss
-  use hc_block_solve, only: solve_blocks
+  use hc_block_cholesky, only: solve_blocks
   use hc_flexibility_dense, only: dense_flexibility_t
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
-  use hc_friction_law, only: normal_to
-  use hc_friction_problem, only: friction_problem_t
-  use hc_driven_motions, only: driven_motions_t, new_driven_motions
+  use hc_coulomb, only: normal_to
+  use hc_contact_problem, only: friction_problem_t
+  use hc_load_constraints, only: driven_motions_t, new_driven_motions
   implicit none
   private
 

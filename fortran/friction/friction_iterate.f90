@@ -1,8 +1,8 @@
 !> An iterate of a frictional load step on one lattice.
 !>
 !> It holds tractions and motions with what they cause, and says which residuals follow from
-!> them. Which zones they call for stands in friction_zones; how to get to the next iterate is left to
-!> friction_sweep and friction_newton.
+!> them. Which zones they call for stands in active_zones; how to get to the next iterate is left to
+!> staggered_newton and coupled_newton.
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
@@ -10,9 +10,9 @@ module hc_friction_iterate
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
   use hc_friction_rows, only: residual_row, cone_row
-  use hc_friction_problem, only: friction_problem_t
-  use hc_driven_motions, only: driven_motions_t, new_driven_motions
-  use hc_friction_operators, only: operators_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_load_constraints, only: driven_motions_t, new_driven_motions
+  use hc_elastic_operators, only: operators_t
   use hc_friction_systems, only: pressure_system_t, shear_system_t, new_shear_system
   use hc_krylov, only: solution_accurate
   use hc_vectors, only: fill, copy, add, maximum

@@ -15,11 +15,11 @@ module hc_friction_systems
   use hc_error, only: error_t
   use hc_flexibility, only: normal, along_x, along_y
   use hc_spring_blend, only: node_compliance, blend
-  use hc_edge_extension, only: edge_extension_t, new_edge_extension
-  use hc_friction_operators, only: operators_t
+  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
+  use hc_elastic_operators, only: operators_t
   use hc_friction_rows, only: soften_row
   use hc_krylov, only: linear_system_t
-  use hc_packing, only: packing_t, new_packing
+  use hc_active_set, only: packing_t, new_packing
   use hc_vectors, only: fill, copy
   implicit none
   private

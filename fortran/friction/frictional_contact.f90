@@ -1,6 +1,6 @@
 !> One load step with Coulomb friction, on FFTs.
 !>
-!> Sweeps of a semismooth Newton method (see friction_level) lead from the last
+!> Sweeps of a semismooth Newton method (see lattice_solver) lead from the last
 !> state to the next, after coarser lattices have told what will change (see
 !> friction_predictor). Without an earlier state the first guess comes from them, too.
 module hc_frictional_contact
@@ -8,12 +8,12 @@ module hc_frictional_contact
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t
-  use hc_friction_problem, only: friction_problem_t, friction_solver_t
-  use hc_friction_operators, only: operators_t, new_operators, operators_memory
-  use hc_friction_level, only: solve_level
-  use hc_friction_predictor, only: predict
-  use hc_kernel_cache, only: kernel_cache_t
-  use hc_multilevel, only: prolong_edge, prolong_shear, restrict_vector, level_count
+  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_elastic_operators, only: operators_t, new_operators, operators_memory
+  use hc_lattice_solver, only: solve_level
+  use hc_fas_predictor, only: predict
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_transfer, only: prolong_edge, prolong_shear, restrict_vector, level_count
   implicit none
   private
 

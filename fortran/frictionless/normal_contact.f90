@@ -10,15 +10,15 @@ module hc_normal_contact
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_memory
   use hc_flexibility_fft, only: fft_memory
-  use hc_normal_kernel, only: normal_kernel_t
-  use hc_kernel_cache, only: kernel_cache_t
+  use hc_pressure_kernel, only: normal_kernel_t
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target
-  use hc_preconditioner, only: preconditioner_memory
-  use hc_normal_level, only: normal_level_t
+  use hc_symbol_preconditioner, only: preconditioner_memory
+  use hc_normal_lattice, only: normal_level_t
   use hc_normal_iterate, only: iterate_t
-  use hc_normal_steps, only: solve_level
+  use hc_normal_lattice_solver, only: solve_level
   use hc_window_part, only: frame, is_worth, part_of
-  use hc_multilevel, only: level_count, prolong_edge, restrict_field, restrict_mask
+  use hc_transfer, only: level_count, prolong_edge, restrict_field, restrict_mask
   implicit none
   private
 

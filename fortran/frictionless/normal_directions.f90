@@ -1,7 +1,7 @@
 !> Steps of an iteration for frictionless contact: where to go, and how far.
 module hc_normal_directions
   use hc_precision, only: wp, sp
-  use hc_normal_level, only: normal_level_t
+  use hc_normal_lattice, only: normal_level_t
   use hc_normal_iterate, only: iterate_t
   implicit none
   private

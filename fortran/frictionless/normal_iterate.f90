@@ -3,8 +3,8 @@ module hc_normal_iterate
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: not_finite
-  use hc_edge_extension, only: edge_extension_t, new_edge_extension
-  use hc_normal_level, only: normal_level_t
+  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
+  use hc_normal_lattice, only: normal_level_t
   use hc_normal_rows, only: judge_row, add_row, largest_of
   implicit none
   private

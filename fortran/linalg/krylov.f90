@@ -20,7 +20,7 @@ module hc_krylov
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: eliminate
-  use hc_packing, only: packing_t, new_packing
+  use hc_active_set, only: packing_t, new_packing
   use hc_vectors, only: fill, dot, dots, add_columns, sum_block
   implicit none
   private

@@ -9,9 +9,9 @@ module hc_f2py_friction
   use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
-  use hc_friction_law, only: coulomb_t
-  use hc_friction_problem, only: friction_problem_t, new_friction_problem
-  use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
+  use hc_coulomb, only: coulomb_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_convolution, only: threads_for
   use hc_flexibility_dense, only: dense_memory

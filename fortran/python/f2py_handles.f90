@@ -15,8 +15,8 @@ module hc_f2py_handles
   use hc_normal_contact, only: normal_contact_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_direct_contact, only: direct_contact_t
-  use hc_friction_problem, only: friction_solver_t
-  use hc_kernel_cache, only: kernel_cache_t
+  use hc_contact_problem, only: friction_solver_t
+  use hc_spectrum_cache, only: kernel_cache_t
   implicit none
   private
 

@@ -33,33 +33,35 @@ if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 if TYPE_CHECKING:
-    from . import analytic, influence, kernel_cache, plotting, surfaces
+    from . import analytic, plotting
     from .case import Case
-    from .lattice import Lattice
-    from .native import ElasticPair, FlexibilityOperator, NormalContact
-    from .native_friction import ContactState, FrictionalContact
-    from .restart import resume
-    from .result import Result
-    from .session import Session
-    from .step import Step
-    from .store import open_result
-    from .study import Study, run_study
+    from .core import influence, kernel_cache
+    from .core.contact import ElasticPair, FlexibilityOperator, NormalContact
+    from .core.friction import ContactState, FrictionalContact
+    from .core.lattice import Lattice
+    from .deck import surfaces
+    from .result.result import Result
+    from .result.step import Step
+    from .result.store import open_result
+    from .solve.restart import resume
+    from .solve.session import Session
+    from .study.study import Study, run_study
 
 _HOME = {
     "Case": "case",
-    "ContactState": "native_friction",
-    "ElasticPair": "native",
-    "FlexibilityOperator": "native",
-    "FrictionalContact": "native_friction",
-    "Lattice": "lattice",
-    "NormalContact": "native",
-    "Result": "result",
-    "Session": "session",
-    "Step": "step",
-    "Study": "study",
-    "open_result": "store",
-    "resume": "restart",
-    "run_study": "study",
+    "ContactState": "core.friction",
+    "ElasticPair": "core.contact",
+    "FlexibilityOperator": "core.contact",
+    "FrictionalContact": "core.friction",
+    "Lattice": "core.lattice",
+    "NormalContact": "core.contact",
+    "Result": "result.result",
+    "Session": "solve.session",
+    "Step": "result.step",
+    "Study": "study.study",
+    "open_result": "result.store",
+    "resume": "solve.restart",
+    "run_study": "study.study",
 }
 _MODULES = ("analytic", "influence", "kernel_cache", "plotting", "surfaces")
 

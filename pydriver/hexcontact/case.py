@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .case_arguments import body_keys, gap_given, given, middle_of, segments
-from .case_settings import Body, OutputSettings, SolverSettings
-from .deck_assembly import assemble
+from .core.lattice import Lattice
+from .deck.faults import Source
+from .deck.read import assemble
 from .errors import DeckError
-from .faults import Source
-from .lattice import Lattice
-from .load_history import LoadStep, Target
-from .problem import Problem
+from .problem.arguments import body_keys, gap_given, given, middle_of, segments
+from .problem.loads import LoadStep, Target
+from .problem.problem import Problem
+from .problem.settings import Body, OutputSettings, SolverSettings
 
 if TYPE_CHECKING:
-    from .progress import Reporter
-    from .result import Result
-    from .session import Session
-    from .step import Step
+    from .result.result import Result
+    from .result.step import Step
+    from .solve.progress import Reporter
+    from .solve.session import Session
 
 __all__ = ["Body", "Case", "LoadStep", "OutputSettings", "SolverSettings", "Target"]
 
@@ -189,7 +189,7 @@ class Case(Problem):
         DeckError, ConvergenceError, ResourceError
             As `hexcontact.solve.run`, which does it.
         """
-        from . import solve
+        from .solve import run as solve
 
         return solve.run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
 
@@ -208,12 +208,12 @@ class Case(Problem):
         Session
             Iterate over it for the loads of the case, or apply others with `Session.advance`.
         """
-        from .session import Session
+        from .solve.session import Session
 
         return Session(self, output, overwrite)
 
     def _repr_html_(self) -> str:
-        from .overview import case_rows
+        from .solve.overview import case_rows
         from .text import html_table
 
         return html_table(self.title or "Case", ("", ""), case_rows(self))

@@ -13,10 +13,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench import problems
 from bench.square_window import HertzContact, best_of, clock, main, peak_memory, shear_errors
-from hexcontact import kernel_cache
-from hexcontact.lattice import Lattice
-from hexcontact.native import ElasticPair, NormalContact
-from hexcontact.native_friction import FrictionalContact
+from hexcontact.core import kernel_cache
+from hexcontact.core.contact import ElasticPair, NormalContact
+from hexcontact.core.friction import FrictionalContact
+from hexcontact.core.lattice import Lattice
 
 
 def rhombic_window(side: int, fraction: float) -> tuple[Lattice, HertzContact]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hexcontact.lattice import Lattice
-from hexcontact.native import ElasticPair, Method, NormalContact
-from hexcontact.native_friction import ContactState, FrictionalContact
+from hexcontact.core.contact import ElasticPair, Method, NormalContact
+from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.lattice import Lattice
 
 TOLERANCE = 1e-8
 LOAD = 4 / 3

@@ -233,7 +233,8 @@ def add_ratio(
 
 def estimated_memory(name: str, side: int) -> int:
     """Bytes that the program expects a problem to take."""
-    from hexcontact import native, native_friction
+    from hexcontact.core import contact as native
+    from hexcontact.core import friction as native_friction
 
     if name == "HERTZ":
         return native.memory_needed("fft", side, side)

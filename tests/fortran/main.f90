@@ -10,14 +10,14 @@ program tester
   use test_pyramid_influence, only: collect_pyramid_influence
   use test_lattice, only: collect_lattice
   use test_flexibility, only: collect_flexibility
-  use test_kernel_file, only: collect_kernel_file
+  use test_spectrum_file, only: collect_spectrum_file
   use test_vectors, only: collect_vectors
   use test_arguments, only: collect_arguments
   use test_linear_solvers, only: collect_linear_solvers
   use test_contact, only: collect_contact
   use test_normal_contact, only: collect_normal_contact
   use test_friction, only: collect_friction
-  use test_friction_predictor, only: collect_friction_predictor
+  use test_fas_predictor, only: collect_fas_predictor
   use test_friction_sweeps, only: collect_friction_sweeps
   use test_load_path, only: collect_load_path
   use test_direct_friction, only: collect_direct_friction
@@ -33,14 +33,14 @@ program tester
     new_suite('pyramid_influence', collect_pyramid_influence), &
     new_suite('lattice', collect_lattice), &
     new_suite('flexibility', collect_flexibility), &
-    new_suite('kernel_file', collect_kernel_file), &
+    new_suite('spectrum_file', collect_spectrum_file), &
     new_suite('vectors', collect_vectors), &
     new_suite('arguments', collect_arguments), &
     new_suite('linear_solvers', collect_linear_solvers), &
     new_suite('contact', collect_contact), &
     new_suite('normal_contact', collect_normal_contact), &
     new_suite('friction', collect_friction), &
-    new_suite('friction_predictor', collect_friction_predictor), &
+    new_suite('fas_predictor', collect_fas_predictor), &
     new_suite('friction_sweeps', collect_friction_sweeps), &
     new_suite('load_path', collect_load_path), &
     new_suite('direct_friction', collect_direct_friction) &

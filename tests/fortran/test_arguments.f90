@@ -10,11 +10,11 @@ module test_arguments
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, normal, &
     within_tolerance, sweeps_used_up
   use hc_contact_residuals, only: normal_residual, force_residual
-  use hc_friction_law, only: coulomb_t
-  use hc_friction_problem, only: friction_problem_t, new_friction_problem
+  use hc_coulomb, only: coulomb_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
-  use hc_windowed_friction, only: windowed_friction_t, new_windowed_friction
+  use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_load_path, only: advance
   use testing, only: test_t, new_test, check, check_true, check_raised

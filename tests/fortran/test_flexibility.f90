@@ -9,12 +9,12 @@ module test_flexibility
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_kernel_cache, only: kernel_cache_t
+  use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_residuals, only: normal_self_compliance
   use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   use hc_triangle_integrals, only: linear_load_displacement
   use hc_spring_blend, only: node_compliance, soft
-  use hc_preconditioner, only: preconditioner_t, new_preconditioner
+  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner
   use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
   private

@@ -10,11 +10,11 @@ module test_friction
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
     separated, stick, slip, normal, about_z
-  use hc_friction_law, only: coulomb_t, linearize, on_cone, normal_to
+  use hc_coulomb, only: coulomb_t, linearize, on_cone, normal_to
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
-  use hc_friction_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_krylov, only: projected_cg
-  use hc_friction_operators, only: operators_t, new_operators
+  use hc_elastic_operators, only: operators_t, new_operators
   use hc_friction_systems, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use testing, only: test_t, new_test, check, check_raised, check_true, largest

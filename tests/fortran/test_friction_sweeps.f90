@@ -3,12 +3,12 @@ module test_friction_sweeps
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
-  use hc_friction_law, only: coulomb_t
-  use hc_friction_operators, only: operators_t, new_operators
+  use hc_coulomb, only: coulomb_t
+  use hc_elastic_operators, only: operators_t, new_operators
   use hc_friction_iterate, only: iterate_t
-  use hc_friction_sweep, only: staggered_sweep
-  use hc_friction_newton, only: coupled_sweep
-  use hc_driven_motions, only: overloads
+  use hc_staggered_newton, only: staggered_sweep
+  use hc_coupled_newton, only: coupled_sweep
+  use hc_load_constraints, only: overloads
   use hc_frictional_contact, only: frictional_contact_t
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check_true

@@ -3,7 +3,7 @@ module test_lattice
   use hc_precision, only: wp
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
-  use hc_multilevel, only: prolong, restrict_field, restrict_mask
+  use hc_transfer, only: prolong, restrict_field, restrict_mask
   use testing, only: test_t, new_test, check, check_raised, check_succeeded, check_true
   implicit none
   private

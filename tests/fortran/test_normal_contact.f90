@@ -8,11 +8,11 @@ module test_normal_contact
   use hc_flexibility, only: normal
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1
-  use hc_normal_kernel, only: normal_kernel_t
+  use hc_pressure_kernel, only: normal_kernel_t
   use hc_lattice_symbol, only: kernel_symbols, normal_symbols
-  use hc_multilevel, only: prolong, prolong_edge
-  use hc_edge_extension, only: edge_extension_t, new_edge_extension
-  use hc_preconditioner, only: preconditioner_t, new_preconditioner
+  use hc_transfer, only: prolong, prolong_edge
+  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
+  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner
   use hc_contact_state, only: contact_state_t, force_control, displacement_control
   use hc_contact_residuals, only: normal_residual, normal_self_compliance
   use hc_normal_contact, only: normal_contact_t, new_normal_contact

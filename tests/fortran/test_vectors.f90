@@ -3,10 +3,10 @@ module test_vectors
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
-  use hc_friction_law, only: coulomb_t, linearize, on_cone
+  use hc_coulomb, only: coulomb_t, linearize, on_cone
   use hc_friction_rows, only: cone_row, residual_row, soften_row, zone_row
   use hc_contact_state, only: separated
-  use hc_packing, only: packing_t, new_packing
+  use hc_active_set, only: packing_t, new_packing
   use hc_vectors, only: add, add_columns, copy, dot, fill, maximum, total
   use testing, only: test_t, new_test, check, check_true, largest
   implicit none

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import xarray
 
 from hexcontact.errors import DeckError
-from hexcontact.store import open_result
+from hexcontact.result.store import open_result
 
 BLOCKS = (512, 4096)  # bytes
 

@@ -17,10 +17,11 @@ import netCDF4  # noqa: F401 (before the time limit)
 import xarray  # noqa: F401
 from fuzz import file_damage, harness
 
-from hexcontact import cli_show, cli_solve
+from hexcontact.cli import run as cli_solve
+from hexcontact.cli import show as cli_show
+from hexcontact.cli.plot_choices import OF_A_RESULT
 from hexcontact.errors import HexcontactError
-from hexcontact.plot_choices import OF_A_RESULT
-from hexcontact.store import open_result
+from hexcontact.result.store import open_result
 
 PICTURES = [name for name in OF_A_RESULT if name != "overview"]
 

@@ -23,9 +23,10 @@ import psutil  # noqa: F401
 import xarray  # noqa: F401
 
 import hexcontact
-from hexcontact import cli, restart, store  # noqa: F401
 from hexcontact.case import Case
-from hexcontact.result import Step
+from hexcontact.cli import app as cli
+from hexcontact.result import store
+from hexcontact.result.result import Step
 
 CALLS = (  # what a run does to the disk
     *((os, name) for name in ("fsync", "replace", "unlink", "rmdir", "ftruncate", "pwrite", "mkdir", "open")),

@@ -9,8 +9,9 @@ import sys
 
 import numpy as np
 
-from hexcontact import FrictionalContact, Lattice, NormalContact, ResourceError, kernel_cache
-from hexcontact.native import ElasticPair
+from hexcontact import FrictionalContact, Lattice, NormalContact, ResourceError
+from hexcontact.core import kernel_cache
+from hexcontact.core.contact import ElasticPair
 
 PAIR = ElasticPair(2e-12, -0.5e-12, 0.9e-12)
 SPACING = 2e-6

@@ -9,23 +9,17 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from hexcontact import (
-    Case,
-    ConvergenceError,
-    DeckError,
-    adaptive_steps,
-    estimates,
-    history,
-    overview,
-    remarks,
-    summary,
-)
-from hexcontact.history import describe
-from hexcontact.progress import Lines
-from hexcontact.restart import resume
-from hexcontact.result import Result, Step
-from hexcontact.schema import deck_schema
-from hexcontact.store import Journal, journal_of, open_result
+from hexcontact import Case, ConvergenceError, DeckError
+from hexcontact.cli import tables as summary
+from hexcontact.deck.schema import deck_schema
+from hexcontact.result import history, remarks
+from hexcontact.result.history import describe
+from hexcontact.result.result import Result, Step
+from hexcontact.result.store import Journal, journal_of, open_result
+from hexcontact.solve import adaptive as adaptive_steps
+from hexcontact.solve import estimates, overview
+from hexcontact.solve.progress import Lines
+from hexcontact.solve.restart import resume
 
 SPHERE = {"young_modulus": 432e9, "poisson_ratio": 0.32, "surface": {"shape": "sphere", "radius": 1e-3}}
 ALUMINIUM = {"young_modulus": 72e9, "poisson_ratio": 0.32}
@@ -287,7 +281,7 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
 
 
 def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact.window_friction import FrictionWindow
+    from hexcontact.solve.frictional import FrictionWindow
 
     advance, asked = FrictionWindow.advance, []
 

@@ -14,15 +14,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from hexcontact import deck as decks
-from hexcontact import grid as grids
-from hexcontact import starters
 from hexcontact.analytic import hertz_ellipse
 from hexcontact.case import Body, Case
+from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
+from hexcontact.core.lattice import Lattice
+from hexcontact.deck import starters
+from hexcontact.deck import tables as decks
+from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
 from hexcontact.errors import DeckError
-from hexcontact.lattice import Lattice
-from hexcontact.native import ElasticPair, NormalContact, NormalSolution
-from hexcontact.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
+from hexcontact.problem import window as grids
 
 CASES = Path(__file__).parents[2] / "cases"
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

@@ -17,9 +17,10 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import native, plotting
-from hexcontact.cli import app
-from hexcontact.store import journal_of, open_result
+from hexcontact import plotting
+from hexcontact.cli.app import app
+from hexcontact.core import contact as native
+from hexcontact.result.store import journal_of, open_result
 
 PACKAGE = Path(hexcontact.__file__).parents[1]
 ENVIRONMENT = {
@@ -428,9 +429,18 @@ def test_a_plain_ascii_terminal_is_enough(solved: Path) -> None:
 
 def test_help_is_quick() -> None:
     """What takes long is to import packages: help does without those that compute, read files and draw."""
-    heavy = {"matplotlib", "xarray", "pandas", "scipy", "netCDF4", "pint", "pydantic", "hexcontact._core"}
+    heavy = {
+        "matplotlib",
+        "xarray",
+        "pandas",
+        "scipy",
+        "netCDF4",
+        "pint",
+        "pydantic",
+        "hexcontact.core._core",
+    }
     program = (
-        "import sys\nfrom hexcontact.cli import main\nsys.argv = ['hexcontact', '--help']\n"
+        "import sys\nfrom hexcontact.cli.app import main\nsys.argv = ['hexcontact', '--help']\n"
         f"try:\n    main()\nexcept SystemExit:\n    pass\nprint(sorted({heavy} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hexcontact import Case, DeckError, Result, analytic
-from hexcontact.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere
+from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SOFT = {"young_modulus": 70e9, "poisson_ratio": 0.33}

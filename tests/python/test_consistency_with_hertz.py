@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from hexcontact import Case, analytic, estimators
-from hexcontact.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, Sphere
+from hexcontact import Case, analytic
+from hexcontact.core import estimators
+from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, Sphere
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 RUBBER = {"young_modulus": 10e6, "poisson_ratio": 0.5}

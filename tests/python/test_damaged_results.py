@@ -10,13 +10,13 @@ import pytest
 import xarray
 from fuzz.file_made import WINDOW, made_step, written
 
-from hexcontact.accuracy import Solution
 from hexcontact.errors import DeckError
-from hexcontact.record import read_record, write_record
-from hexcontact.result import Metadata, assemble
-from hexcontact.store import Store, journal_of, open_result
-from hexcontact.study_collect import histories
-from hexcontact.trial_folder import TrialFolder
+from hexcontact.result.record import read_record, write_record
+from hexcontact.result.result import Metadata, assemble
+from hexcontact.result.store import Store, journal_of, open_result
+from hexcontact.result.trials import TrialFolder
+from hexcontact.solve.accuracy import Solution
+from hexcontact.study.collect import histories
 
 MATERIALS = {
     **{"effective_modulus": 2e11, "dundurs_beta": 0.0, "tangential_compliance_ratio": 1.0},

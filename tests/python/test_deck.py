@@ -9,15 +9,15 @@ from typing import Any, get_args
 
 import pytest
 
-from hexcontact import deck as decks
-from hexcontact.deck import Deck, Load, Segment, read_toml, with_overrides
-from hexcontact.deck_location import places
+from hexcontact.deck import tables as decks
+from hexcontact.deck.faults import Source
+from hexcontact.deck.kinds import Table, kind_of
+from hexcontact.deck.location import places
+from hexcontact.deck.surfaces import SHAPES, Flat, Sphere, Surface
+from hexcontact.deck.tables import Deck, Load, Segment, read_toml, with_overrides
 from hexcontact.errors import DeckError
-from hexcontact.faults import Source
-from hexcontact.load_history import LoadStep, Target, load_steps
-from hexcontact.surfaces import SHAPES, Flat, Sphere, Surface
+from hexcontact.problem.loads import LoadStep, Target, load_steps
 from hexcontact.text import shown
-from hexcontact.validation import Table, kind_of
 
 ROOT = Path(__file__).parents[2]
 

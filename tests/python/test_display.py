@@ -15,9 +15,9 @@ from PIL import Image
 from rich.console import Console
 
 from hexcontact import Case, Result
+from hexcontact.deck.surfaces import Sphere
 from hexcontact.plotting.report_fields import Plane
-from hexcontact.step_view import StepView
-from hexcontact.surfaces import Sphere
+from hexcontact.result.view import StepView
 from hexcontact.text import html_table, text_table
 from hexcontact.variables import VARIABLES
 

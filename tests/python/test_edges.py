@@ -5,12 +5,12 @@ import pytest
 from scipy.special import ellipe
 
 from hexcontact import Case, analytic
-from hexcontact.edges import ContactEdges
-from hexcontact.lattice import Lattice
-from hexcontact.native import ElasticPair, NormalContact, NormalSolution
-from hexcontact.native_friction import ContactState, FrictionalContact
-from hexcontact.pressure_field import PressureField, linear
-from hexcontact.surfaces import Punch
+from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
+from hexcontact.core.edges import ContactEdges
+from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.lattice import Lattice
+from hexcontact.deck.surfaces import Punch
+from hexcontact.result.pressure_field import PressureField, linear
 
 RIGID_PARTNER = ElasticPair.from_materials(1.0, 0.0, None, None)  # E* = 1
 RADIUS = 50.0  # of spheres

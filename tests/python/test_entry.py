@@ -13,10 +13,10 @@ from validation.runs import shear_compliance
 
 import hexcontact
 from hexcontact import Case
-from hexcontact.lattice import Lattice
-from hexcontact.native import ElasticPair, FlexibilityOperator
-from hexcontact.native_friction import ContactState, Entry, FrictionalContact
-from hexcontact.surfaces import Sphere
+from hexcontact.core.contact import ElasticPair, FlexibilityOperator
+from hexcontact.core.friction import ContactState, Entry, FrictionalContact
+from hexcontact.core.lattice import Lattice
+from hexcontact.deck.surfaces import Sphere
 
 FORCES = ("force", "force", "force", "displacement")
 RADIUS = 1.0  # of the contact at the end

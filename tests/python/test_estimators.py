@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hexcontact import analytic, estimators
+from hexcontact import analytic
+from hexcontact.core import estimators
 
 HEIGHT = np.sqrt(0.75)
 

@@ -13,7 +13,8 @@ import matplotlib
 import pytest
 from matplotlib.figure import Figure
 
-from hexcontact import case, session
+from hexcontact import case
+from hexcontact.solve import session
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```python\n(.*?)^```\n(?:```\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL)

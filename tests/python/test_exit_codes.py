@@ -13,10 +13,10 @@ import pytest
 
 import hexcontact
 from hexcontact import Case
-from hexcontact import store as store_module
-from hexcontact.netcdf import read_output
-from hexcontact.result import Step
-from hexcontact.store import journal_of, open_result
+from hexcontact.result import store as store_module
+from hexcontact.result.netcdf import read_output
+from hexcontact.result.result import Step
+from hexcontact.result.store import journal_of, open_result
 
 DECK = """
 title = "A sphere"
@@ -45,7 +45,8 @@ ENVIRONMENT = os.environ | {
 
 LATE = """
 import atexit, os, sys, time
-from hexcontact import cli, json_output, run_command, solve, store, study_run
+from hexcontact.cli import app as cli, json_output, run_command
+from hexcontact.result import store
 
 number, sent = int(sys.argv.pop(1)), []
 def signaled(module, name):

@@ -16,10 +16,10 @@ import xarray
 from typer.testing import CliRunner
 
 from hexcontact import Case, open_result
-from hexcontact.cli import app
-from hexcontact.mesh import triangles
-from hexcontact.result import Step
-from hexcontact.store import journal_of
+from hexcontact.cli.app import app
+from hexcontact.result.mesh import triangles
+from hexcontact.result.result import Step
+from hexcontact.result.store import journal_of
 
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SPHERES = {"body_1": BODY | {"surface": {"shape": "sphere", "radius": 0.01}}, "body_2": BODY}
@@ -182,8 +182,8 @@ def test_a_result_in_memory_has_no_second_set_of_coordinates(folder: Path) -> No
 
 
 def test_a_window_without_triangles_has_no_mesh(tmp_path: Path) -> None:
-    from hexcontact.lattice import Lattice
-    from hexcontact.mesh import write_mesh
+    from hexcontact.core.lattice import Lattice
+    from hexcontact.result.mesh import write_mesh
 
     with netCDF4.Dataset(tmp_path / "row.nc", "w") as file:
         write_mesh(file, Lattice(1e-6, 0, 0, 1, 5))

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hexcontact.lattice import Lattice
-from hexcontact.native import ElasticPair, Method
-from hexcontact.native_friction import ContactState, FrictionalContact
+from hexcontact.core.contact import ElasticPair, Method
+from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.lattice import Lattice
 
 Array = NDArray[np.float64]
 

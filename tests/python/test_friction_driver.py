@@ -15,35 +15,31 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 from typer.testing import CliRunner
 
-from hexcontact import (
-    history,
-    influence,
-    json_output,
-    memory,
-    native,
-    native_friction,
-    overview,
-    remarks,
-    solve,
-    summary,
-)
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
-from hexcontact.cli import app
+from hexcontact.cli import json_output
+from hexcontact.cli import tables as summary
+from hexcontact.cli.app import app
+from hexcontact.core import contact as native
+from hexcontact.core import friction as native_friction
+from hexcontact.core import influence, memory
+from hexcontact.core.estimators import area_radius
+from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.lattice import Lattice
+from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
-from hexcontact.estimators import area_radius
-from hexcontact.history import describe
-from hexcontact.lattice import Lattice
-from hexcontact.load_history import LoadStep, Target
-from hexcontact.native_friction import ContactState, FrictionalContact
 from hexcontact.plotting import report
-from hexcontact.progress import Lines
-from hexcontact.result import Result, Step
-from hexcontact.store import Journal, journal_of, open_result
-from hexcontact.surfaces import Punch, Sphere
+from hexcontact.problem.loads import LoadStep, Target
+from hexcontact.result import history, remarks
+from hexcontact.result.history import describe
+from hexcontact.result.result import Result, Step
+from hexcontact.result.store import Journal, journal_of, open_result
+from hexcontact.solve import overview
+from hexcontact.solve import run as solve
+from hexcontact.solve.frictional import FrictionWindow, state_of
+from hexcontact.solve.frictionless import memory_needed
+from hexcontact.solve.progress import Lines
 from hexcontact.variables import FIELDS
-from hexcontact.window import memory_needed
-from hexcontact.window_friction import FrictionWindow, state_of
 
 STIFF = {"young_modulus": 432e9, "poisson_ratio": 0.32}
 ALUMINIUM = {"young_modulus": 72e9, "poisson_ratio": 0.32}
@@ -352,7 +348,7 @@ def test_memory_is_that_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     in_python = memory_needed(large, large.lattice) - large.memory_needed(large.lattice)
     assert in_python >= 3 * 8 * len(FrictionWindow.state) * large.lattice.size
     monkeypatch.setattr(memory, "available", lambda: 1000)
-    monkeypatch.setattr("hexcontact.native_friction.FrictionalContact", None)  # must not be reached
+    monkeypatch.setattr("hexcontact.core.friction.FrictionalContact", None)  # must not be reached
     with pytest.raises(ResourceError, match="a window of .* needs .* GB of memory"):
         case.run()
 

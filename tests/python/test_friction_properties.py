@@ -13,9 +13,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from hexcontact.lattice import Lattice
-from hexcontact.native import ElasticPair, FlexibilityOperator, Method, NormalContact
-from hexcontact.native_friction import ContactState, FrictionalContact
+from hexcontact.core.contact import ElasticPair, FlexibilityOperator, Method, NormalContact
+from hexcontact.core.friction import ContactState, FrictionalContact
+from hexcontact.core.lattice import Lattice
 
 Array = NDArray[np.float64]
 Control = tuple[str, str, str, str]

@@ -20,9 +20,9 @@ from hexcontact import (
     NormalContact,
     Study,
     analytic,
-    influence,
-    native,
 )
+from hexcontact.core import contact as native
+from hexcontact.core import influence
 
 LATTICE = Lattice(spacing=1e-4, row_first=-4, col_first=-4, n_row=9, n_col=9)
 GAP = (LATTICE.x**2 + LATTICE.y**2) / 20e-3

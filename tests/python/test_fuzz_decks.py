@@ -13,9 +13,11 @@ import typer
 from fuzz import harness
 from fuzz.deck_mutations import garbled, mutated
 
-from hexcontact import cli_deck, cli_guard, cli_solve
-from hexcontact.store import open_result
-from hexcontact.study import Study
+from hexcontact.cli import deck as cli_deck
+from hexcontact.cli import guard as cli_guard
+from hexcontact.cli import run as cli_solve
+from hexcontact.result.store import open_result
+from hexcontact.study.study import Study
 
 CASES = Path(__file__).parents[2] / "cases"
 CHECKED, RUN, OTHERS = 2000, 200, 240  # decks; of each kind of other files a third

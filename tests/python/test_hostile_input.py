@@ -20,11 +20,11 @@ from click.testing import Result as Done
 from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError, Study, open_result
-from hexcontact.cli import app
-from hexcontact.deck_assembly import MOST_INCLUDED, MOST_SERIES
+from hexcontact.cli.app import app
+from hexcontact.deck.read import MOST_INCLUDED, MOST_SERIES
+from hexcontact.deck.series import MOST_STEPS, read_series
 from hexcontact.files import LARGEST_TEXT, text_of
-from hexcontact.load_series import MOST_STEPS, read_series
-from hexcontact.progress import Bar
+from hexcontact.solve.progress import Bar
 from hexcontact.text import html_table, text_table, visible
 
 OBEYED = re.compile(
@@ -324,7 +324,7 @@ def test_files_have_a_largest_size(folder: Path) -> None:
 
 
 def test_includes_that_multiply_are_stopped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from hexcontact import deck_assembly
+    from hexcontact.deck import read as deck_assembly
 
     read: list[str] = []
 

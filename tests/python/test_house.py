@@ -13,7 +13,7 @@ import pytest
 import typer.main
 
 import hexcontact
-from hexcontact.cli import app
+from hexcontact.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "fortran").rglob("*.f90"))
@@ -149,7 +149,7 @@ def canonical(requirement: str) -> str:
 
 def test_command_starts_without_the_heavy_packages() -> None:
     heavy = {"matplotlib", "xarray", "pandas", "scipy", "netCDF4", "pint", "pydantic", "hypothesis"}
-    program = f"import sys, hexcontact, hexcontact.cli; print(sorted({heavy} & set(sys.modules)))"
+    program = f"import sys, hexcontact, hexcontact.cli.app; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hexcontact.interruption import Interrupted, in_background, news
+from hexcontact.solve.interruption import Interrupted, in_background, news
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1]
 

@@ -16,10 +16,13 @@ import typer.main
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, ConvergenceError, cli_deck, json_output, solve, verify
-from hexcontact.cli import app
+from hexcontact import Case, ConvergenceError
+from hexcontact.cli import deck as cli_deck
+from hexcontact.cli import json_output, verify
+from hexcontact.cli.app import app
 from hexcontact.errors import Fault
-from hexcontact.store import open_result
+from hexcontact.result.store import open_result
+from hexcontact.solve import run as solve
 
 DECK = """title = "A sphere"
 [body.1]

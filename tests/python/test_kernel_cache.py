@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from hexcontact import DeckError, FlexibilityOperator, KernelFolderWarning, Lattice, kernel_cache, memory
-from hexcontact.native import ElasticPair, NormalContact
-from hexcontact.native_friction import FrictionalContact
+from hexcontact import DeckError, FlexibilityOperator, KernelFolderWarning, Lattice
+from hexcontact.core import kernel_cache, memory
+from hexcontact.core.contact import ElasticPair, NormalContact
+from hexcontact.core.friction import FrictionalContact
 
 PAIR = ElasticPair(2e-12, -0.4e-12, 0.9e-12)
 SPACING = 2e-6

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from hexcontact import DeckError
-from hexcontact.lock import Lock
-from hexcontact.result import Metadata
-from hexcontact.store import Store, journal_of
+from hexcontact.result.lock import Lock
+from hexcontact.result.result import Metadata
+from hexcontact.result.store import Store, journal_of
 
 THESIS = "what somebody wrote\n"
 

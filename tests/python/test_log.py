@@ -18,10 +18,11 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, ConvergenceError, FrictionalContact, NormalContact, log
-from hexcontact.cli import app
+from hexcontact import Case, ConvergenceError, FrictionalContact, NormalContact
+from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
-from hexcontact.store import open_result
+from hexcontact.result.store import open_result
+from hexcontact.solve import log
 
 DECK = """
 title = "A \\"sphere\\"\\nof steel"
@@ -374,7 +375,7 @@ def test_a_study_logs_its_cases(tmp_path: Path) -> None:
 
 
 def test_level_names_are_those_of_the_option() -> None:
-    from hexcontact.cli_options import LogLevel
+    from hexcontact.cli.options import LogLevel
 
     assert [level.value for level in LogLevel] == list(log.LEVELS)
     with pytest.raises(DeckError, match="cannot be written"), log.kept(Path("/no/folder/x"), None):

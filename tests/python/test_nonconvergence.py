@@ -11,8 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexcontact import Case, ConvergenceError, influence, nonconvergence, solve
-from hexcontact.window import kind_of
+from hexcontact import Case, ConvergenceError
+from hexcontact.core import influence
+from hexcontact.solve import nonconvergence
+from hexcontact.solve import run as solve
+from hexcontact.solve.frictionless import kind_of
 
 SPHERE = {"young_modulus": 210e9, "poisson_ratio": 0.3, "surface": {"shape": "sphere", "radius": 10e-3}}
 PLANE = {"young_modulus": 70e9, "poisson_ratio": 0.33}
@@ -37,7 +40,7 @@ def failed(case: Case, **changed: Any) -> tuple[ConvergenceError, Any, Any]:
 
 
 def _names() -> list[str]:
-    from hexcontact.load_series import LOADS
+    from hexcontact.deck.series import LOADS
 
     return [name for pair in LOADS.values() for name in pair]
 

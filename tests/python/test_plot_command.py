@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from hexcontact import Case, open_result, plot_choices, plot_command, plotting
-from hexcontact.cli import app
+from hexcontact import Case, open_result, plotting
+from hexcontact.cli import plot_choices, plot_command
+from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
 from hexcontact.plotting import influence as plotting_influence
 

@@ -12,16 +12,17 @@ import xarray
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
-from hexcontact import analytic, estimators, plotting
+from hexcontact import analytic, plotting
 from hexcontact.analytic import EllipticContact
+from hexcontact.core import estimators
 from hexcontact.plotting import maps as plotting_maps
-from hexcontact.step_view import StepView, scaled, worded
+from hexcontact.result.view import StepView, scaled, worded
 
 HEIGHT = np.sqrt(0.75)
 
 
 def made(gap, pressures, loads, spacing=0.1, half=16, modulus=2.0, **attributes) -> xarray.Dataset:
-    """Lay a result out as `hexcontact.result.assemble` does; gap and pressures are functions of (x, y)."""
+    """Lay a result out as `hexcontact.result.result.assemble` does; gap and pressures are functions of (x, y)."""
     index = np.arange(-half, half + 1)
     row, col = np.meshgrid(index, index, indexing="ij")
     x, y = spacing * (col + 0.5 * row), spacing * HEIGHT * row

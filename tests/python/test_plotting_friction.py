@@ -1,6 +1,6 @@
 """Pictures of results with friction: what they show is what the result says.
 
-The results here are laid out by `hexcontact.result.assemble` from closed solutions: spheres with E* = 2,
+The results here are laid out by `hexcontact.result.result.assemble` from closed solutions: spheres with E* = 2,
 gamma = 0.4, mu = 0.3, pressed by P = 0.8 and sheared or twisted.
 """
 
@@ -26,13 +26,13 @@ from hexcontact import analytic, plotting
 from hexcontact.analytic import shear as closed_forms
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
 from hexcontact.analytic.shear import ClosedForms
-from hexcontact.lattice import Lattice
+from hexcontact.core.lattice import Lattice
 from hexcontact.plotting import zone_maps
 from hexcontact.plotting.compliance_curve import initial_compliance
 from hexcontact.plotting.histories import panels_of
 from hexcontact.plotting.style import SLIP, STICK
-from hexcontact.result import Metadata, Step, assemble
-from hexcontact.step_view import StepView
+from hexcontact.result.result import Metadata, Step, assemble
+from hexcontact.result.view import StepView
 
 MODULUS, GAMMA, MU, LOAD, RADIUS = 2.0, 0.4, 0.3, 0.8, 1.5
 HERTZ = analytic.hertz_sphere(MODULUS, RADIUS, normal_load=LOAD)

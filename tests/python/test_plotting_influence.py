@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexcontact.influence import pyramid_functions
+from hexcontact.core.influence import pyramid_functions
 from hexcontact.plotting import influence as plotting_influence
 
 HEIGHT = np.sqrt(0.75)

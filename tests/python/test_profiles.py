@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from hexcontact import Case, DeckError, Lattice, Result, open_result
-from hexcontact.profiles import Line, interpolate, profile
-from hexcontact.surfaces import Sphere
+from hexcontact.deck.surfaces import Sphere
+from hexcontact.result.profiles import Line, interpolate, profile
 
 Array = NDArray[np.float64]
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

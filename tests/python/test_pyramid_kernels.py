@@ -9,7 +9,7 @@ import pytest
 
 import hexcontact
 from hexcontact import DeckError
-from hexcontact.influence import (
+from hexcontact.core.influence import (
     PyramidFunctions,
     linear_load_displacement,
     pyramid_functions,

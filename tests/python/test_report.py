@@ -24,11 +24,11 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from hexcontact import Case, analytic, open_result
-from hexcontact.cli import app
+from hexcontact.cli.app import app
 from hexcontact.plotting.report import report, write_report
 from hexcontact.plotting.report_fields import MOST_STEPS, Plane, kept_steps
-from hexcontact.result import Result, Step
-from hexcontact.step_view import StepView
+from hexcontact.result.result import Result, Step
+from hexcontact.result.view import StepView
 from hexcontact.text import quantity
 
 DECK = """\

@@ -16,11 +16,12 @@ import pytest
 import xarray
 
 import hexcontact
-from hexcontact import Case, ConvergenceError, DeckError, ResourceError, native
-from hexcontact import store as store_module
-from hexcontact.record import read_record, write_record
-from hexcontact.result import Metadata, Step
-from hexcontact.store import Journal, Store, journal_of, open_result
+from hexcontact import Case, ConvergenceError, DeckError, ResourceError
+from hexcontact.core import contact as native
+from hexcontact.result import store as store_module
+from hexcontact.result.record import read_record, write_record
+from hexcontact.result.result import Metadata, Step
+from hexcontact.result.store import Journal, Store, journal_of, open_result
 
 RECORD_KB = 100
 SPHERE = {"young_modulus": 432e9, "poisson_ratio": 0.32, "surface": {"shape": "sphere", "radius": 1e-3}}
@@ -383,7 +384,7 @@ def test_a_process_number_that_was_given_again_holds_no_lock(
 
     out = tmp_path / "out.nc"
     stopped(made(), out, 2)
-    monkeypatch.setattr("hexcontact.lock.fcntl.flock", unsupported)
+    monkeypatch.setattr("hexcontact.result.lock.fcntl.flock", unsupported)
     holder = {"process": os.getpid(), "host": os.uname().nodename, "since": "2026-01-01 00:00:00"}
     (journal_of(out) / "lock").write_text(json.dumps({**holder, "time": 2e9}))
     with pytest.raises(DeckError, match="is being written by another run"):
@@ -420,7 +421,7 @@ def test_after_a_full_disk_the_run_goes_on(
 
     def fill(step: Step) -> None:
         if step.number == 2:
-            monkeypatch.setattr(f"hexcontact.store.os.{call}", full)
+            monkeypatch.setattr(f"hexcontact.result.store.os.{call}", full)
 
     case, out = made(), tmp_path / "out.nc"
     case.run(tmp_path / "whole.nc")

@@ -52,7 +52,7 @@ def python_arrows() -> tuple[dict[str, str], Arrows]:
     """Room of each module, and who imports whom."""
     files = {
         ".".join(path.relative_to(PYTHON.parent).with_suffix("").parts).removesuffix(".__init__"): path
-        for path in sorted([*PYTHON.rglob("*.py"), PYTHON / "_core.pyi"])
+        for path in sorted([*PYTHON.rglob("*.py"), PYTHON / "core/_core.pyi"])
     }
     rooms = {}
     for name, path in files.items():

@@ -13,8 +13,8 @@ from numpy.testing import assert_array_equal
 
 import hexcontact
 from hexcontact import Case, ConvergenceError, DeckError, Result, Step, StopRun, open_result
-from hexcontact.store import journal_of
-from hexcontact.surfaces import Sphere
+from hexcontact.deck.surfaces import Sphere
+from hexcontact.result.store import journal_of
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SOFT = {"young_modulus": 70e9, "poisson_ratio": 0.33}

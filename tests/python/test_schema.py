@@ -12,11 +12,11 @@ import pytest
 from jsonschema import Draft202012Validator
 from typer.testing import CliRunner
 
-from hexcontact import starters
-from hexcontact.cli import app
-from hexcontact.deck import Deck
-from hexcontact.faults import Source
-from hexcontact.schema import deck_schema
+from hexcontact.cli.app import app
+from hexcontact.deck import starters
+from hexcontact.deck.faults import Source
+from hexcontact.deck.schema import deck_schema
+from hexcontact.deck.tables import Deck
 
 ROOT = Path(__file__).parents[2]
 DECKS = runpy.run_path(str(Path(__file__).with_name("test_deck.py")))

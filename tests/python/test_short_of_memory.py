@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_array_equal
 
-from hexcontact import memory, open_result
+from hexcontact import open_result
+from hexcontact.core import memory
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/statm").exists(), reason="limits and sizes are those of Linux"
@@ -53,7 +54,7 @@ except ResourceError as error:
 # Says how much address space the command and the buffers of numpy take before it begins to work.
 BEGUN = """
 import numpy
-import hexcontact._core, hexcontact.run_command
+import hexcontact.core._core, hexcontact.cli.run_command
 numpy.linalg.lstsq(numpy.eye(9), numpy.ones(9))
 print(*(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmPeak")))
 """

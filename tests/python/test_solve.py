@@ -12,14 +12,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hexcontact import memory, native, solve
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
+from hexcontact.core import contact as native
+from hexcontact.core import memory
+from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import ConvergenceError, DeckError, ResourceError
-from hexcontact.progress import Lines, Reporter, reporter
-from hexcontact.result import Step
-from hexcontact.store import journal_of, open_result
-from hexcontact.surfaces import Punch, Sphere
+from hexcontact.result.result import Step
+from hexcontact.result.store import journal_of, open_result
+from hexcontact.solve import run as solve
+from hexcontact.solve.progress import Lines, Reporter, reporter
 from hexcontact.text import quantity
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}

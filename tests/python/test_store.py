@@ -23,14 +23,14 @@ import xarray
 from fuzz.file_made import WINDOW, made_step, written
 from numpy.testing import assert_array_equal
 
-from hexcontact import journal as journal_module
-from hexcontact import lock as lock_module
-from hexcontact import store as store_module
 from hexcontact.errors import DeckError, ResourceError
-from hexcontact.lock import Lock
-from hexcontact.record import read_record
-from hexcontact.result import Metadata, Step, assemble
-from hexcontact.store import Journal, Store, journal_of, open_result
+from hexcontact.result import journal as journal_module
+from hexcontact.result import lock as lock_module
+from hexcontact.result import store as store_module
+from hexcontact.result.lock import Lock
+from hexcontact.result.record import read_record
+from hexcontact.result.result import Metadata, Step, assemble
+from hexcontact.result.store import Journal, Store, journal_of, open_result
 
 
 def content(path: Path) -> dict[str, bytes]:
@@ -111,7 +111,7 @@ def test_a_file_can_be_open_many_times(out: Path) -> None:
     program = f"""
         import random, sys
         sys.path[:0] = {sys.path!r}
-        from hexcontact.store import open_result
+        from hexcontact.result.store import open_result
         random.seed(1)
         held = []
         for turn in range(150):
@@ -404,8 +404,8 @@ def test_a_full_disk_is_told_apart_from_wrong_input(out: Path) -> None:
         sys.path[:0] = {[str(Path(__file__).parent), *sys.path]!r}
         from dataclasses import replace
         from test_store import WINDOW, made_step
-        from hexcontact.result import Metadata
-        from hexcontact.store import Store
+        from hexcontact.result.result import Metadata
+        from hexcontact.result.store import Store
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         with Store({str(out)!r}, Metadata(planned_steps=9), overwrite=True) as store:
             store.append(made_step(0))
@@ -436,8 +436,8 @@ WRITER = """
     import sys
     sys.path[:0] = {path!r}
     from test_store import made_step
-    from hexcontact import store
-    from hexcontact.result import Metadata
+    from hexcontact.result import store
+    from hexcontact.result.result import Metadata
     store.PUBLISH_INTERVAL = 0.0
     with store.Store({out!r}, Metadata(title="killed", planned_steps=40), overwrite={overwrite!r}) as running:
         for index in range(40):
@@ -499,8 +499,8 @@ def other_run(out: Path) -> Iterator[subprocess.Popen[str]]:
     program = f"""
         import sys
         sys.path[:0] = {sys.path!r}
-        from hexcontact.result import Metadata
-        from hexcontact.store import Store
+        from hexcontact.result.result import Metadata
+        from hexcontact.result.store import Store
         with Store({str(out)!r}, Metadata()):
             print("ready", flush=True)
             sys.stdin.readline()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import hexcontact
-from hexcontact.store import open_result
+from hexcontact.result.store import open_result
 
 DECK = """
 title = "A sphere"

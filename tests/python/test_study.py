@@ -23,14 +23,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
 import hexcontact
-from hexcontact import Case, DeckError, starters, study_run
-from hexcontact.cli import app
-from hexcontact.deck import with_overrides
-from hexcontact.progress import Reporter
-from hexcontact.solve import metadata_of, record
-from hexcontact.store import Store
-from hexcontact.study import Study, run_study
-from hexcontact.study_run import Job, LocalPool, solve_case
+from hexcontact import Case, DeckError
+from hexcontact.cli.app import app
+from hexcontact.deck import starters
+from hexcontact.deck.tables import with_overrides
+from hexcontact.result.store import Store
+from hexcontact.solve.progress import Reporter
+from hexcontact.solve.run import metadata_of, record
+from hexcontact.study import pool as study_run
+from hexcontact.study.pool import Job, LocalPool, solve_case
+from hexcontact.study.study import Study, run_study
 
 PACKAGE = Path(hexcontact.__file__).parents[1]
 CASES = Path(__file__).parents[2] / "cases"
@@ -608,8 +610,8 @@ def test_two_runs_of_one_study_do_not_meet(folder: Path) -> None:
 
 
 def test_a_case_that_another_run_is_at_is_no_failure_of_the_case(folder: Path) -> None:
-    from hexcontact.solve import metadata_of
-    from hexcontact.store import Store
+    from hexcontact.result.store import Store
+    from hexcontact.solve.run import metadata_of
 
     study = Study.from_toml("study.toml")
     case = study.missing()[0]
@@ -638,7 +640,7 @@ def test_on_dask_a_killed_worker_loses_nothing(folder: Path) -> None:
         pids = {worker.pid for worker in cluster.workers.values()}
         killed: list[int] = []
 
-        class Killer(hexcontact.study.StudyWatcher):
+        class Killer(hexcontact.study.study.StudyWatcher):
             def finished(self, case: Any, outcome: Any) -> None:
                 if killed:
                     return

@@ -6,8 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from hexcontact.errors import DeckError
-from hexcontact.surfaces import (
+from hexcontact.deck.surfaces import (
     SHAPES,
     Cone,
     Cylinder,
@@ -21,6 +20,7 @@ from hexcontact.surfaces import (
     Surface,
     principal_curvatures,
 )
+from hexcontact.errors import DeckError
 
 SOME = [
     Flat(),

@@ -25,12 +25,12 @@ from hexcontact import (
     NormalContact,
     Result,
     Step,
-    native,
-    native_friction,
     open_result,
 )
-from hexcontact.native import ElasticPair, Method
-from hexcontact.surfaces import Sphere
+from hexcontact.core import contact as native
+from hexcontact.core import friction as native_friction
+from hexcontact.core.contact import ElasticPair, Method
+from hexcontact.deck.surfaces import Sphere
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SOFT = {"young_modulus": 70e9, "poisson_ratio": 0.33}

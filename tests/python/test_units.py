@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexcontact import units
-from hexcontact.units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE, UnitError, to_si
+from hexcontact.deck import units
+from hexcontact.deck.units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE, UnitError, to_si
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_lengths_in_messages_are_readable(length: float, text: str) -> None:
 
 def test_pint_is_imported_only_for_unusual_units() -> None:
     script = (
-        "import sys; import hexcontact.deck as d; from hexcontact.units import *;"
+        "import sys; import hexcontact.deck.tables as d; from hexcontact.deck.units import *;"
         "to_si('3 mm', LENGTH), to_si('2 GPa', PRESSURE), to_si('1 kN', FORCE), to_si('3 deg', ANGLE);"
         "assert not {'pint', 'scipy', 'xarray', 'matplotlib', 'netCDF4'} & set(sys.modules), 'early import';"
         "to_si('3 inch', LENGTH); assert 'pint' in sys.modules"

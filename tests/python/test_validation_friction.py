@@ -21,8 +21,8 @@ from validation import (
 from validation.reference import reference
 
 from hexcontact.analytic.friction import PlaneCattaneo, goodman_stick_ratio_plane
-from hexcontact.surfaces import Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.deck.surfaces import Sphere
 
 
 def failures(comparison: Comparison) -> list[str]:

@@ -11,11 +11,11 @@ from validation import reference as table_of_references
 from validation.reference import TABLE, reference
 from validation.run import markdown
 
-from hexcontact import verify
 from hexcontact.analytic.friction import MindlinContact
+from hexcontact.cli import verify
+from hexcontact.cli.verify import Check, Comparison
+from hexcontact.core.contact import ElasticPair
 from hexcontact.errors import DeckError
-from hexcontact.native import ElasticPair
-from hexcontact.verify import Check, Comparison
 
 
 def failures(comparison: Comparison) -> list[str]:

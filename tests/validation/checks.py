@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hexcontact.verify import Check, Comparison
+from hexcontact.cli.verify import Check, Comparison
 
 from .reference import reference
 
 
 def kernels() -> Comparison:
     """Pyramid kernels at lattice points against the reference table."""
-    from hexcontact.influence import pyramid_kernels
+    from hexcontact.core.influence import pyramid_kernels
 
     found = Comparison()
     for col, row in ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, -1)):
@@ -29,7 +29,7 @@ def kernels() -> Comparison:
 
 def materials() -> Comparison:
     """Constants of the pairs of materials of sections 9.2 and 9.3."""
-    from hexcontact.native import ElasticPair
+    from hexcontact.core.contact import ElasticPair
 
     found = Comparison()
     for section, beta, moduli in (

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from hexcontact import analytic, estimators
-from hexcontact.surfaces import Cylinder
-from hexcontact.verify import Comparison
+from hexcontact import analytic
+from hexcontact.cli.verify import Comparison
+from hexcontact.core import estimators
+from hexcontact.deck.surfaces import Cylinder
 
 from .normal import ellipse_error
 from .reference import reference

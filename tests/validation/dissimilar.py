@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hexcontact.analytic import friction as closed
-from hexcontact.surfaces import Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.deck.surfaces import Sphere
 
 from .reference import reference
 from .runs import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hexcontact.analytic import friction as closed
-from hexcontact.surfaces import Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.deck.surfaces import Sphere
 
 from .dissimilar import LOAD
 from .reference import reference

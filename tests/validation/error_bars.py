@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from hexcontact import analytic
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.case import Case
-from hexcontact.native import ElasticPair
-from hexcontact.progress import Reporter
-from hexcontact.refinement import InMemory, refine
-from hexcontact.surfaces import Cylinder, Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.core.contact import ElasticPair
+from hexcontact.deck.surfaces import Cylinder, Sphere
+from hexcontact.solve.lattices import InMemory, refine
+from hexcontact.solve.progress import Reporter
 
 from .runs import shear_compliance
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hexcontact.analytic.friction import MindlinContact
-from hexcontact.surfaces import Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.deck.surfaces import Sphere
 
 from .reference import reference
 from .runs import (

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hexcontact.surfaces import Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.deck.surfaces import Sphere
 
 from .runs import ALUMINUM, BALL, STIFF, bodies, dissimilar_pair, hertz_of, press, run
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from hexcontact.analytic import friction as closed
-from hexcontact.surfaces import Punch, Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.deck.surfaces import Punch, Sphere
 
 from .reference import reference
 from .runs import DIGITS, bodies, hertz_of, press, run

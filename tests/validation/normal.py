@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexcontact import analytic, estimators
+from hexcontact import analytic
 from hexcontact.case import Case
-from hexcontact.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere, Surface
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.core import estimators
+from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere, Surface
 
 from .reference import reference
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from hexcontact import analytic
 from hexcontact.analytic.friction import PlaneCattaneo, goodman_stick_ratio_plane
-from hexcontact.surfaces import Paraboloid
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.deck.surfaces import Paraboloid
 
 from .runs import Array, Mask, State, bodies, press, run
 

@@ -7,7 +7,7 @@ import functools
 import math
 from pathlib import Path
 
-from hexcontact.verify import UNITS, Known
+from hexcontact.cli.verify import UNITS, Known
 
 TABLE = Path(__file__).parents[1] / "reference/benchmarks.csv"
 

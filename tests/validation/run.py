@@ -13,8 +13,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from hexcontact import DeckError, verify
-from hexcontact.verify import HEADERS, Check, Comparison, cells_of, judge_column
+from hexcontact import DeckError
+from hexcontact.cli import verify
+from hexcontact.cli.verify import HEADERS, Check, Comparison, cells_of, judge_column
 from validation.checks import CHECKS
 
 

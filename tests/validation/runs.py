@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexcontact import analytic, estimators
+from hexcontact import analytic
 from hexcontact.case import Case
-from hexcontact.native import ElasticPair
-from hexcontact.result import Result
-from hexcontact.surfaces import Sphere, Surface
+from hexcontact.core import estimators
+from hexcontact.core.contact import ElasticPair
+from hexcontact.deck.surfaces import Sphere, Surface
+from hexcontact.result.result import Result
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

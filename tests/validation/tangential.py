@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
-from hexcontact.native import ElasticPair
-from hexcontact.surfaces import Sphere
-from hexcontact.verify import Comparison
+from hexcontact.cli.verify import Comparison
+from hexcontact.core.contact import ElasticPair
+from hexcontact.deck.surfaces import Sphere
 
 from .reference import reference
 from .runs import DIGITS, Run, State, bodies, each, hertz_of, run, shear_compliance, twist_compliance

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import reals
+from ..arrays import reals
 
 Array = NDArray[np.float64]
 

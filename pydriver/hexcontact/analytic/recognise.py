@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deck import Deck
+from ..deck.tables import Deck
 from . import friction, frictionless
 from .hertz_gap import SIMILAR, QuadraticGap
 from .shear import CIRCULAR, ClosedForms, superposed
@@ -24,7 +24,7 @@ from .shear import CIRCULAR, ClosedForms, superposed
 if TYPE_CHECKING:
     import xarray
 
-    from ..surfaces import Surface
+    from ..deck.surfaces import Surface
     from .frictionless import AxisymmetricContact
 
 Array = NDArray[np.float64]

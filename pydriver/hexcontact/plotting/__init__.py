@@ -14,7 +14,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from ..analytic.shear import ClosedForms
-from ..step_view import StepView, dataset_of, scaled
+from ..result.view import StepView, dataset_of, scaled
 from .compliance_curve import compliance
 from .histories import draw_history, fitted, history, loop, torsion
 from .maps import draw_field, field_map, outline, set_plane, widened
@@ -25,7 +25,7 @@ from .zone_maps import contact_boundary, draw_zones, outlines, zone_legend, zone
 if TYPE_CHECKING:
     import xarray
 
-    from ..result import Result
+    from ..result.result import Result
 
 __all__ = [
     "FIGURES",

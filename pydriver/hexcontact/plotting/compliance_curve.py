@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ..analytic.friction import MindlinContact
 from ..analytic.shear import CIRCULAR
-from ..step_view import QuadraticGap, as_list, dataset_of
+from ..result.view import QuadraticGap, as_list, dataset_of
 from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, new_figure, set_title
 
 if TYPE_CHECKING:
     import xarray
 
-    from ..step_view import Results
+    from ..result.view import Results
 
 Array = NDArray[np.float64]
 

@@ -12,14 +12,14 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, line_of
-from ..step_view import dataset_of, scaled, title_of
+from ..result.view import dataset_of, scaled, title_of
 from .style import COMPUTED, EXACT, GUIDE, STYLE, new_figure, set_title
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from ..result import Result
+    from ..result.result import Result
 
 Array = NDArray[np.float64]
 

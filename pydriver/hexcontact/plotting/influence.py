@@ -41,7 +41,7 @@ def pyramid_displacements(poisson_ratio: float = 0.3) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    from ..influence import pyramid_functions
+    from ..core.influence import pyramid_functions
 
     fine = np.linspace(-2.2, 2.2, 221)
     x, y = np.meshgrid(fine, fine)
@@ -90,7 +90,7 @@ def point_force(x: Array, y: Array) -> Array:
 
 def constant_cell(x: Array, y: Array) -> Array:
     """Integral of 1/rho over the hexagonal cell of a node, under the load 1."""
-    from ..influence import triangle_integral
+    from ..core.influence import triangle_integral
 
     corner = np.exp(1j * (_HEXAGON + np.pi / 6)) / np.sqrt(3.0)
     total = np.zeros(np.broadcast(x, y).shape)
@@ -102,7 +102,7 @@ def constant_cell(x: Array, y: Array) -> Array:
 
 def pyramid(x: Array, y: Array) -> Array:
     """Integral of 1/rho over the unit pyramid."""
-    from ..influence import pyramid_kernels
+    from ..core.influence import pyramid_kernels
 
     return np.asarray(pyramid_kernels(x, y)[0])
 

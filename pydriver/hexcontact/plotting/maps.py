@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from ..step_view import StepView, as_list, dataset_of, scaled, title_of
+from ..result.view import StepView, as_list, dataset_of, scaled, title_of
 from .style import EXACT, STYLE, new_figure, set_title
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.collections import TriMesh
     from matplotlib.figure import FigureBase
 
-    from ..result import Result
-    from ..step_view import Results
+    from ..result.result import Result
+    from ..result.view import Results
 
 Array = NDArray[np.float64]
 Limits = tuple[float, float, float, float]

@@ -18,19 +18,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import summary
 from .._version import __version__
+from ..cli import tables as summary
 from ..errors import DeckError
-from ..history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, step_rows, worth_showing
-from ..overview import case_rows
-from ..remarks import remarks
-from ..step_view import scaled
+from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, step_rows, worth_showing
+from ..result.remarks import remarks
+from ..result.view import scaled
+from ..solve.overview import case_rows
 from ..text import escaped, quantity
 from ..variables import VARIABLES
 from .report_fields import kept_steps, maps_of, rounded
 
 if TYPE_CHECKING:
-    from ..result import Result
+    from ..result.result import Result
 
 History = Mapping[str, Any]
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..raster import Plane, png_of
-from ..step_view import StepView, scaled
+from ..result.raster import Plane, png_of
+from ..result.view import StepView, scaled
 from ..variables import VARIABLES
 
 if TYPE_CHECKING:
-    from ..result import Result
+    from ..result.result import Result
 
 Array = NDArray[np.float64]
 

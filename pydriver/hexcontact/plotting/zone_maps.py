@@ -14,10 +14,10 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from .. import estimators
 from ..analytic.shear import ClosedForms, PartialSlip
-from ..edges import ContactEdges, Edge
-from ..step_view import StepView, as_list, dataset_of, scaled, worded
+from ..core import estimators
+from ..core.edges import ContactEdges, Edge
+from ..result.view import StepView, as_list, dataset_of, scaled, worded
 from .maps import FEWER_ARROWS, draw_arrows, map_panels, outer_labels, outline, set_plane, union, views_of
 from .style import COMPUTED, EXACT, GUIDE, SLIP, STICK, STYLE, THIRD, set_title, shades
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from ..result import Result
-    from ..step_view import Results
+    from ..result.result import Result
+    from ..result.view import Results
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

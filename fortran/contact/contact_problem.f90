@@ -1,0 +1,401 @@
+!> A contact problem with friction: what is given, and how well a state solves it.
+!>
+!> One load step leads from the relative displacement s^n (zero for a body that
+!> was never loaded) to tractions p, q and rigid motions with
+!>
+!>     g = h + w - approach,   s = (u1 - u2) - shift - twist x r,   ds = s - s^n,
+!>
+!> where w, u1 - u2 are the flexibility operator's. `friction_solver_t` is what
+!> both methods, on LAPACK and on FFTs, look like from outside.
+module hc_contact_problem
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use hc_precision, only: wp, pi
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: flexibility_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
+    normal, along_x, along_y, about_z, n_motion, force_control, within_tolerance, sweeps_used_up, &
+    loads_not_carried, out_of_range
+  use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
+    tangential_residual, largest_pressure, force_residual, least_traction
+  use hc_coulomb, only: coulomb_t
+  use hc_friction_rows, only: zone_row
+  use hc_transfer, only: restrict_field, restrict_mask
+  implicit none
+  private
+
+  public :: friction_problem_t, new_friction_problem, friction_solver_t
+  public :: classification_scale
+
+  !> Scale kappa of the classification parameter: r = kappa/(2 pi lambda_1 (1 + gamma) a).
+  real(wp), parameter :: classification_scale = 10.0_wp
+
+  !> |beta| min(mu, 1) from which pressure and shear traction are better found together.
+  real(wp), parameter :: strong_coupling = 0.03_wp
+
+  !> What is given.
+  type :: friction_problem_t
+    !> Lattice and window
+    type(lattice_t) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t) :: pair
+    !> Law of friction
+    type(coulomb_t) :: friction
+    !> Goodman's approximation: shear tractions do not move the pressure
+    logical :: goodman = .false.
+    !> Initial gap (n_col, n_row) [m]
+    real(wp), allocatable :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, allocatable :: candidate(:, :)
+    !> Coordinates of the nodes (n_col, n_row) [m]
+    real(wp), allocatable :: x(:, :), y(:, :)
+    !> Self-compliances d_n and d_t of a node [m/Pa]
+    real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
+    !> Threads that share the passes over its nodes
+    integer :: n_threads = 1
+  contains
+    !> The same problem on the lattice of every second node
+    procedure :: coarsened
+    !> Will the bodies touch?
+    procedure :: is_pressed
+    !> Do pressure and shear traction act strongly on each other?
+    procedure :: couples_strongly
+    !> State of bodies that do not touch
+    procedure :: separate
+    !> Relative displacements (w, u_x, u_y) of given tractions
+    procedure :: displacements
+    !> Tangential displacement of a rigid motion
+    procedure :: rigid_displacement
+    !> Resultants of given tractions
+    procedure :: resultants
+    !> Classification parameter r of the tangential conditions
+    procedure :: classification_parameter
+    !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known
+    procedure :: conclude
+    !> Residuals of its loads alone
+    procedure :: judge_loads
+  end type friction_problem_t
+
+  !> A method of solving it.
+  type, abstract :: friction_solver_t
+    type(friction_problem_t) :: problem
+  contains
+    !> One load step
+    procedure(solve_step), deferred :: solve_step
+    !> Relative displacements (w, u_x, u_y) of given tractions
+    procedure(solver_displacements), deferred :: displacements
+  end type friction_solver_t
+
+  abstract interface
+    !> Tractions and motions at the end of a load step.
+    !>
+    !> `state%converged` tells whether all residuals are within the tolerance. The
+    !> accumulated quantities (slip path, dissipated energy) are left alone.
+    subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+      import :: friction_solver_t, contact_state_t, load_target_t, wp, error_t
+      class(friction_solver_t), intent(inout), target :: self
+      !> State to start the iteration from; without pressure anywhere: none
+      type(contact_state_t), intent(in) :: start
+      !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
+      real(wp), intent(in) :: reference(:, :, :)
+      !> Loads or motions to be reached
+      type(load_target_t), intent(in) :: target
+      !> Bound of all residuals
+      real(wp), intent(in) :: tolerance
+      !> Active sets that may be tried
+      integer, intent(in) :: max_sweeps
+      !> State at the end of the step, converged or not
+      type(contact_state_t), intent(out) :: state
+      !> Allocated on failure: memory, an operator that is not positive definite
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine solve_step
+
+    !> Relative displacements (w, u_x, u_y) of given tractions.
+    subroutine solver_displacements(self, pressure, traction, displacement, error)
+      import :: friction_solver_t, wp, error_t
+      class(friction_solver_t), intent(inout) :: self
+      !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
+      real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+      !> w, u_x, u_y (n_col, n_row, 3) [m]
+      real(wp), intent(out), contiguous :: displacement(:, :, :)
+      !> Allocated on failure
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine solver_displacements
+  end interface
+
+contains
+
+  !> A problem from what is given.
+  subroutine new_friction_problem(problem, lattice, pair, initial_gap, candidate, friction, goodman, error)
+    !> Problem to be set up
+    type(friction_problem_t), intent(out) :: problem
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Initial gap (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Law of friction
+    type(coulomb_t), intent(in) :: friction
+    !> Goodman's approximation: shear tractions do not move the pressure
+    logical, intent(in) :: goodman
+    !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, a negative coefficient
+    type(error_t), allocatable, intent(out) :: error
+    logical :: sound
+
+    call check_problem(lattice, pair, initial_gap, candidate, error)
+    if (allocated(error)) return
+    sound = friction%no_slip .or. ieee_is_finite(friction%coefficient)
+    if (sound .and. .not. friction%no_slip) sound = friction%coefficient >= 0.0_wp
+    if (.not. sound) then
+      call raise(error, status%invalid_input, 'coefficient of friction: a finite number of at least 0 expected, or no_slip')
+      return
+    end if
+    problem%lattice = lattice
+    problem%pair = pair
+    problem%friction = friction
+    problem%goodman = goodman
+    problem%initial_gap = initial_gap
+    problem%candidate = candidate
+    allocate (problem%x, problem%y, mold=initial_gap)
+    call lattice%coordinates(problem%x, problem%y)
+    problem%normal_compliance = normal_self_compliance(lattice, pair)
+    problem%tangential_compliance = tangential_self_compliance(lattice, pair)
+  end subroutine new_friction_problem
+
+  !> The same problem on the lattice of every second node.
+  function coarsened(self) result(coarse)
+    class(friction_problem_t), intent(in) :: self
+    type(friction_problem_t) :: coarse
+
+    coarse%lattice = self%lattice%coarsened()
+    coarse%pair = self%pair
+    coarse%friction = self%friction
+    coarse%goodman = self%goodman
+    coarse%n_threads = self%n_threads
+    allocate (coarse%initial_gap, source=restrict_field(self%lattice, self%initial_gap, coarse%lattice))
+    allocate (coarse%candidate, source=restrict_mask(self%lattice, self%candidate, coarse%lattice))
+    allocate (coarse%x, coarse%y, mold=coarse%initial_gap)
+    call coarse%lattice%coordinates(coarse%x, coarse%y)
+    coarse%normal_compliance = normal_self_compliance(coarse%lattice, coarse%pair)
+    coarse%tangential_compliance = tangential_self_compliance(coarse%lattice, coarse%pair)
+  end function coarsened
+
+  !> Will the bodies touch? A load does, an approach only beyond the smallest gap.
+  pure logical function is_pressed(self, target)
+    class(friction_problem_t), intent(in) :: self
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+
+    if (target%control(normal) == force_control) then
+      is_pressed = target%value(normal) > 0.0_wp
+    else
+      is_pressed = target%value(normal) > minval(self%initial_gap, mask=self%candidate)
+    end if
+  end function is_pressed
+
+  !> Do pressure and shear traction act strongly on each other? |beta| min(mu, 1) tells.
+  pure logical function couples_strongly(self)
+    class(friction_problem_t), intent(in) :: self
+    real(wp) :: mu
+
+    mu = 1.0_wp
+    if (.not. self%friction%no_slip) mu = min(self%friction%coefficient, 1.0_wp)
+    couples_strongly = abs(self%pair%beta())*mu > strong_coupling .and. .not. self%goodman
+  end function couples_strongly
+
+  !> State of bodies that do not touch; motions that are driven by their load stay where they are.
+  subroutine separate(self, start, reference, target, tolerance, state)
+    class(friction_problem_t), intent(in) :: self
+    !> State before
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> State without contact; sliding where a tangential load is prescribed
+    type(contact_state_t), intent(out) :: state
+    real(wp), allocatable :: displacement(:, :, :)
+
+    call new_friction_state(state, self%lattice, self%n_threads)
+    state%motion = merge(start%motion, target%value, target%control == force_control)
+    if (target%control(normal) == force_control) state%motion(normal) = minval(self%initial_gap, mask=self%candidate)
+    allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 3), source=0.0_wp)
+    call self%conclude(target, tolerance, reference, displacement, state)
+    state%sliding = .not. state%converged
+    if (state%sliding) state%stopped = loads_not_carried
+  end subroutine separate
+
+  !> Relative displacements (w, u_x, u_y) of given tractions, by any operator.
+  subroutine displacements(self, flexibility, pressure, traction, displacement, error)
+    class(friction_problem_t), intent(in) :: self
+    !> Flexibility operator over the window
+    class(flexibility_t), intent(inout) :: flexibility
+    !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
+    real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+    !> w, u_x, u_y (n_col, n_row, 3) [m]
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: tractions(:, :, :)
+    integer :: row
+
+    allocate (tractions(size(pressure, 1), size(pressure, 2), 3))
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do row = 1, size(pressure, 2)
+      tractions(:, row, 1) = pressure(:, row)
+      tractions(:, row, 2:) = traction(:, row, :)
+    end do
+    !$omp end parallel do
+    call flexibility%apply([normal, along_x, along_y], tractions, [normal, along_x, along_y], displacement, error)
+    if (allocated(error)) return
+    if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
+  end subroutine displacements
+
+  !> shift + twist x r at every node (n_col, n_row, 2) [m].
+  pure function rigid_displacement(self, motion) result(displacement)
+    class(friction_problem_t), intent(in) :: self
+    !> Approach, shifts and twist
+    real(wp), intent(in) :: motion(n_motion)
+    real(wp), allocatable :: displacement(:, :, :)
+
+    allocate (displacement(size(self%x, 1), size(self%x, 2), 2))
+    displacement(:, :, 1) = motion(along_x) - motion(about_z)*self%y
+    displacement(:, :, 2) = motion(along_y) + motion(about_z)*self%x
+  end function rigid_displacement
+
+  !> Normal load, tangential loads [N] and torque [N m] of given tractions.
+  function resultants(self, pressure, traction) result(load)
+    class(friction_problem_t), intent(in) :: self
+    !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
+    real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+    real(wp) :: load(n_motion), part(n_motion, size(pressure, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    do row = 1, size(pressure, 2)
+      part(normal, row) = sum(pressure(:, row))
+      part(along_x, row) = sum(traction(:, row, 1))
+      part(along_y, row) = sum(traction(:, row, 2))
+      part(about_z, row) = dot_product(self%x(:, row), traction(:, row, 2)) - dot_product(self%y(:, row), traction(:, row, 1))
+    end do
+    !$omp end parallel do
+    load = self%lattice%cell_area()*sum(part, dim=2)
+  end function resultants
+
+  !> r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius [Pa/m].
+  pure real(wp) function classification_parameter(self, n_contact) result(r)
+    class(friction_problem_t), intent(in) :: self
+    !> Nodes in contact
+    integer, intent(in) :: n_contact
+
+    r = classification_scale/(2.0_wp*pi*(self%pair%lambda_1 + self%pair%lambda_5) &
+                              *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+  end function classification_parameter
+
+  !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known.
+  subroutine conclude(self, target, tolerance, reference, displacement, state)
+    class(friction_problem_t), intent(in) :: self
+    !> Loads or motions that were prescribed
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    !> w, u_x, u_y of the tractions (n_col, n_row, 3) [m]
+    real(wp), intent(in) :: displacement(:, :, :)
+    !> State to be completed
+    type(contact_state_t), intent(inout) :: state
+
+    real(wp) :: r, unit, slope
+    integer :: col, row, m, n_contact
+    logical :: finite
+
+    n_contact = count(state%pressure > 0.0_wp)
+    r = self%classification_parameter(n_contact)
+    unit = largest_pressure(state%pressure, self%n_threads)
+    if (unit > 0.0_wp) unit = 1.0_wp/unit
+    slope = self%friction%slope()
+    finite = .true.
+    !$omp parallel do schedule(static) num_threads(self%n_threads) private(col, m) reduction(.and.: finite)
+    do row = 1, size(state%pressure, 2)
+      do col = 1, size(state%pressure, 1)
+        state%gap(col, row) = self%initial_gap(col, row) + displacement(col, row, 1) - state%motion(normal)
+        state%relative_displacement(col, row, 1) = displacement(col, row, 2) &
+                                                   - (state%motion(along_x) - state%motion(about_z)*self%y(col, row))
+        state%relative_displacement(col, row, 2) = displacement(col, row, 3) &
+                                                   - (state%motion(along_y) + state%motion(about_z)*self%x(col, row))
+      end do
+      do m = 1, 2
+        state%slip_increment(:, row, m) = merge(state%relative_displacement(:, row, m) - reference(:, row, m), 0.0_wp, &
+                                                state%pressure(:, row) > 0.0_wp)
+      end do
+      if (self%friction%resists()) then
+        call zone_row(size(state%zone, 1), unit, slope, r, state%pressure(:, row), state%traction(:, row, 1), &
+                      state%traction(:, row, 2), state%slip_increment(:, row, 1), state%slip_increment(:, row, 2), &
+                      state%zone(:, row))
+      else
+        state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
+      end if
+      finite = finite .and. all(ieee_is_finite(state%gap(:, row)) .or. .not. self%candidate(:, row)) .and. &
+               all(ieee_is_finite(state%relative_displacement(:, row, :)))
+    end do
+    !$omp end parallel do
+
+    state%load = self%resultants(state%pressure, state%traction)
+    state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, &
+                                            self%n_threads)
+    state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
+                                                    self%friction, self%tangential_compliance, self%n_threads)
+    call self%judge_loads(target, state)
+    ! one by one: the largest of several numbers hides one that is not a number
+    finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))
+    state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
+                           state%residual_shear_force, state%residual_torque] <= tolerance) .and. finite
+    state%clipped = touches_rim(state)
+    state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
+    if (.not. finite) state%stopped = out_of_range
+  end subroutine conclude
+
+  !> Residuals of the loads that were prescribed.
+  subroutine judge_loads(self, target, state)
+    class(friction_problem_t), intent(in) :: self
+    !> Loads or motions that were prescribed
+    type(load_target_t), intent(in) :: target
+    !> State whose tractions and loads are known
+    type(contact_state_t), intent(inout) :: state
+    real(wp) :: scale, missing(n_motion)
+
+    missing = merge(abs(state%load - target%value), 0.0_wp, target%control == force_control)
+    state%residual_force = merge(force_residual(state%load(normal), target%value(normal)), 0.0_wp, &
+                                 target%control(normal) == force_control)
+    ! mu P, or P times the ratio of the largest traction to the largest pressure where there is no slip
+    scale = self%friction%coefficient*state%load(normal)
+    if (self%friction%no_slip) then
+      scale = sqrt(maxval(sum(state%traction**2, dim=3)))/max(maxval(state%pressure), tiny(1.0_wp))
+      scale = max(scale, least_traction)*state%load(normal)
+    end if
+    state%residual_shear_force = relative(norm2(missing(along_x:along_y)), scale)
+    state%residual_torque = relative(missing(about_z), &
+                                     scale*sqrt(self%lattice%cell_area()*count(state%pressure > 0.0_wp)/pi))
+  end subroutine judge_loads
+
+  !> A missing load relative to a scale; any at all is too much where the scale vanishes.
+  elemental real(wp) function relative(missing, scale)
+    real(wp), intent(in) :: missing, scale
+
+    if (missing <= 0.0_wp) then
+      relative = 0.0_wp
+    else if (scale > 0.0_wp) then
+      relative = missing/scale
+    else
+      relative = huge(1.0_wp)
+    end if
+  end function relative
+
+end module hc_contact_problem

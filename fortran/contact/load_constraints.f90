@@ -1,0 +1,253 @@
+!> Tangential motions that are driven by their loads.
+!>
+!> Each is an unknown, and its load a constraint on the shear traction: what
+!> the unit motion does along x and y, summed over the traction, is the load. A torque is
+!> taken about the middle of the contact, as far as the tangential loads are
+!> known too: a contact far from the origin would not tell a twist from a shift.
+module hc_load_constraints
+  use hc_precision, only: wp, pi
+  use hc_lapack, only: eliminate
+  use hc_contact_state, only: load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
+  use hc_contact_problem, only: friction_problem_t
+  implicit none
+  private
+
+  public :: driven_motions_t, new_driven_motions, overloads
+
+  !> Share of a load that rounding may add.
+  real(wp), parameter :: rounding = 1.0e-6_wp
+  !> Residual R_n above which a pressure tells nothing.
+  real(wp), parameter :: trusted = 0.1_wp
+  !> Motions that are tried for the one that the least load drives, and the gain below which no more are.
+  integer, parameter :: max_tries = 100
+  real(wp), parameter :: no_gain = 1.0e-9_wp
+
+  !> The driven motions of a contact.
+  type :: driven_motions_t
+    !> Some of along_x, along_y, about_z
+    integer, allocatable :: motion(:)
+    !> Point that a torque is taken about [m]
+    real(wp) :: center(2) = 0.0_wp
+    !> Unit of length of a twist: the contact radius [m]
+    real(wp) :: arm = 1.0_wp
+  contains
+    !> Tangential displacement of a unit motion
+    procedure :: direction, direction_row
+    !> Load of a motion over the cell area
+    procedure :: load
+    !> Multipliers of the constraints from the motions, and back
+    procedure :: multipliers, set_motions
+  end type driven_motions_t
+
+contains
+
+  !> The driven motions of a contact.
+  subroutine new_driven_motions(self, problem, target, contact)
+    !> Motions to be set up
+    type(driven_motions_t), intent(out) :: self
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Nodes in contact (n_col, n_row)
+    logical, intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
+    real(wp) :: part(2, problem%lattice%extent(2))
+    integer :: n_contact, row
+
+    n_contact = 0
+    !$omp parallel do schedule(static) num_threads(problem%n_threads) reduction(+: n_contact)
+    do row = 1, size(contact, 2)
+      n_contact = n_contact + count(contact(:, row))
+      part(1, row) = sum(problem%x(:, row), mask=contact(:, row))
+      part(2, row) = sum(problem%y(:, row), mask=contact(:, row))
+    end do
+    !$omp end parallel do
+    n_contact = max(n_contact, 1)
+    associate (control => target%control)
+      ! nothing turns a single node
+      self%motion = pack([along_x, along_y, about_z], control(along_x:) == force_control .and. &
+                         [.true., .true., n_contact > 1])
+      if (control(along_y) == force_control) self%center(1) = sum(part(1, :))/n_contact
+      if (control(along_x) == force_control) self%center(2) = sum(part(2, :))/n_contact
+    end associate
+    self%arm = sqrt(problem%lattice%cell_area()*n_contact/pi)
+  end subroutine new_driven_motions
+
+  !> Tangential displacement of a unit motion (n_col, n_row, 2).
+  function direction(self, k, problem)
+    class(driven_motions_t), intent(in) :: self
+    !> Which of the driven motions
+    integer, intent(in) :: k
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    real(wp), allocatable :: direction(:, :, :)
+    integer :: row
+
+    allocate (direction(problem%lattice%extent(1), problem%lattice%extent(2), 2))
+    !$omp parallel do schedule(static) num_threads(problem%n_threads)
+    do row = 1, size(direction, 2)
+      call self%direction_row(k, problem, row, direction(:, row, 1), direction(:, row, 2))
+    end do
+    !$omp end parallel do
+  end function direction
+
+  !> The same along one row of nodes.
+  pure subroutine direction_row(self, k, problem, row, ux, uy)
+    class(driven_motions_t), intent(in) :: self
+    !> Which of the driven motions
+    integer, intent(in) :: k
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    integer, intent(in) :: row
+    !> Components along x and y (n_col)
+    real(wp), intent(out), contiguous :: ux(:), uy(:)
+
+    ux = 0.0_wp
+    uy = 0.0_wp
+    select case (self%motion(k))
+    case (along_x)
+      ux = 1.0_wp
+    case (along_y)
+      uy = 1.0_wp
+    case default
+      ux = -(problem%y(:, row) - self%center(2))/self%arm
+      uy = (problem%x(:, row) - self%center(1))/self%arm
+    end select
+  end subroutine direction_row
+
+  !> Prescribed load of a motion over the cell area [Pa].
+  pure real(wp) function load(self, k, problem, target)
+    class(driven_motions_t), intent(in) :: self
+    !> Which of the driven motions
+    integer, intent(in) :: k
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+
+    load = target%value(self%motion(k))
+    if (self%motion(k) == about_z) then
+      load = (load - self%center(1)*target%value(along_y) + self%center(2)*target%value(along_x))/self%arm
+    end if
+    load = load/problem%lattice%cell_area()
+  end function load
+
+  !> Multipliers that stand for given motions: shifts are those of the center, if it turns.
+  pure function multipliers(self, motion) result(multiplier)
+    class(driven_motions_t), intent(in) :: self
+    !> Approach, shifts and twist
+    real(wp), intent(in) :: motion(n_motion)
+    real(wp), allocatable :: multiplier(:)
+
+    multiplier = motion(self%motion)
+    if (any(self%motion == about_z)) then
+      where (self%motion == along_x) multiplier = multiplier - motion(about_z)*self%center(2)
+      where (self%motion == along_y) multiplier = multiplier + motion(about_z)*self%center(1)
+      where (self%motion == about_z) multiplier = multiplier*self%arm
+    end if
+  end function multipliers
+
+  !> Motions from their multipliers; the others stay as they are.
+  pure subroutine set_motions(self, multiplier, motion)
+    class(driven_motions_t), intent(in) :: self
+    !> Multipliers of the driven motions
+    real(wp), intent(in) :: multiplier(:)
+    !> Approach, shifts and twist
+    real(wp), intent(inout) :: motion(n_motion)
+
+    motion(self%motion) = multiplier
+    if (any(self%motion == about_z)) then
+      motion(about_z) = motion(about_z)/self%arm
+      if (any(self%motion == along_x)) motion(along_x) = motion(along_x) + motion(about_z)*self%center(2)
+      if (any(self%motion == along_y)) motion(along_y) = motion(along_y) - motion(about_z)*self%center(1)
+    end if
+  end subroutine set_motions
+
+  !> Is more prescribed than full sliding carries, whatever is still wrong with the pressure?
+  !>
+  !> Friction carries the prescribed loads times a factor, and no more than
+  !>
+  !>     factor <= sum of mu p |u| / (loads . motion)
+  !>
+  !> with u the displacement of any motion that they drive (upper bound of limit analysis). For shifts alone the
+  !> least is mu P/|Q|. With a torque, or without a prescribed P, it depends on the pressure: a gap that makes the
+  !> residual R_n moves it by that share of its largest value where it acts on single nodes, by less where it is smooth.
+  logical function overloads(problem, target, pressure, residual_normal)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Pressure (n_col, n_row) [Pa], and its residual R_n
+    real(wp), intent(in) :: pressure(problem%lattice%extent(1), problem%lattice%extent(2)), residual_normal
+    type(driven_motions_t) :: driven
+    real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
+    real(wp) :: carried, error, factor, before
+    integer :: k, try
+
+    overloads = .false.
+    if (problem%friction%no_slip .or. .not. any(pressure > 0.0_wp)) return
+    call new_driven_motions(driven, problem, target, pressure > 0.0_wp)
+    associate (n => size(driven%motion), n_contact => count(pressure > 0.0_wp))
+      load = [(driven%load(k, problem, target), k=1, n)]
+      overloads = any(abs(load) > 0.0_wp) .and. .not. problem%friction%resists()
+      if (overloads .or. n == 0) return
+      allocate (u(n_contact, 2, n))
+      bound = problem%friction%bound(pack(pressure, pressure > 0.0_wp))
+      error = residual_normal
+      if (target%control(normal) == force_control) then
+        carried = problem%friction%bound(target%value(normal))/problem%lattice%cell_area()
+        if (sum(bound) > 0.0_wp) bound = bound*(carried/sum(bound))
+        if (.not. any(driven%motion == about_z)) error = 0.0_wp
+      end if
+      if (error > trusted) return
+      do k = 1, n
+        field = driven%direction(k, problem)
+        u(:, 1, k) = pack(field(:, :, 1), pressure > 0.0_wp)
+        u(:, 2, k) = pack(field(:, :, 2), pressure > 0.0_wp)
+      end do
+      allocate (length(n_contact), source=1.0_wp)
+      factor = huge(1.0_wp)
+      do try = 1, max_tries
+        before = factor
+        call lower(u, bound, load, length, factor)
+        if (.not. factor < (1.0_wp - no_gain)*before) exit
+      end do
+      overloads = factor*(1.0_wp + error) < 1.0_wp - rounding
+    end associate
+  end function overloads
+
+  !> Try the motion that nodes with springs of stiffness bound/length would make: what slips far resists the less.
+  pure subroutine lower(u, bound, load, length, factor)
+    !> Displacements of unit motions (n, 2, motion)
+    real(wp), intent(in) :: u(:, :, :)
+    !> Largest traction of each node, and load of each motion over the cell area [Pa]
+    real(wp), intent(in) :: bound(:), load(:)
+    !> Displacement of each node in the motion tried before, and in this one
+    real(wp), intent(inout) :: length(:)
+    !> Least load factor so far
+    real(wp), intent(inout) :: factor
+    real(wp) :: stiffness(size(load), size(load)), motion(size(load), 1), moved(size(bound), 2)
+    integer :: i, k
+
+    do k = 1, size(load)
+      do i = 1, size(load)
+        stiffness(i, k) = sum(spread(bound/length, 2, 2)*u(:, :, i)*u(:, :, k))
+      end do
+    end do
+    motion(:, 1) = load
+    ! any motion gives an upper bound, also what is left of a singular matrix
+    call eliminate(stiffness, motion)
+    associate (work => dot_product(load, motion(:, 1)))
+      if (.not. work > 0.0_wp) return
+      motion = motion/work
+    end associate
+    moved = 0.0_wp
+    do k = 1, size(load)
+      moved = moved + motion(k, 1)*u(:, :, k)
+    end do
+    length = norm2(moved, dim=2)
+    factor = min(factor, dot_product(bound, length))
+    length = max(length, no_gain*maxval(length))
+  end subroutine lower
+
+end module hc_load_constraints

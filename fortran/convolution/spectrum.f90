@@ -1,0 +1,149 @@
+!> Spectra of kernels that several problems may share, and what they depend on.
+module hc_spectrum
+  use, intrinsic :: iso_fortran_env, only: int64
+  use hc_precision, only: wp, sp
+  use hc_lock, only: lock, unlock, spectrum_users
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  implicit none
+  private
+
+  public :: kernel_spectrum_t, kernel_key_t, new_kernel_key, release
+  public :: of_pressure, of_all_tractions, of_pressure_rounded, inverse_of_pressure, inverse_of_shear, kind_name
+
+  !> What was transformed: the kernel of the pressure, those of all blocks, that of the pressure in single
+  !> precision, and the inverses that precondition.
+  integer, parameter :: of_pressure = 1, of_all_tractions = 2, of_pressure_rounded = 3, &
+    inverse_of_pressure = 4, inverse_of_shear = 5
+  character(len=*), parameter :: kind_name(5) = &
+    [character(len=16) :: 'pressure', 'tractions', 'pressure-single', 'inverse', 'shear-inverse']
+
+  !> Everything that the numbers of a spectrum depend on, to the bit.
+  type :: kernel_key_t
+    !> Kind, columns and rows of the window, basis over its spacing, lambda_2 and lambda_5 over lambda_1
+    integer(int64) :: word(9) = 0
+  contains
+    !> The same kernels?
+    procedure :: is_same
+  end type kernel_key_t
+
+  !> Spectra that are freed when nobody uses them any more; nothing changes them once they are shared.
+  type :: kernel_spectrum_t
+    !> Spectra (frequency, block, kernel), in one of the precisions
+    real(wp), allocatable :: double(:, :, :)
+    real(sp), allocatable :: single(:, :, :)
+    integer, private :: users = 1
+  contains
+    !> One more user
+    procedure :: hold
+    !> Bytes of the values
+    procedure :: bytes
+    !> Let a pointer point to the values, if they have its precision and the given shape
+    generic :: point => point_double, point_single
+    procedure, private :: point_double, point_single
+    !> Make room for values and let a pointer point to them
+    generic :: reserve => reserve_double, reserve_single
+    procedure, private :: reserve_double, reserve_single
+  end type kernel_spectrum_t
+
+contains
+
+  !> Key of the spectra of a kind, on a window.
+  pure type(kernel_key_t) function new_kernel_key(kind, lattice, pair) result(key)
+    !> One of the kinds above
+    integer, intent(in) :: kind
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants; of no matter to the pressure alone
+    type(elastic_pair_t), intent(in) :: pair
+    type(elastic_pair_t) :: ratios
+
+    ratios = pair%scaled()
+    key%word(1) = kind
+    key%word(2:3) = lattice%extent
+    key%word(4:7) = transfer(lattice%unit_basis(), key%word, 4)
+    if (kind == of_all_tractions) key%word(8) = transfer(ratios%lambda_2, key%word(8))
+    if (kind == of_all_tractions .or. kind == inverse_of_shear) key%word(9) = transfer(ratios%lambda_5, key%word(9))
+  end function new_kernel_key
+
+  pure logical function is_same(self, other)
+    class(kernel_key_t), intent(in) :: self, other
+    is_same = all(self%word == other%word)
+  end function is_same
+
+  subroutine hold(self)
+    class(kernel_spectrum_t), intent(inout) :: self
+
+    call lock(spectrum_users)
+    self%users = self%users + 1
+    call unlock(spectrum_users)
+  end subroutine hold
+
+  !> One user less; the last one frees the memory.
+  subroutine release(spectrum)
+    !> Spectra that were held; not associated afterwards
+    type(kernel_spectrum_t), pointer, intent(inout) :: spectrum
+    integer :: left
+
+    if (.not. associated(spectrum)) return
+    call lock(spectrum_users)
+    spectrum%users = spectrum%users - 1
+    left = spectrum%users
+    call unlock(spectrum_users)
+    if (left == 0) deallocate (spectrum)
+    spectrum => null()
+  end subroutine release
+
+  pure integer(int64) function bytes(self)
+    class(kernel_spectrum_t), intent(in) :: self
+
+    bytes = 0
+    if (allocated(self%double)) bytes = bytes + size(self%double, kind=int64)*(storage_size(self%double)/8)
+    if (allocated(self%single)) bytes = bytes + size(self%single, kind=int64)*(storage_size(self%single)/8)
+  end function bytes
+
+  subroutine point_double(self, n, values)
+    class(kernel_spectrum_t), intent(in), target :: self
+    integer, intent(in) :: n(3)
+    real(wp), pointer, contiguous, intent(out) :: values(:, :, :)
+
+    values => null()
+    if (.not. allocated(self%double)) return
+    if (all(shape(self%double) == n)) values => self%double
+  end subroutine point_double
+
+  subroutine point_single(self, n, values)
+    class(kernel_spectrum_t), intent(in), target :: self
+    integer, intent(in) :: n(3)
+    real(sp), pointer, contiguous, intent(out) :: values(:, :, :)
+
+    values => null()
+    if (.not. allocated(self%single)) return
+    if (all(shape(self%single) == n)) values => self%single
+  end subroutine point_single
+
+  subroutine reserve_double(self, n, values, stat)
+    class(kernel_spectrum_t), intent(inout), target :: self
+    integer, intent(in) :: n(3)
+    real(wp), pointer, contiguous, intent(out) :: values(:, :, :)
+    !> Not zero: not enough memory
+    integer, intent(out) :: stat
+
+    values => null()
+    allocate (self%double(n(1), n(2), n(3)), stat=stat)
+    if (stat == 0) values => self%double
+  end subroutine reserve_double
+
+  subroutine reserve_single(self, n, values, stat)
+    class(kernel_spectrum_t), intent(inout), target :: self
+    integer, intent(in) :: n(3)
+    real(sp), pointer, contiguous, intent(out) :: values(:, :, :)
+    !> Not zero: not enough memory
+    integer, intent(out) :: stat
+
+    values => null()
+    allocate (self%single(n(1), n(2), n(3)), stat=stat)
+    if (stat == 0) values => self%single
+  end subroutine reserve_single
+
+end module hc_spectrum

@@ -1,0 +1,143 @@
+!> Newton's method for pressure and shear traction at once.
+!>
+!> Where the two act strongly on each other (dissimilar materials and much
+!> friction), sweeps that find one after the other keep exchanging nodes at the
+!> edge of the contact. Here contact area, stick, slip and both tractions come from
+!> one linear problem with the rigid motions, solved by GMRES. It is not
+!> symmetric, because the pressure of a slipping node carries mu p e along.
+module hc_coupled_newton
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: normal, force_control
+  use hc_load_constraints, only: driven_motions_t
+  use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
+  use hc_friction_iterate, only: iterate_t, rounding
+  use hc_staggered_newton, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
+  use hc_friction_systems, only: coupled_system_t
+  use hc_krylov, only: projected_gmres, fulfil
+  implicit none
+  private
+
+  public :: coupled_sweep
+
+  !> Directions that GMRES keeps.
+  integer, parameter :: max_directions = 40
+
+contains
+
+  !> One step of Newton's method.
+  subroutine coupled_sweep(now, failed, error)
+    !> Tractions and motions
+    type(iterate_t), intent(inout), target :: now
+    !> Nothing came of it: no node resists the loads
+    logical, intent(out) :: failed
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(coupled_system_t) :: system
+    real(wp), allocatable :: x(:), ax(:), rhs(:), weight(:), columns(:, :), mb(:, :), rows(:, :)
+    real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:)
+    real(wp), allocatable :: gap(:)
+    logical, allocatable :: active(:), shear_active(:), contact(:)
+    real(wp), allocatable :: shear_missing(:)
+    type(driven_motions_t) :: driven
+    real(wp) :: missing(4), multiplier(4), goal, residual, drift
+    integer :: n, m, k, n_shear, iterations
+    logical :: independent
+
+    n = size(now%p)
+    call now%find_gap(gap)
+    call find_contact(now, gap, contact)
+    call move_alloc(contact, now%contact)
+    now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
+    call classify(now, .false., shear_active)
+    system%operators => now%operators
+    system%shear => now%shear
+    call now%pressure%take(now%contact)
+    system%edge = now%pressure%edge
+    system%n_threads = now%operators%n_threads
+    allocate (active(3*n), x(3*n), ax(3*n), rhs(3*n), weight(3*n), plane(2*n))
+    active(:n) = now%contact
+    active(n + 1:) = shear_active
+    allocate (system%slope(n), source=0.0_wp)
+    if (.not. now%problem%friction%no_slip) then
+      where (now%contact .and. .not. shear_active(n + 1:)) system%slope = now%problem%friction%coefficient
+    end if
+    x(:n) = now%p
+    call now%shear%to_frame(now%q, x(n + 1:))
+    ! what p carries along is not counted twice
+    x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
+    where (.not. shear_active) x(n + 1:) = 0.0_wp
+
+    call find_constraints(now, shear_active, driven, shear_columns, shear_missing)
+    n_shear = size(shear_missing)
+    m = n_shear
+    if (now%target%control(normal) == force_control) m = m + 1
+    allocate (columns(3*n, m), rows(3*n, m), source=0.0_wp)
+    columns(n + 1:, :n_shear) = shear_columns
+    rows(n + 1:, :n_shear) = shear_columns
+    do k = 1, n_shear
+      ! the traction mu p e belongs to the pressure
+      plane = reshape(driven%direction(k, now%problem), [2*n])
+      rows(:n, k) = system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
+    end do
+    missing(:n_shear) = shear_missing
+    multiplier(:n_shear) = driven%multipliers(now%motion)
+    if (m > n_shear) then
+      columns(:n, m) = merge(1.0_wp, 0.0_wp, now%contact)
+      rows(:, m) = columns(:, m)
+      missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - sum(now%p)
+      multiplier(m) = now%motion(normal)
+    end if
+    allocate (mb(3*n, m), source=0.0_wp)
+    call drag_shear(now, shear_active, shear_columns, .false., part, error)
+    if (allocated(error)) return
+    mb(n + 1:, :n_shear) = part
+    if (m > n_shear) then
+      call lift_pressure(now, columns(:n, m:), part, error)
+      if (allocated(error)) return
+      mb(:n, m:) = part
+    end if
+    call fulfil(rows, mb, missing(:m), x, independent, system%n_threads)
+    if (independent) then
+      call system%product(x, ax, error)
+      if (allocated(error)) return
+      rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
+      call find_wanted(now, rhs(n + 1:))
+      weight(:n) = 1.0_wp/(now%problem%normal_compliance*maxval(now%p))
+      weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
+      goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
+                 final_accuracy*now%tolerance)
+      goal = goal*real(count(active), wp)**0.25_wp
+      call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
+                           independent, residual, iterations, now%outcome, error, drift)
+      if (allocated(error)) return
+      if (drift > rounding) call system%product(x, ax, error)
+      if (allocated(error)) return
+    end if
+    ! where all nodes slip, only their directions resist a load: not beyond reason
+    failed = .not. independent
+    if (.not. failed .and. n_shear > 0 .and. .not. any(shear_active(n + 1:))) then
+      failed = maxval(abs(x(n + 1:2*n))) > beyond_reason*now%traction_scale()
+    end if
+    if (failed) then
+      call now%refresh(error)
+      return
+    end if
+
+    call driven%set_motions(multiplier(:n_shear), now%motion)
+    if (m > n_shear) now%motion(normal) = multiplier(m)
+    now%p = x(:n)
+    x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
+    call now%shear%to_plane(x(n + 1:), now%q)
+    now%w = ax(:n)
+    now%closing = 0.0_wp
+    now%cut = .false.
+    now%joint = .true.
+    ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*x(n + 1:2*n)
+    call now%shear%to_plane(ax(n + 1:), now%u)
+    call now%find_residuals()
+    now%first = .false.
+  end subroutine coupled_sweep
+
+end module hc_coupled_newton

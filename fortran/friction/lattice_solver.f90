@@ -1,0 +1,132 @@
+!> A load step with friction on one lattice.
+!>
+!> Sweeps that find pressure and shear traction one after the other (staggered_newton),
+!> and where that is not enough both together (coupled_newton).
+module hc_lattice_solver
+  use hc_precision, only: wp
+  use hc_build_options, only: debug_checks
+  use hc_error, only: error_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, sweeps_used_up, &
+    no_progress, loads_not_carried, out_of_range
+  use hc_contact_problem, only: friction_problem_t
+  use hc_load_constraints, only: overloads
+  use hc_elastic_operators, only: operators_t
+  use hc_friction_iterate, only: iterate_t, cautious
+  use hc_staggered_newton, only: staggered_sweep
+  use hc_coupled_newton, only: coupled_sweep
+  use hc_krylov, only: solution_broke_off
+  implicit none
+  private
+
+  public :: solve_level
+
+  !> Sweeps in which nodes had to be held, after which no more are made.
+  integer, parameter :: max_held = 12
+  !> Sweeps after which tractions that do not settle one after the other are found together, unless they act on
+  !> each other so strongly that it is done sooner: once residuals are near, or a few sweeps later all the same.
+  integer, parameter :: most_apart = 12, patience = 4
+  real(wp), parameter :: near = 0.6_wp
+contains
+
+  !> Sweeps on one lattice.
+  subroutine solve_level(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
+    !> The problem
+    type(friction_problem_t), intent(in), target :: problem
+    !> Operator and preconditioners
+    type(operators_t), intent(inout), target :: operators
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Sweeps that may be made
+    integer, intent(in) :: max_sweeps
+    !> Solution, converged or not
+    type(contact_state_t), intent(out) :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(iterate_t) :: now
+    real(wp), allocatable :: displacement(:, :, :)
+    integer :: sweep, held, apart
+    logical :: failed
+
+    held = 0
+    operators%flexibility%applications = 0.0_wp
+    operators%preconditioning = 0.0_wp
+    call new_friction_state(state, problem%lattice, operators%n_threads)
+    allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+    call now%begin(problem, operators, start, reference, target, tolerance, error)
+    if (allocated(error)) return
+    ! sweeps that find pressure and shear traction one after the other
+    apart = max_sweeps
+    if (now%pressing) apart = most_apart
+    if (problem%couples_strongly()) then
+      apart = 1
+      now%caution = cautious
+    end if
+    do sweep = 1, max_sweeps
+      failed = .true.
+      if (sweep > apart .and. (max(now%residual_normal, now%residual_tangential) < near .or. sweep > apart + patience)) then
+        call coupled_sweep(now, failed, error)
+        if (allocated(error)) return
+      end if
+      if (failed) call staggered_sweep(now, error)
+      if (allocated(error)) return
+      if (.not. now%is_finite()) exit
+      if (debug_checks) call now%check_displacements(error)
+      if (allocated(error)) return
+      if (now%held) then
+        held = held + 1
+        state%sliding = overloads(problem, target, reshape(now%p, problem%lattice%extent), now%residual_normal)
+        if (state%sliding) held = max_held
+      end if
+      state%sweeps = sweep
+      if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
+          .and. .not. now%adrift .and. held < max_held) cycle
+
+      ! what is recorded fulfils the bounds exactly, and is judged by a product of its own
+      call record(now, state)
+      state%motion = now%motion
+      call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
+      if (allocated(error)) return
+      call problem%conclude(target, tolerance, reference, displacement, state)
+      if (state%converged .or. now%adrift .or. held >= max_held) exit
+      call now%refresh(error)
+      if (allocated(error)) return
+    end do
+    if (.not. (state%converged .or. state%sliding)) then
+      state%sliding = overloads(problem, target, state%pressure, state%residual_normal)
+    end if
+    state%sliding = state%sliding .and. .not. state%converged
+    state%operator_applications = operators%work()
+    if (state%converged) return
+    state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)
+    if (state%sliding) state%stopped = loads_not_carried
+    if (.not. now%is_finite()) state%stopped = out_of_range
+  end subroutine solve_level
+
+  !> Tractions of an iterate, without tension and cut to the cone.
+  subroutine record(now, state)
+    type(iterate_t), intent(in) :: now
+    type(contact_state_t), intent(inout) :: state
+    real(wp), allocatable :: q(:)
+    integer :: n, row, from, to
+
+    n = size(now%p)
+    call now%cut_to_cone(q)
+    !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(from, to)
+    do row = 1, size(state%pressure, 2)
+      to = row*size(state%pressure, 1)
+      from = to - size(state%pressure, 1) + 1
+      state%pressure(:, row) = max(now%p(from:to), 0.0_wp)
+      state%traction(:, row, 1) = q(from:to)
+      state%traction(:, row, 2) = q(n + from:n + to)
+    end do
+    !$omp end parallel do
+  end subroutine record
+
+end module hc_lattice_solver

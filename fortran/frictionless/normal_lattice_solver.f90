@@ -1,0 +1,201 @@
+!> Frictionless contact on one lattice.
+!>
+!> Find pressure p and gap g = h + w - approach with p >= 0, g >= 0, p g = 0. Each
+!> iteration takes the nodes with p - r g > 0 as active. While this set changes, a step of a
+!> projected gradient method, p <- max(p + c M r, 0), finds pressure and set
+!> together, with one product of the operator; M is close enough to the inverse of
+!> the operator for that. Once the set stands still the steps become those of preconditioned
+!> conjugate gradients. Where a set changes on and on (rough surfaces), it is held until
+!> the linear problem on it is solved well enough to trust the next one.
+!>
+!> What is added to the pressure is multiplied in single precision, and pressure and gap are
+!> summed up in double precision. The error that this can have left in the gap is kept
+!> account of; before it matters the gap is found anew from the pressure, in double precision.
+module hc_normal_lattice_solver
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
+  use hc_contact_residuals, only: conclude
+  use hc_normal_lattice, only: normal_level_t
+  use hc_normal_iterate, only: iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, &
+                               push_only
+  use hc_normal_directions, only: find_residual, projected_step, next_direction, step_share
+  implicit none
+  private
+
+  public :: solve_level
+
+  !> Projected steps have to bring the residual down by this factor every other time, or sets are held.
+  real(wp), parameter :: progress = 0.5_wp
+  !> Steps that are not judged.
+  integer, parameter :: first_steps = 3
+  !> A set that is held is given up when its residual has come down by this factor.
+  real(wp), parameter :: held_accuracy = 0.1_wp
+  !> Share of a residual, and of the tolerance, that errors of single precision may make up.
+  real(wp), parameter :: residual_share = 0.01_wp, tolerance_share = 0.1_wp
+  !> Times that the pressure of a solution is fitted to the load: a tolerance below rounding errors is not reached by more.
+  integer, parameter :: max_fits = 3
+
+contains
+
+  !> Solve for a normal load or an approach.
+  subroutine solve_level(level, now, control, target, tolerance, max_sweeps, state, error)
+    type(normal_level_t), intent(inout) :: level
+    !> Iterate of an earlier solution, whose memory is used again
+    type(iterate_t), intent(inout) :: now
+    !> force_control or displacement_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Bound of both residuals
+    real(wp), intent(in) :: tolerance
+    !> Iterations that may be made
+    integer, intent(in) :: max_sweeps
+    !> On entry its pressure is the start, up to a factor; on return the solution
+    type(contact_state_t), intent(inout) :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), allocatable :: start(:, :)
+    real(wp) :: delta
+    logical :: pulls
+    integer :: row
+
+    level%flexibility%applications = 0.0_wp
+    level%single_work = 0.0_wp
+    call move_alloc(state%pressure, start)
+    call new_contact_state(state, level%lattice, level%n_threads)
+    delta = minval(level%initial_gap, mask=level%candidate)
+    if (target <= merge(0.0_wp, delta, control == force_control)) then         ! nothing touches
+      state%motion(normal) = merge(delta, target, control == force_control)
+      state%gap = level%initial_gap - state%motion(normal)
+    else
+      call iterate(level, now, control == force_control, target, tolerance, max_sweeps, start, state%sweeps, error)
+      if (allocated(error)) return
+      state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
+      call push_only(level, now, pulls)
+      if (pulls .and. level%exact) call find_closing(level, now, error)
+      if (allocated(error)) return
+      !$omp parallel do schedule(static) num_threads(level%n_threads)
+      do row = 1, size(now%w, 2)
+        state%gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
+      end do
+      !$omp end parallel do
+      call move_alloc(now%p, state%pressure)
+      state%motion(normal) = now%approach
+    end if
+    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%n_threads, error)
+  end subroutine solve_level
+
+  !> Iterations up to the tolerance.
+  subroutine iterate(level, now, by_load, target, tolerance, max_sweeps, start, sweeps, error)
+    type(normal_level_t), intent(inout) :: level
+    type(iterate_t), intent(inout) :: now
+    !> The normal load is prescribed, not the approach
+    logical, intent(in) :: by_load
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    !> Pressure to start from, up to a factor
+    real(wp), intent(in) :: start(:, :)
+    !> Iterations made
+    integer, intent(out) :: sweeps
+    type(error_t), allocatable, intent(out) :: error
+
+    logical, allocatable :: candidate(:, :), next(:, :)
+    real(wp) :: history(3), held_start, rz_old, pressures, share
+    logical :: changed, held, fresh
+    integer :: fits
+
+    allocate (candidate, source=level%candidate)
+    ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
+    if (.not. by_load) candidate = candidate .and. level%initial_gap < target
+    pressures = target/level%lattice%cell_area()                  ! of no meaning under a prescribed approach
+    call begin(level, now, by_load, target, candidate, start, error)
+    if (allocated(error)) return
+    allocate (next, mold=candidate)
+    history = huge(1.0_wp)
+    held = .false.
+    fresh = .false.
+    held_start = 1.0_wp
+    rz_old = 0.0_wp
+    sweeps = 0
+    fits = 0
+    do
+      if (by_load) call balance(level, now)
+      call judge(level, now, candidate, next, changed, error)
+      if (allocated(error)) return
+      if (level%exact .and. now%stale > level%compliance*now%p_max*max(residual_share*now%residual, tolerance_share*tolerance)) then
+        if (by_load) call fit_load(level, now, pressures)
+        call find_closing(level, now, error)
+        if (allocated(error)) return
+        cycle
+      end if
+      if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < max_fits) then
+        if (abs(load_lack(level, now, pressures)) > tolerance_share*tolerance*pressures) then
+          fits = fits + 1
+          call fit_load(level, now, pressures)
+          call find_closing(level, now, error)
+          if (allocated(error)) return
+          cycle
+        end if
+      end if
+      if (now%residual <= tolerance .or. sweeps >= max_sweeps) return
+      sweeps = sweeps + 1
+      if (sweeps == 1) changed = .true.
+
+      ! has the residual come down, compared with the best but the last two?
+      if (.not. held .and. sweeps > first_steps) held = now%residual > progress*history(3)
+      history = [now%residual, history(1), min(history(2), history(3))]
+      if (held .and. changed) then
+        if (fresh .and. now%residual_active > held_accuracy*held_start) then
+          changed = .false.
+        else
+          held_start = min(now%residual, 1.0_wp)
+          fresh = .true.
+        end if
+      end if
+
+      if (changed) then
+        call take_set(level, now, next)
+        rz_old = 0.0_wp
+      end if
+      if (by_load .and. .not. allocated(now%punch)) call press_punch(level, now)
+      if (.not. (changed .and. held)) then
+        if (by_load .and. changed) call balance(level, now)
+        call find_residual(level, now)
+        call level%precondition(now%edge, now%r, now%z)
+      end if
+      if (changed) then
+        call projected_step(level, now, held, by_load, pressures)
+        share = 1.0_wp
+      else
+        call next_direction(level, now, by_load, rz_old)
+      end if
+      call level%multiply(now%d, now%kd)
+      if (.not. changed) then
+        share = step_share(level, now, rz_old)
+        if (.not. share > 0.0_wp) then
+          ! nothing is left to gain in single precision, and perhaps at all
+          if (.not. (level%exact .and. now%stale > 0.0_wp)) return
+          now%stale = huge(1.0_wp)
+          cycle
+        end if
+      end if
+      call advance(level, now, share)
+      if (changed .and. .not. by_load) call rescale(level, now)
+    end do
+  end subroutine iterate
+
+  !> w = K p in double precision: nothing of single precision is left in it.
+  subroutine find_closing(level, now, error)
+    type(normal_level_t), intent(inout) :: level
+    type(iterate_t), intent(inout) :: now
+    type(error_t), allocatable, intent(out) :: error
+
+    call level%multiply_exactly(now%p, now%w, error)
+    now%stale = 0.0_wp
+  end subroutine find_closing
+
+end module hc_normal_lattice_solver

@@ -1,0 +1,268 @@
+!> Fields between a lattice and the lattice of its every second node.
+!>
+!> Node (i, j) of the coarse lattice is node (2 i, 2 j) of the fine one. The
+!> interpolation is that of the piecewise linear pyramids themselves: the other
+!> fine nodes are the midpoints of coarse edges.
+module hc_transfer
+  use hc_precision, only: wp
+  use hc_lattice, only: lattice_t, neighbors
+  implicit none
+  private
+
+  public :: level_count, prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
+
+  !> Smaller fields are left to one thread.
+  integer, parameter :: worth_sharing = 16384
+
+contains
+
+  !> Number of lattices, the given one included, when no window gets smaller than it should.
+  pure integer function level_count(extent, smallest_side)
+    !> Number of columns and rows of the finest window
+    integer, intent(in) :: extent(2)
+    !> Nodes that a side should have at least
+    integer, intent(in) :: smallest_side
+    integer :: side
+
+    level_count = 1
+    side = minval(extent)
+    do while (side >= 2*smallest_side)
+      side = side/2
+      level_count = level_count + 1
+    end do
+  end function level_count
+
+  !> Threads for a field of some nodes.
+  pure integer function team(n, n_threads)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Threads that may be used; absent: one
+    integer, intent(in), optional :: n_threads
+
+    team = 1
+    if (present(n_threads) .and. n >= worth_sharing) team = n_threads
+  end function team
+
+  !> Interpolate a field from the coarse to the fine lattice; zero outside the coarse window.
+  subroutine prolong(coarse_lattice, coarse, fine_lattice, fine, n_threads)
+    !> Coarse lattice and window
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse field (n_col, n_row)
+    real(wp), intent(in) :: coarse(:, :)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine field (n_col, n_row)
+    real(wp), intent(out) :: fine(:, :)
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    integer :: col, row, i, j
+
+    !$omp parallel do schedule(static) private(col, i, j) num_threads(team(size(fine), n_threads))
+    do row = 1, size(fine, 2)
+      j = fine_lattice%first(2) + row - 1
+      do col = 1, size(fine, 1)
+        i = fine_lattice%first(1) + col - 1
+        if (modulo(i, 2) == 0 .and. modulo(j, 2) == 0) then
+          fine(col, row) = at(i, j)
+        else if (modulo(j, 2) == 0) then
+          fine(col, row) = 0.5_wp*(at(i - 1, j) + at(i + 1, j))
+        else if (modulo(i, 2) == 0) then
+          fine(col, row) = 0.5_wp*(at(i, j - 1) + at(i, j + 1))
+        else
+          fine(col, row) = 0.5_wp*(at(i + 1, j - 1) + at(i - 1, j + 1))
+        end if
+      end do
+    end do
+    !$omp end parallel do
+
+  contains
+
+    !> Coarse value at an even fine node
+    pure real(wp) function at(fine_col, fine_row)
+      !> Absolute indices of the fine node
+      integer, intent(in) :: fine_col, fine_row
+      integer :: c(2)
+
+      c = [fine_col, fine_row]/2 - coarse_lattice%first + 1
+      at = 0.0_wp
+      if (all(c >= 1) .and. all(c <= coarse_lattice%extent)) at = coarse(c(1), c(2))
+    end function at
+
+  end subroutine prolong
+
+  !> Interpolate a pressure that falls to zero at its edge like the root of the distance.
+  !>
+  !> Its square is linear there: the square is continued by a straight line into the
+  !> nodes beyond the edge, interpolated, and cut off where it is negative. So the edge
+  !> of the fine pressure lies where that of the coarse one does between nodes.
+  subroutine prolong_edge(coarse_lattice, coarse, fine_lattice, fine, n_threads)
+    !> Coarse lattice and window
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse pressure (n_col, n_row)
+    real(wp), intent(in) :: coarse(:, :)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine pressure (n_col, n_row)
+    real(wp), intent(out) :: fine(:, :)
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    real(wp), allocatable :: square(:, :)
+    real(wp) :: beyond, around(size(coarse, 1))
+    integer :: col, row, k, n, near(2), next(2), last
+
+    last = size(coarse, 1)
+    allocate (square(last, size(coarse, 2)))
+    !$omp parallel do schedule(static) private(beyond, around, col, k, n, near, next) num_threads(team(size(coarse), n_threads))
+    do row = 1, size(coarse, 2)
+      square(:, row) = max(coarse(:, row), 0.0_wp)**2
+      ! the largest pressure of the neighbours tells whether there is anything to continue
+      around = 0.0_wp
+      do k = 1, size(neighbors, 2)
+        associate (c => neighbors(1, k), r => row + neighbors(2, k))
+          if (r < 1 .or. r > size(coarse, 2)) cycle
+          around(max(1, 1 - c):min(last, last - c)) = max(around(max(1, 1 - c):min(last, last - c)), &
+                                                          coarse(max(1, 1 + c):min(last, last + c), r))
+        end associate
+      end do
+      do col = 1, last
+        if (coarse(col, row) > 0.0_wp .or. .not. around(col) > 0.0_wp) cycle
+        beyond = 0.0_wp
+        n = 0
+        do k = 1, size(neighbors, 2)
+          near = [col, row] + neighbors(:, k)
+          next = near + neighbors(:, k)
+          if (any(min(near, next) < 1) .or. any(max(near, next) > shape(coarse))) cycle
+          if (.not. min(coarse(near(1), near(2)), coarse(next(1), next(2))) > 0.0_wp) cycle
+          beyond = beyond + min(2.0_wp*coarse(near(1), near(2))**2 - coarse(next(1), next(2))**2, 0.0_wp)
+          n = n + 1
+        end do
+        if (n > 0) square(col, row) = beyond/n
+      end do
+    end do
+    !$omp end parallel do
+    call prolong(coarse_lattice, square, fine_lattice, fine, n_threads)
+    !$omp parallel do schedule(static) num_threads(team(size(fine), n_threads))
+    do row = 1, size(fine, 2)
+      fine(:, row) = sqrt(max(fine(:, row), 0.0_wp))
+    end do
+    !$omp end parallel do
+  end subroutine prolong_edge
+
+  !> Interpolate all components of a field.
+  subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine, n_threads)
+    !> Coarse lattice and window
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse field (n_col, n_row, number of components)
+    real(wp), intent(in) :: coarse(:, :, :)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine field (n_col, n_row, number of components)
+    real(wp), intent(out) :: fine(:, :, :)
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    integer :: m
+
+    do m = 1, size(fine, 3)
+      call prolong(coarse_lattice, coarse(:, :, m), fine_lattice, fine(:, :, m), n_threads)
+    end do
+  end subroutine prolong_vector
+
+  !> Interpolate a shear traction as its ratio to the pressure: where a node slips it stays on the cone.
+  subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine, n_threads)
+    !> Coarse lattice and window
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse pressure (n_col, n_row) and shear traction (n_col, n_row, 2)
+    real(wp), intent(in) :: coarse_pressure(:, :), coarse(:, :, :)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine pressure (n_col, n_row)
+    real(wp), intent(in) :: fine_pressure(:, :)
+    !> Fine shear traction (n_col, n_row, 2)
+    real(wp), intent(out) :: fine(:, :, :)
+    !> Threads to use; absent: one
+    integer, intent(in), optional :: n_threads
+    real(wp), allocatable :: ratio(:, :, :)
+    integer :: col, row, k, n, near(2)
+
+    allocate (ratio, mold=coarse)
+    !$omp parallel do schedule(static) private(col, k, n, near) num_threads(team(size(coarse_pressure), n_threads))
+    do row = 1, size(coarse, 2)
+      do col = 1, size(coarse, 1)
+        ratio(col, row, :) = 0.0_wp
+        if (coarse_pressure(col, row) > 0.0_wp) then
+          ratio(col, row, :) = coarse(col, row, :)/coarse_pressure(col, row)
+          cycle
+        end if
+        ! beyond the edge: that of the neighbours in contact
+        n = 0
+        do k = 1, size(neighbors, 2)
+          near = [col, row] + neighbors(:, k)
+          if (any(near < 1) .or. any(near > shape(coarse_pressure))) cycle
+          if (.not. coarse_pressure(near(1), near(2)) > 0.0_wp) cycle
+          ratio(col, row, :) = ratio(col, row, :) + coarse(near(1), near(2), :)/coarse_pressure(near(1), near(2))
+          n = n + 1
+        end do
+        if (n > 0) ratio(col, row, :) = ratio(col, row, :)/n
+      end do
+    end do
+    !$omp end parallel do
+    call prolong_vector(coarse_lattice, ratio, fine_lattice, fine, n_threads)
+    !$omp parallel do schedule(static) private(k) num_threads(team(size(fine_pressure), n_threads))
+    do row = 1, size(fine, 2)
+      do k = 1, size(fine, 3)
+        fine(:, row, k) = fine(:, row, k)*max(fine_pressure(:, row), 0.0_wp)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine prolong_shear
+
+  !> Values of a field at the coarse nodes.
+  pure function restrict_field(fine_lattice, fine, coarse_lattice) result(coarse)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine field (n_col, n_row)
+    real(wp), intent(in) :: fine(:, :)
+    !> Coarse lattice and window, inside the fine one
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse field (n_col, n_row)
+    real(wp) :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2))
+    integer :: start(2)
+
+    start = 2*coarse_lattice%first - fine_lattice%first + 1
+    coarse = fine(start(1)::2, start(2)::2)
+  end function restrict_field
+
+  !> Values of all components of a field at the coarse nodes.
+  pure function restrict_vector(fine_lattice, fine, coarse_lattice) result(coarse)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine field (n_col, n_row, number of components)
+    real(wp), intent(in) :: fine(:, :, :)
+    !> Coarse lattice and window, inside the fine one
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse field (n_col, n_row, number of components)
+    real(wp) :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2), size(fine, 3))
+    integer :: m
+
+    do m = 1, size(fine, 3)
+      coarse(:, :, m) = restrict_field(fine_lattice, fine(:, :, m), coarse_lattice)
+    end do
+  end function restrict_vector
+
+  !> Values of a mask at the coarse nodes.
+  pure function restrict_mask(fine_lattice, fine, coarse_lattice) result(coarse)
+    !> Fine lattice and window
+    type(lattice_t), intent(in) :: fine_lattice
+    !> Fine mask (n_col, n_row)
+    logical, intent(in) :: fine(:, :)
+    !> Coarse lattice and window, inside the fine one
+    type(lattice_t), intent(in) :: coarse_lattice
+    !> Coarse mask (n_col, n_row)
+    logical :: coarse(coarse_lattice%extent(1), coarse_lattice%extent(2))
+    integer :: start(2)
+
+    start = 2*coarse_lattice%first - fine_lattice%first + 1
+    coarse = fine(start(1)::2, start(2)::2)
+  end function restrict_mask
+
+end module hc_transfer

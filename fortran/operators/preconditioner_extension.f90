@@ -1,0 +1,343 @@
+!> Displacements continued beyond the edge of a contact, for a better preconditioner.
+!>
+!> The inverse K^-1 of the flexibility over the whole lattice is cheap by FFT. The
+!> inverse of its part on the active nodes is that of the whole, minimised over
+!> what the displacement may be elsewhere:
+!>
+!>     r^T (K_CC)^-1 r = min over all continuations u of r of u^T K^-1 u,
+!>
+!> because no traction acts outside. Any linear continuation E thus gives a symmetric
+!> preconditioner E^T K^-1 E >= (K_CC)^-1, the better the closer E comes to the
+!> minimum; zero outside is the plainest. Beyond the edge of a loaded region the
+!> surface falls off like the root of the distance, and less the longer
+!> the waves along the edge are. Here each ring of nodes around the active ones takes the
+!> mean of its neighbours in the ring before, smoothed along the ring, and falls off like
+!> 1 - sqrt(ring/(rings + 1)).
+module hc_preconditioner_extension
+  use hc_precision, only: wp, sp
+  use hc_lattice, only: neighbors
+  implicit none
+  private
+
+  public :: edge_extension_t, new_edge_extension
+
+  !> Rings: this times a power of the number of active nodes over that of the edge nodes (the width of
+  !> the contact), and at most so many.
+  real(wp), parameter :: ring_factor = 0.7_wp, ring_power = 0.8_wp
+  integer, parameter :: most_rings = 16
+  !> Marks of nodes without a ring, and of what lies around the window.
+  integer, parameter :: free = huge(0), outside = huge(0) - 1
+  !> Times that a ring is smoothed.
+  integer, parameter :: smoothings = 2
+
+  !> Nodes in the rings from which on threads share the work.
+  integer, parameter :: worth_sharing = 8192
+
+  !> Neighbours of the nodes of the rings.
+  type :: edge_extension_t
+    private
+    !> Nodes of the rings, ring by ring, and where each ring begins
+    integer, allocatable :: node(:), ring(:)
+    !> Neighbours in the ring before, as nodes (6, n), and how many they are
+    integer, allocatable :: inner(:, :), n_inner(:)
+    !> Neighbours in the same ring and the node itself, as places in the list (7, n), and how many they are
+    integer, allocatable :: beside(:, :), n_beside(:)
+    !> Fall from ring to ring over the number of neighbours in the ring before
+    real(sp), allocatable :: fall(:)
+    !> Threads that share the work
+    integer :: n_threads = 1
+  contains
+    !> Continue a field beyond the active nodes
+    procedure :: extend
+    !> The transpose: add what acts on the rings to the active nodes
+    procedure :: fold
+  end type edge_extension_t
+
+contains
+
+  !> Rings around the active nodes.
+  subroutine new_edge_extension(self, active, n_threads)
+    !> Continuation to be set up
+    type(edge_extension_t), intent(out) :: self
+    !> Active nodes (n_col, n_row)
+    logical, intent(in) :: active(:, :)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+
+    !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
+    !> those of the rings, `free` elsewhere and `outside` around
+    integer, allocatable :: mark(:)
+    integer, allocatable :: frontier(:), next(:), node(:)
+    integer :: n_ring, n_col, width, step(6), n_active, r, n, k
+
+    n_col = size(active, 1)
+    width = n_col + 2
+    step = neighbors(1, :) + width*neighbors(2, :)
+    call mark_window(active, n_threads, mark, n_active)
+    call find_edge(mark, step, shape(active), n_threads, frontier)
+    n_ring = 0
+    if (size(frontier) > 0) n_ring = min(most_rings, int(ring_factor*(real(n_active, wp)/size(frontier))**ring_power))
+    allocate (node(0), self%ring(1))
+    self%ring(1) = 1
+    do r = 1, n_ring
+      call next_ring(frontier, step, mark, size(node), next)
+      if (size(next) == 0) exit
+      node = [node, next]
+      self%ring = [self%ring, size(node) + 1]
+      call move_alloc(next, frontier)
+    end do
+
+    n = size(node)
+    n_ring = size(self%ring) - 1
+    if (n >= worth_sharing) self%n_threads = n_threads
+    allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%inner(6, n), self%beside(7, n))
+    !$omp parallel num_threads(self%n_threads) private(r, k)
+    do r = 1, n_ring
+      !$omp do schedule(static)
+      do k = self%ring(r), self%ring(r + 1) - 1
+        call list_neighbors(node(k), step, mark, self%ring(r), self%ring(r + 1), self%inner(:, k), self%beside(:, k), &
+                            self%n_inner(k), self%n_beside(k))
+        self%node(k) = in_window(node(k))
+        self%inner(:self%n_inner(k), k) = in_window(self%inner(:self%n_inner(k), k))
+        self%fall(k) = real(profile(r, n_ring)/profile(r - 1, n_ring)/self%n_inner(k), sp)
+      end do
+      !$omp end do nowait
+    end do
+    !$omp end parallel
+
+  contains
+
+    !> Place in the window of a place in the marks.
+    elemental integer function in_window(place)
+      integer, intent(in) :: place
+      integer :: row
+      row = (place - 1)/width
+      in_window = place - 1 - row*width + (row - 1)*n_col
+    end function in_window
+
+  end subroutine new_edge_extension
+
+  !> Marks of all nodes before there are rings.
+  subroutine mark_window(active, n_threads, mark, n_active)
+    logical, intent(in) :: active(:, :)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    integer, allocatable, intent(out) :: mark(:)
+    !> Number of active nodes
+    integer, intent(out) :: n_active
+    integer :: row, width, start
+
+    width = size(active, 1) + 2
+    allocate (mark(width*(size(active, 2) + 2)))
+    mark(:width) = outside
+    mark(size(mark) - width + 1:) = outside
+    n_active = 0
+    !$omp parallel do schedule(static) num_threads(n_threads) private(start) reduction(+: n_active)
+    do row = 1, size(active, 2)
+      start = row*width + 1
+      mark(start) = outside
+      mark(start + 1:start + width - 2) = merge(0, free, active(:, row))
+      mark(start + width - 1) = outside
+      n_active = n_active + count(active(:, row))
+    end do
+    !$omp end parallel do
+  end subroutine mark_window
+
+  !> Height of the continuation in a ring.
+  pure real(wp) function profile(ring, n_ring)
+    !> Ring, and number of rings
+    integer, intent(in) :: ring, n_ring
+    profile = 1.0_wp - sqrt(real(ring, wp)/(n_ring + 1))
+  end function profile
+
+  !> Active nodes with a neighbour that is not; a node at the rim of the window has none there.
+  subroutine find_edge(mark, step, extent, n_threads, edge)
+    !> Marks of all nodes, and steps to the neighbours of a node
+    integer, intent(in) :: mark(:), step(6)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    !> The nodes, as places in the marks
+    integer, allocatable, intent(out) :: edge(:)
+
+    type :: list_t
+      integer, allocatable :: node(:)
+    end type list_t
+    type(list_t) :: found(extent(2))
+    integer :: is_edge(extent(1)), first(extent(2) + 1), col, row, k, place
+
+    !$omp parallel do schedule(static) num_threads(n_threads) private(is_edge, col, k, place)
+    do row = 1, extent(2)
+      place = row*(extent(1) + 2) + 1
+      is_edge = 0
+      do k = 1, size(step)
+        do col = 1, extent(1)
+          is_edge(col) = merge(1, is_edge(col), mark(place + col + step(k)) == free)
+        end do
+      end do
+      do col = 1, extent(1)
+        is_edge(col) = merge(is_edge(col), 0, mark(place + col) == 0)
+      end do
+      found(row)%node = pack([(place + col, col=1, extent(1))], is_edge == 1)
+    end do
+    !$omp end parallel do
+    first(1) = 1
+    do row = 1, extent(2)
+      first(row + 1) = first(row) + size(found(row)%node)
+    end do
+    allocate (edge(first(extent(2) + 1) - 1))
+    do row = 1, extent(2)
+      edge(first(row):first(row + 1) - 1) = found(row)%node
+    end do
+  end subroutine find_edge
+
+  !> Nodes next to a ring that have no ring yet.
+  pure subroutine next_ring(ring, step, mark, listed, next)
+    !> Nodes of the ring before, and steps to the neighbours of a node
+    integer, intent(in) :: ring(:), step(:)
+    !> Marks of all nodes; those of the new ring get their place in the list
+    integer, intent(inout) :: mark(:)
+    !> Nodes that are in the list already
+    integer, intent(in) :: listed
+    !> Nodes of the new ring
+    integer, allocatable, intent(out) :: next(:)
+    integer, allocatable :: found(:)
+    integer :: i, k, n, near
+
+    allocate (found(size(step)*size(ring)))
+    n = 0
+    do i = 1, size(ring)
+      do k = 1, size(step)
+        near = ring(i) + step(k)
+        if (mark(near) /= free) cycle
+        n = n + 1
+        mark(near) = listed + n
+        found(n) = near
+      end do
+    end do
+    next = found(:n)
+  end subroutine next_ring
+
+  !> Neighbours of a node in the ring before and in its own.
+  pure subroutine list_neighbors(node, step, mark, own, after, inner, beside, n_inner, n_beside)
+    !> The node, and steps to its neighbours
+    integer, intent(in) :: node, step(6)
+    !> Marks of all nodes
+    integer, intent(in) :: mark(:)
+    !> First marks of its own ring and of the next
+    integer, intent(in) :: own, after
+    !> Neighbours in the ring before (places in the marks), and in its own (places in the list), itself included
+    integer, intent(out) :: inner(6), beside(7)
+    !> Their numbers
+    integer, intent(out) :: n_inner, n_beside
+    integer :: k, near
+
+    n_inner = 0
+    n_beside = 1
+    beside(1) = mark(node)
+    do k = 1, size(step)
+      near = node + step(k)
+      if (mark(near) < own) then
+        ! no neighbour is further in than the ring before
+        n_inner = n_inner + 1
+        inner(n_inner) = near
+      else if (mark(near) < after) then
+        n_beside = n_beside + 1
+        beside(n_beside) = mark(near)
+      end if
+    end do
+  end subroutine list_neighbors
+
+  !> Continue a field beyond the active nodes.
+  subroutine extend(self, field)
+    class(edge_extension_t), intent(in) :: self
+    !> Field over the window (n)
+    real(sp), intent(inout), contiguous :: field(:)
+    real(sp), allocatable :: value(:), smooth(:)
+    integer :: r, k, s
+
+    if (.not. allocated(self%node)) return                                     ! not set up: zero beyond the edge
+    allocate (value(size(self%node)), smooth(size(self%node)))
+    !$omp parallel num_threads(self%n_threads) private(r, k, s)
+    do r = 1, size(self%ring) - 1
+      associate (first => self%ring(r), last => self%ring(r + 1) - 1)
+        !$omp do schedule(static)
+        do k = first, last
+          value(k) = self%fall(k)*sum_of(field, self%inner(:self%n_inner(k), k))
+        end do
+        !$omp end do
+        do s = 1, smoothings
+          !$omp do schedule(static)
+          do k = first, last
+            smooth(k) = sum_of(value, self%beside(:self%n_beside(k), k))/self%n_beside(k)
+          end do
+          !$omp end do
+          !$omp do schedule(static)
+          do k = first, last
+            value(k) = smooth(k)
+            field(self%node(k)) = smooth(k)
+          end do
+          !$omp end do
+        end do
+      end associate
+    end do
+    !$omp end parallel
+  end subroutine extend
+
+  !> The transpose of `extend`; what is left on the rings has no meaning.
+  subroutine fold(self, field)
+    class(edge_extension_t), intent(in) :: self
+    !> Field over the window (n)
+    real(sp), intent(inout), contiguous :: field(:)
+    real(sp), allocatable :: value(:), share(:)
+    integer :: r, k, s, i
+
+    if (.not. allocated(self%node)) return
+    allocate (value(size(self%node)), share(size(self%node)))
+    !$omp parallel num_threads(self%n_threads) private(r, k, s, i)
+    do r = size(self%ring) - 1, 1, -1
+      associate (first => self%ring(r), last => self%ring(r + 1) - 1)
+        !$omp do schedule(static)
+        do k = first, last
+          value(k) = field(self%node(k))
+        end do
+        !$omp end do
+        do s = 1, smoothings
+          !$omp do schedule(static)
+          do k = first, last
+            share(k) = value(k)/self%n_beside(k)
+          end do
+          !$omp end do
+          !$omp do schedule(static)
+          do k = first, last
+            value(k) = sum_of(share, self%beside(:self%n_beside(k), k))
+          end do
+          !$omp end do
+        end do
+        ! several nodes add to the same neighbour, always in the same order
+        !$omp single
+        do k = first, last
+          do i = 1, self%n_inner(k)
+            field(self%inner(i, k)) = field(self%inner(i, k)) + self%fall(k)*value(k)
+          end do
+        end do
+        !$omp end single
+      end associate
+    end do
+    !$omp end parallel
+  end subroutine fold
+
+  !> Sum over some places.
+  pure real(sp) function sum_of(value, places)
+    real(sp), intent(in), contiguous :: value(:)
+    integer, intent(in), contiguous :: places(:)
+    integer :: i
+
+    sum_of = 0.0_sp
+    do i = 1, size(places)
+      sum_of = sum_of + value(places(i))
+    end do
+  end function sum_of
+
+end module hc_preconditioner_extension

@@ -1,0 +1,89 @@
+!> The kernel of the pressure at all lattice offsets of a window, over the spacing.
+!>
+!> On the equilateral lattice it has twelve symmetries: only offsets with
+!> 0 <= j <= i are evaluated. Over the spacing the kernel is the same at the same
+!> indices of any lattice, so that one table serves a whole hierarchy of lattices.
+module hc_pressure_kernel
+  use hc_precision, only: wp
+  use hc_lattice, only: lattice_t
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid
+  use hc_convolution, only: kernel_source_t, threads_for
+  implicit none
+  private
+
+  public :: normal_kernel_t
+
+  !> Closing of the gap by a pyramid of unit pressure, over lambda_1 and the spacing.
+  type, extends(kernel_source_t) :: normal_kernel_t
+    private
+    logical :: equilateral = .false.
+    !> K1 at offsets (i, j) with i j >= 0, and at (i, -j), over the spacing
+    real(wp), allocatable :: same(:, :), opposite(:, :)
+  contains
+    !> Make the table, unless it serves already
+    procedure :: cover
+    procedure :: row => kernel_row
+  end type normal_kernel_t
+
+contains
+
+  !> Table for a window; the one that is there has to be of the same lattice, or of one that is coarser or finer.
+  subroutine cover(self, lattice, n_threads)
+    class(normal_kernel_t), intent(inout) :: self
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Threads to use; absent or 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+    type(pyramid_t) :: pyramid
+    integer :: i, j, n(2)
+
+    n = lattice%extent - 1
+    if (allocated(self%same)) then
+      if (all(n <= ubound(self%same))) return
+      deallocate (self%same)
+      if (allocated(self%opposite)) deallocate (self%opposite)
+    end if
+    call new_pyramid(pyramid, lattice%unit_basis())
+    self%equilateral = pyramid%is_equilateral()
+    if (self%equilateral) n = maxval(n)
+    allocate (self%same(0:n(1), 0:n(2)))
+    if (.not. self%equilateral) allocate (self%opposite(0:n(1), 0:n(2)))
+    associate (basis => lattice%unit_basis())
+      !$omp parallel do schedule(dynamic, 8) private(i) num_threads(threads_for(lattice%extent, n_threads))
+      do j = 0, n(2)
+        do i = merge(j, 0, self%equilateral), n(1)
+          self%same(i, j) = pyramid%normal_kernel(i*basis(1, 1) + j*basis(1, 2), i*basis(2, 1) + j*basis(2, 2))
+          if (self%equilateral) cycle
+          self%opposite(i, j) = pyramid%normal_kernel(i*basis(1, 1) - j*basis(1, 2), i*basis(2, 1) - j*basis(2, 2))
+        end do
+      end do
+      !$omp end parallel do
+    end associate
+    if (.not. self%equilateral) return
+    ! a mirror image: columns and rows change places
+    do j = 1, n(2)
+      self%same(:j - 1, j) = self%same(j, :j - 1)
+    end do
+  end subroutine cover
+
+  pure subroutine kernel_row(self, j, k)
+    class(normal_kernel_t), intent(in) :: self
+    integer, intent(in) :: j
+    real(wp), intent(out) :: k(:, :)
+    integer :: i, n
+
+    n = size(k, 2)/2
+    k(1, n + 1:) = self%same(:n, j)
+    do i = 1, n
+      if (j == 0) then
+        k(1, n + 1 - i) = self%same(i, 0)
+      else if (self%equilateral) then
+        ! a turn by 60 degrees
+        k(1, n + 1 - i) = self%same(abs(i - j), min(i, j))
+      else
+        k(1, n + 1 - i) = self%opposite(i, j)
+      end if
+    end do
+  end subroutine kernel_row
+
+end module hc_pressure_kernel

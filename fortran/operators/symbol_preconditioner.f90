@@ -1,0 +1,216 @@
+!> Fourier preconditioner: the inverse of the lattice symbol on a small periodic grid.
+!>
+!> The grid is that of the window, or the next of a fast length, instead of twice
+!> as large, so that one application costs about a quarter of a product. It is symmetric
+!> and positive definite, also when it is restricted to a set of nodes.
+!>
+!> For shear tractions there is a second one, of a body whose every node has a soft
+!> spring (see spring_blend).
+module hc_symbol_preconditioner
+  use hc_precision, only: wp, sp
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_fftw, only: good_size
+  use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
+  use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_preconditioner_extension, only: edge_extension_t
+  use hc_spring_blend, only: node_ratio, soft
+  use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
+  implicit none
+  private
+
+  public :: preconditioner_t, new_preconditioner, preconditioner_memory
+
+  !> A transform in single precision moves half of the bytes, and is counted as half of one.
+  real(wp), parameter, public :: single_cost = 0.5_wp
+
+  !> Blocks (onto, from) of the symmetric inverse.
+  integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
+  !> Kernels of the tangential inverse; those on soft springs come after them.
+  integer, parameter :: n_tangential = 3
+
+  !> Approximate inverse of the normal or of the tangential flexibility.
+  type :: preconditioner_t
+    type(convolution_t), private :: convolution
+    !> Displacement per traction that the single precision numbers are scaled with [m/Pa]
+    real(wp) :: unit = 1.0_wp
+    !> Of the tangential flexibility
+    logical, private :: tangential = .false.
+    !> Fields in single precision
+    real(sp), allocatable, private :: given(:, :, :), wanted(:, :, :)
+    !> Cost of one application in applications of the full flexibility operator
+    real(wp) :: cost = 0.0_wp
+  contains
+    !> Traction that causes a given displacement, approximately
+    procedure :: apply
+    !> The same in single precision, displacements and tractions in any units of ratio `unit`
+    procedure :: apply_single
+  end type preconditioner_t
+
+contains
+
+  !> Plans and inverse symbol over a window.
+  subroutine new_preconditioner(self, lattice, pair, error, n_threads, tangential, cache)
+    !> Preconditioner to be set up
+    type(preconditioner_t), intent(out) :: self
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads to use; absent or 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+    !> For shear tractions instead of the pressure
+    logical, intent(in), optional :: tangential
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+
+    type(kernel_key_t) :: key
+    integer, allocatable :: f(:, :)
+    integer :: length(2), b, i, n_component
+    real(wp) :: scale, k(3), matrix(3), spring, basis(2, 2), gamma
+    real(wp), allocatable :: symbol(:)
+    logical :: found
+
+    if (present(tangential)) self%tangential = tangential
+    n_component = merge(2, 1, self%tangential)
+    length = good_size(lattice%extent)
+    call new_convolution(self%convolution, lattice%extent, length, merge(2*n_tangential, 1, self%tangential), n_component, &
+                         error, n_threads=n_threads)
+    if (allocated(error)) return
+    self%unit = pair%lambda_1*lattice%spacing()
+    self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
+    key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, pair)
+    call self%convolution%take_spectra(found, error, cache, key)
+    if (found .or. allocated(error)) return
+    ! all in units of lambda_1 and the spacing
+    basis = lattice%unit_basis()
+    gamma = pair%gamma()
+    spring = soft*node_ratio(pair)
+    scale = 1.0_wp/product(real(length, wp))
+    !$omp parallel do num_threads(self%convolution%n_threads) private(f, i, k, matrix, symbol)
+    do b = 1, self%convolution%n_block
+      f = self%convolution%frequencies(b)
+      if (.not. self%tangential) then
+        allocate (symbol(size(f, 2)))
+        ! beyond length/2 there is mere filling
+        f(1, :) = min(f(1, :), length(1)/2)
+        call normal_symbols(basis, length, f, symbol)
+        self%convolution%spectrum(:, b, 1) = real(scale/symbol, sp)
+        deallocate (symbol)
+      else
+        do i = 1, size(f, 2)
+          if (f(1, i) > length(1)/2) cycle
+          k = kernel_symbols(basis, length, f(:, i))
+          ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
+          matrix = [k(symbol_1) + gamma*k(symbol_xx), gamma*k(symbol_xy), k(symbol_1) + gamma*(k(symbol_1) - k(symbol_xx))]
+          self%convolution%spectrum(i, b, :n_tangential) = real(scale*inverse(matrix), sp)
+          matrix([1, 3]) = matrix([1, 3]) + spring
+          self%convolution%spectrum(i, b, n_tangential + 1:) = real(scale*inverse(matrix), sp)
+        end do
+      end if
+    end do
+    !$omp end parallel do
+    call self%convolution%share_spectra(cache, key)
+  end subroutine new_preconditioner
+
+  !> Inverse of a symmetric matrix.
+  pure function inverse(matrix)
+    !> Elements xx, xy and yy
+    real(wp), intent(in) :: matrix(3)
+    real(wp) :: inverse(3)
+    inverse = [matrix(3), -matrix(2), matrix(1)]/(matrix(1)*matrix(3) - matrix(2)**2)
+  end function inverse
+
+  !> Bytes that the preconditioner takes, for a window of the given size.
+  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, n_threads, tangential)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: n_threads
+    !> For shear tractions instead of the pressure
+    logical, intent(in) :: tangential
+    integer, parameter :: long = selected_int_kind(18)
+
+    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), &
+                                               merge(2, 1, tangential), n_threads)
+    ! fields in single precision; those of the tangential one belong to the shear system
+    if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
+  end function preconditioner_memory
+
+  subroutine apply(self, displacement, traction, edge)
+    class(preconditioner_t), intent(inout) :: self
+    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2) [m]
+    real(wp), intent(in), contiguous :: displacement(:, :, :)
+    !> Pressure, or shear tractions (n_col, n_row, 1 or 2) [Pa]
+    real(wp), intent(out), contiguous :: traction(:, :, :)
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in), optional :: edge
+    real(sp), allocatable :: given(:, :, :), wanted(:, :, :)
+    integer :: row, m
+
+    ! out of `self`, which the product changes
+    call move_alloc(self%given, given)
+    call move_alloc(self%wanted, wanted)
+    if (.not. allocated(given)) then
+      allocate (given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
+      allocate (wanted, mold=given)
+    end if
+    associate (n_threads => self%convolution%n_threads)
+      !$omp parallel do collapse(2) schedule(static) num_threads(n_threads)
+      do m = 1, size(given, 3)
+        do row = 1, size(given, 2)
+          given(:, row, m) = real(displacement(:, row, m)/self%unit, sp)
+        end do
+      end do
+      !$omp end parallel do
+      call self%apply_single(given, wanted, edge)
+      !$omp parallel do collapse(2) schedule(static) num_threads(n_threads)
+      do m = 1, size(wanted, 3)
+        do row = 1, size(wanted, 2)
+          traction(:, row, m) = wanted(:, row, m)
+        end do
+      end do
+      !$omp end parallel do
+    end associate
+    call move_alloc(given, self%given)
+    call move_alloc(wanted, self%wanted)
+  end subroutine apply
+
+  subroutine apply_single(self, displacement, traction, edge, on_springs)
+    class(preconditioner_t), intent(inout) :: self
+    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
+    real(sp), intent(inout), contiguous, target :: displacement(:, :, :)
+    !> Pressure, or shear tractions (n_col, n_row, 1 or 2)
+    real(sp), intent(out), contiguous, target :: traction(:, :, :)
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in), optional :: edge
+    !> Displacements of nodes on soft springs; absent: without springs
+    logical, intent(in), optional :: on_springs
+    real(sp), pointer, contiguous :: field(:)
+    integer :: m, block(2, 2)
+
+    if (present(edge)) then
+      do m = 1, size(displacement, 3)
+        field(1:size(displacement, 1)*size(displacement, 2)) => displacement(:, :, m)
+        call edge%extend(field)
+      end do
+    end if
+    if (self%tangential) then
+      block = tangential_block
+      if (present(on_springs)) block = block + merge(n_tangential, 0, on_springs)
+      call self%convolution%convolve(block, displacement, traction)
+    else
+      call self%convolution%convolve(normal_block, displacement, traction)
+    end if
+    if (.not. present(edge)) return
+    do m = 1, size(displacement, 3)
+      field(1:size(displacement, 1)*size(displacement, 2)) => traction(:, :, m)
+      call edge%fold(field)
+    end do
+  end subroutine apply_single
+
+end module hc_symbol_preconditioner

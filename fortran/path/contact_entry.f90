@@ -1,0 +1,448 @@
+!> Where nodes stood when their gap closed.
+!>
+!> Backward Euler lets the slip of a node that enters the contact during a step count from s^n,
+!> its relative displacement at the beginning of the step, as if it had not moved freely until
+!> its gap closed. Here it counts from an estimate of that moment's,
+!>
+!>     s_e = s^n + m_1/M_1 (D - C) + m_2/M_2 C,
+!>
+!> with D = s^{n+1} - s^n of the nodes that are still outside, carried inwards. Near the old edge
+!> s_e - s^n is a sum of a part that is linear in the distance d from it, as the edge slips, and one with
+!> d^(3/2), C, as it sticks. The gap at the beginning of the step measures both without any geometry: m_1 is its power
+!> 2/3, m_2 the gap itself; M_1, M_2 are what they lose during the step outside. How much there is of C shows in how D
+!> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory.md, section 11).
+module hc_contact_entry
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: contact_state_t, load_target_t, normal, force_control
+  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  implicit none
+  private
+
+  public :: solve_with_entry, entry_displacement
+
+  !> The six neighbors of a node.
+  integer, parameter :: n_neighbor = 6
+  integer, parameter :: neighbor(2, n_neighbor) = reshape([1, 0, -1, 0, 0, 1, 0, -1, 1, -1, -1, 1], [2, n_neighbor])
+
+  !> Near an edge on a lattice gap^(2/3) closes as (gap + g_0)^(2/3), g_0 this times the closing that
+  !> the pressure at the edge makes at a node. Found from the moments at which nodes enter a Hertzian contact.
+  real(wp), parameter :: edge_gap = 0.11_wp
+  !> The part C is found too small by this much of D, which is known from the first node outside on.
+  real(wp), parameter :: missed_share = 0.12_wp
+  !> Spacings along the edge over which C is found.
+  integer, parameter :: along_edge = 3
+
+  !> Corrections of the entry state in one load step.
+  integer, parameter :: max_corrections = 40
+  !> Corrections that the next one is extrapolated from.
+  integer, parameter :: depth = 5
+  !> A linear combination of corrections counts as dependent below this.
+  real(wp), parameter :: dependent = 1.0e-7_wp
+  !> Accuracy of a solution: at the beginning; relative to the residual that the entry state leaves; of the last one.
+  real(wp), parameter :: first_tolerance = 1.0e-3_wp, relative_tolerance = 0.05_wp, last_tolerance = 0.5_wp
+
+  !> What is carried inwards from the nodes outside.
+  type :: carried_t
+    !> Motion D of the step, and the part of it that grows with d^(3/2)
+    real(wp) :: moved(2) = 0.0_wp
+    real(wp) :: curved(2) = 0.0_wp
+    !> Closing of both measures of the gap during the step
+    real(wp) :: closed(2) = 0.0_wp
+    !> g_0
+    real(wp) :: lattice_gap = 0.0_wp
+  end type carried_t
+
+contains
+
+  !> A load step in which slip counts from the entry state.
+  !>
+  !> The residuals of the result, and whether it converged, are those with the entry state that follows from the result itself.
+  subroutine solve_with_entry(solver, start, target, tolerance, max_sweeps, state, error)
+    !> Method
+    class(friction_solver_t), intent(inout) :: solver
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: start
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Active sets that may be tried for a given entry state
+    integer, intent(in) :: max_sweeps
+    !> State at the end of the step, converged or not
+    type(contact_state_t), intent(out) :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    type(contact_state_t) :: from
+    real(wp), allocatable :: entry(:, :, :), correction(:, :, :), before(:, :, :), previous(:, :, :)
+    real(wp), allocatable :: changes(:, :), corrections(:, :)
+    real(wp) :: accuracy, work
+    integer :: i, n, kept, sweeps
+    logical :: again
+
+    n = size(start%relative_displacement)
+    allocate (changes(n, depth), corrections(n, depth))
+    allocate (entry, mold=start%relative_displacement)
+    allocate (before, previous, mold=entry)
+    entry = 0.0_wp
+    accuracy = last_tolerance*tolerance
+    if (grows(start, target)) accuracy = max(accuracy, first_tolerance)
+    from = start
+    work = 0.0_wp
+    sweeps = 0
+    kept = -1
+    again = .false.
+    do i = 1, max_corrections
+      call solver%solve_step(from, start%relative_displacement + entry, target, accuracy, max_sweeps, state, error)
+      if (allocated(error)) return
+      work = work + state%operator_applications
+      sweeps = sweeps + state%sweeps
+      if (.not. state%converged) then
+        ! an inaccurate solution may lead astray: once more from the beginning
+        if (again) exit
+        again = .true.
+        accuracy = last_tolerance*tolerance
+        from = start
+        cycle
+      end if
+      correction = entry_displacement(solver%problem, start, state) - entry
+      call judge(solver%problem, start%relative_displacement + entry + correction, target, tolerance, state)
+      if (state%converged) exit
+      if (i == max_corrections) exit
+      accuracy = max(min(accuracy, relative_tolerance*state%residual_tangential), last_tolerance*tolerance)
+      kept = min(kept + 1, depth)
+      if (kept > 0) then
+        changes(:, 2:kept) = changes(:, 1:kept - 1)
+        corrections(:, 2:kept) = corrections(:, 1:kept - 1)
+        changes(:, 1) = reshape(entry - before, [n])
+        corrections(:, 1) = reshape(correction - previous, [n])
+      end if
+      before = entry
+      previous = correction
+      entry = entry + correction - reshape(extrapolated(changes(:, :kept), corrections(:, :kept), reshape(correction, [n])), &
+                                           shape(entry))
+      ! nodes that have left again take nothing along
+      where (spread(state%pressure <= 0.0_wp, 3, 2)) entry = 0.0_wp
+      from = state
+    end do
+    state%operator_applications = work
+    state%sweeps = sweeps
+  end subroutine solve_with_entry
+
+  !> Will nodes enter the contact?
+  pure logical function grows(start, target)
+    type(contact_state_t), intent(in) :: start
+    type(load_target_t), intent(in) :: target
+
+    if (target%control(normal) == force_control) then
+      grows = target%value(normal) > start%load(normal)
+    else
+      grows = target%value(normal) > start%motion(normal)
+    end if
+  end function grows
+
+  !> Slip, zones and residuals of a solution with another reference displacement; nothing is multiplied.
+  subroutine judge(problem, reference, target, tolerance, state)
+    type(friction_problem_t), intent(in) :: problem
+    !> Displacement that slip counts from (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    type(contact_state_t), intent(inout) :: state
+    real(wp), allocatable :: displacement(:, :, :)
+
+    allocate (displacement(size(reference, 1), size(reference, 2), 3))
+    displacement(:, :, 1) = state%gap - problem%initial_gap + state%motion(normal)
+    displacement(:, :, 2:) = state%relative_displacement + problem%rigid_displacement(state%motion)
+    call problem%conclude(target, tolerance, reference, displacement, state)
+  end subroutine judge
+
+  !> What Anderson's extrapolation takes from a corrected entry state: (changes + corrections) y, where
+  !> y makes |corrections y - correction| least. Combinations that depend on newer ones are left out.
+  pure function extrapolated(changes, corrections, correction) result(less)
+    !> Changes of the entry state and of its correction, the newest first
+    real(wp), intent(in) :: changes(:, :), corrections(:, :)
+    !> The last correction
+    real(wp), intent(in) :: correction(:)
+    real(wp) :: less(size(correction))
+    real(wp) :: direction(size(correction), size(changes, 2)), move(size(correction), size(changes, 2)), length, part
+    integer :: k, m, j
+
+    less = 0.0_wp
+    m = 0
+    do k = 1, size(changes, 2)
+      m = m + 1
+      direction(:, m) = corrections(:, k)
+      move(:, m) = changes(:, k) + corrections(:, k)
+      length = norm2(direction(:, m))
+      do j = 1, m - 1
+        part = dot_product(direction(:, j), direction(:, m))
+        direction(:, m) = direction(:, m) - part*direction(:, j)
+        move(:, m) = move(:, m) - part*move(:, j)
+      end do
+      if (norm2(direction(:, m)) <= max(dependent*length, tiny(1.0_wp))) then
+        m = m - 1
+        cycle
+      end if
+      move(:, m) = move(:, m)/norm2(direction(:, m))
+      direction(:, m) = direction(:, m)/norm2(direction(:, m))
+      less = less + dot_product(direction(:, m), correction)*move(:, m)
+    end do
+  end function extrapolated
+
+  !> s_e - s^n of the nodes that entered the contact during a step, zero elsewhere (n_col, n_row, 2) [m].
+  function entry_displacement(problem, before, after) result(displacement)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> States at the beginning and at the end of the step
+    type(contact_state_t), intent(in) :: before, after
+    real(wp), allocatable :: displacement(:, :, :)
+
+    type(carried_t), allocatable :: carried(:, :)
+    type(carried_t) :: sum_of
+    real(wp), allocatable :: gap(:, :), edge_pressure(:, :)
+    !> Nodes that entered, that are outside all the time, that have a value to carry on, that are tied to the old contact
+    logical, allocatable :: entered(:, :), outside(:, :), known(:, :), attached(:, :)
+    integer, allocatable :: node(:, :)
+    real(wp) :: weight, total, share(2)
+    integer :: i, k, col, row, c, r
+
+    allocate (displacement, mold=after%relative_displacement)
+    displacement = 0.0_wp
+    entered = after%pressure > 0.0_wp .and. before%pressure <= 0.0_wp
+    if (.not. any(entered)) return
+    outside = problem%candidate .and. after%pressure <= 0.0_wp .and. before%pressure <= 0.0_wp
+    if (any(before%pressure > 0.0_wp)) then
+      gap = max(before%gap, 0.0_wp)
+    else
+      gap = max(problem%initial_gap - before%motion(normal), 0.0_wp)
+    end if
+    edge_pressure = widened(widened(after%pressure))
+    node = by_falling_gap(entered, gap)
+    allocate (carried(size(gap, 1), size(gap, 2)), known(size(gap, 1), size(gap, 2)), attached(size(gap, 1), size(gap, 2)))
+    known = .false.
+    attached = .false.
+    do i = size(node, 2), 1, -1
+      do k = 1, n_neighbor
+        c = node(1, i) + neighbor(1, k)
+        r = node(2, i) + neighbor(2, k)
+        if (.not. inside(gap, c, r)) cycle
+        if (before%pressure(c, r) > 0.0_wp .or. attached(c, r)) attached(node(1, i), node(2, i)) = .true.
+        if (outside(c, r)) then
+          known(c, r) = .true.
+          carried(c, r) = seen_from(c, r, problem%normal_compliance*edge_gap*edge_pressure(c, r))
+        end if
+      end do
+    end do
+    call find_curved_parts()
+
+    do i = 1, size(node, 2)
+      col = node(1, i)
+      row = node(2, i)
+      sum_of = carried_t()
+      total = 0.0_wp
+      do k = 1, n_neighbor
+        c = col + neighbor(1, k)
+        r = row + neighbor(2, k)
+        if (.not. inside(gap, c, r)) cycle
+        weight = gap(c, r) - gap(col, row)
+        if (weight <= 0.0_wp .or. .not. known(c, r)) cycle
+        total = total + weight
+        sum_of%moved = sum_of%moved + weight*carried(c, r)%moved
+        sum_of%closed = sum_of%closed + weight*carried(c, r)%closed
+        sum_of%lattice_gap = sum_of%lattice_gap + weight*carried(c, r)%lattice_gap
+        sum_of%curved = sum_of%curved + weight*carried(c, r)%curved
+      end do
+      if (total <= 0.0_wp) cycle
+      known(col, row) = .true.
+      carried(col, row) = carried_t(sum_of%moved/total, sum_of%curved/total, sum_of%closed/total, sum_of%lattice_gap/total)
+      share = merge(1.0_wp, 0.0_wp, gap(col, row) > 0.0_wp)
+      associate (here => carried(col, row))
+        where (measures(gap(col, row), here%lattice_gap) < here%closed)
+          share = measures(gap(col, row), here%lattice_gap)/here%closed
+        end where
+        if (attached(col, row)) then
+          displacement(col, row, :) = share(1)*(here%moved - here%curved) + share(2)*here%curved
+        else
+          displacement(col, row, :) = share(2)*here%moved
+        end if
+      end associate
+    end do
+
+  contains
+
+    !> Motion of a node outside, and how far its gap closed.
+    type(carried_t) function seen_from(col, row, lattice_gap)
+      integer, intent(in) :: col, row
+      real(wp), intent(in) :: lattice_gap
+
+      seen_from%moved = after%relative_displacement(col, row, :) - before%relative_displacement(col, row, :)
+      seen_from%closed = measures(gap(col, row), lattice_gap) - measures(max(after%gap(col, row), 0.0_wp), lattice_gap)
+      seen_from%lattice_gap = lattice_gap
+    end function seen_from
+
+    !> Part C of D that grows with d^(3/2), from how D grows between the first two nodes outside.
+    !>
+    !> Least squares over a few nodes along the edge: D_2 = m_2/m_1 (D_1 - C) + m'_2/m'_1 C.
+    subroutine find_curved_parts()
+      type(carried_t) :: next, further
+      real(wp) :: growth(2), total, weight
+      real(wp), allocatable :: squares(:, :), products(:, :, :)
+      integer :: col, row, k, c, r
+
+      allocate (squares, mold=gap)
+      allocate (products, mold=after%traction)
+      squares = 0.0_wp
+      products = 0.0_wp
+      do row = 1, size(gap, 2)
+        do col = 1, size(gap, 1)
+          if (.not. known(col, row)) cycle
+          further = carried_t()
+          total = 0.0_wp
+          associate (here => carried(col, row))
+            if (any(here%closed <= 0.0_wp)) cycle
+            do k = 1, n_neighbor
+              c = col + neighbor(1, k)
+              r = row + neighbor(2, k)
+              if (.not. inside(gap, c, r)) cycle
+              weight = gap(c, r) - gap(col, row)
+              if (weight <= 0.0_wp .or. .not. outside(c, r)) cycle
+              next = seen_from(c, r, here%lattice_gap)
+              total = total + weight
+              further%moved = further%moved + weight*next%moved
+              further%closed = further%closed + weight*next%closed
+            end do
+            if (total <= 0.0_wp) cycle
+            growth = further%closed/(total*here%closed)
+            squares(col, row) = (growth(2) - growth(1))**2
+            products(col, row, :) = (growth(2) - growth(1))*(further%moved/total - growth(1)*here%moved)
+          end associate
+        end do
+      end do
+      do k = 1, along_edge
+        squares = with_neighbors(squares)
+        products(:, :, 1) = with_neighbors(products(:, :, 1))
+        products(:, :, 2) = with_neighbors(products(:, :, 2))
+      end do
+      do row = 1, size(gap, 2)
+        do col = 1, size(gap, 1)
+          if (.not. known(col, row)) cycle
+          associate (here => carried(col, row))
+            here%curved = here%moved
+            if (squares(col, row) <= 0.0_wp) cycle
+            here%curved = products(col, row, :)/squares(col, row) + missed_share*here%moved
+            ! no more than all there is
+            here%curved = here%curved*min(1.0_wp, norm2(here%moved)/max(norm2(here%curved), tiny(1.0_wp)))
+          end associate
+        end do
+      end do
+    end subroutine find_curved_parts
+
+  end function entry_displacement
+
+  !> Is there such a node in the window?
+  pure logical function inside(field, col, row)
+    real(wp), intent(in) :: field(:, :)
+    integer, intent(in) :: col, row
+
+    inside = col >= 1 .and. col <= size(field, 1) .and. row >= 1 .and. row <= size(field, 2)
+  end function inside
+
+  !> What a gap measures of the distance from an edge that slips, and from one that sticks.
+  pure function measures(gap, lattice_gap)
+    real(wp), intent(in) :: gap, lattice_gap
+    real(wp) :: measures(2)
+
+    measures(1) = (gap + lattice_gap)**(2.0_wp/3.0_wp) - lattice_gap**(2.0_wp/3.0_wp)
+    measures(2) = gap
+  end function measures
+
+  !> The largest value at a node and its neighbors.
+  pure function widened(field) result(largest)
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: largest(size(field, 1), size(field, 2))
+    integer :: k
+
+    largest = field
+    do k = 1, n_neighbor
+      largest = max(largest, eoshift(eoshift(field, neighbor(1, k), dim=1), neighbor(2, k), dim=2))
+    end do
+  end function widened
+
+  !> Sum of the values at a node and its neighbors.
+  pure function with_neighbors(field) result(total)
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: total(size(field, 1), size(field, 2))
+    integer :: k
+
+    total = field
+    do k = 1, n_neighbor
+      total = total + eoshift(eoshift(field, neighbor(1, k), dim=1), neighbor(2, k), dim=2)
+    end do
+  end function with_neighbors
+
+  !> Column and row of the nodes of a set, the largest gap first (heap sort).
+  pure function by_falling_gap(set, gap) result(node)
+    logical, intent(in) :: set(:, :)
+    real(wp), intent(in) :: gap(:, :)
+    integer, allocatable :: node(:, :)
+    integer :: col, row, n, last, swapped(2)
+
+    allocate (node(2, count(set)))
+    n = 0
+    do row = 1, size(set, 2)
+      do col = 1, size(set, 1)
+        if (.not. set(col, row)) cycle
+        n = n + 1
+        node(:, n) = [col, row]
+      end do
+    end do
+    do n = size(node, 2)/2, 1, -1
+      call sink(n, size(node, 2))
+    end do
+    do last = size(node, 2), 2, -1
+      swapped = node(:, 1)
+      node(:, 1) = node(:, last)
+      node(:, last) = swapped
+      call sink(1, last - 1)
+    end do
+
+  contains
+
+    !> Put a node of the heap, whose top is the smallest gap, into its place.
+    pure subroutine sink(first, n)
+      integer, intent(in) :: first, n
+      integer :: i, child, moved(2)
+
+      moved = node(:, first)
+      i = first
+      do
+        child = 2*i
+        if (child > n) exit
+        if (child < n) then
+          if (below(node(:, child + 1), node(:, child))) child = child + 1
+        end if
+        if (.not. below(node(:, child), moved)) exit
+        node(:, i) = node(:, child)
+        i = child
+      end do
+      node(:, i) = moved
+    end subroutine sink
+
+    !> Has the first node the smaller gap? Equal ones stay in the order of the lattice.
+    pure logical function below(a, b)
+      integer, intent(in) :: a(2), b(2)
+
+      if (gap(a(1), a(2)) < gap(b(1), b(2))) then
+        below = .true.
+      else if (gap(a(1), a(2)) > gap(b(1), b(2))) then
+        below = .false.
+      else
+        below = a(2) > b(2) .or. (a(2) == b(2) .and. a(1) > b(1))
+      end if
+    end function below
+
+  end function by_falling_gap
+
+end module hc_contact_entry

@@ -1,6 +1,0 @@
-from typing import Any
-
-hc_f2py_api: Any
-hc_f2py_friction: Any
-hc_f2py_influence: Any
-hc_f2py_cache: Any

@@ -1,0 +1,91 @@
+"""Commands about decks: check, schema, new."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import DeckError
+from ..text import visible
+from .guard import Content, guarded, say
+from .options import AsJson, DeckFile, Settings
+
+
+@guarded
+def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
+    """Read a deck, report everything that is wrong with it, and say what would be run."""
+    from ..solve.frictionless import require_memory
+    from ..solve.lattices import least_and_most
+    from ..solve.overview import case_rows
+    from . import json_output, run_command
+    from . import tables as summary
+
+    case = run_command.case_of(deck, settings)
+    if not as_json:
+        console = summary.console()
+        console.print(summary.pairs(case.title or deck.stem, case_rows(case)))
+    first = least_and_most(case)[0][-1] if case.accuracy else case  # the first that may be the result
+    require_memory(first, first.lattice)
+    target = run_command.target_of(case, deck)
+    if as_json:
+        return json_output.of_case(case, target)
+    console.print(visible(f"{deck} is ready to run"), soft_wrap=True)
+    return None
+
+
+@guarded
+def schema(
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; default: print it.")
+    ] = None,
+) -> None:
+    """Write the JSON schema of decks, with which editors complete keys and mark mistakes."""
+    from ..deck.schema import deck_schema
+
+    text = json.dumps(deck_schema(), indent=2, ensure_ascii=False) + "\n"
+    if output is None or str(output) == "-":
+        print(text, end="")
+        return
+    if output.is_file() and not output.read_bytes().lstrip().startswith(b"{"):
+        raise DeckError(f"{output} is there and no JSON, so it is not overwritten; choose another output")
+    output.write_text(text, encoding="utf-8")
+    say(f'written: {output}; first line of a deck that uses it: "#:schema {output}"')
+
+
+@guarded
+def new(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Which starter deck.", show_default=False)
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the starter decks.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; default: NAME.toml; - prints it."),
+    ] = None,
+) -> None:
+    """Write a commented deck to start from."""
+    from ..deck import starters
+
+    names = starters.names()
+    if listing or name is None:
+        print("\n".join(names))
+        if not listing:
+            raise DeckError("NAME is missing; expected one of the names above")
+        return
+    if name not in names:
+        from ..text import did_you_mean, listed
+
+        raise DeckError(f"NAME = {name}: expected {listed(names, 'or')}{did_you_mean(name, names)}")
+    if str(output) == "-":
+        print(starters.text(name), end="")
+        return
+    target = output or Path(f"{name}.toml")
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(starters.text(name))
+    except FileExistsError:
+        raise DeckError(f"{target} exists already; choose another name with --output") from None
+    say(f"written: {target}; now: hexcontact run {target}")

@@ -1,0 +1,58 @@
+"""Arguments and options that several commands have."""
+
+from __future__ import annotations
+
+import enum
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import DeckError
+
+DeckFile = Annotated[Path, typer.Argument(metavar="DECK", help="The deck, a TOML file.", show_default=False)]
+ResultFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="The result, a netCDF file.", show_default=False)
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Replace a key of the deck, as grid.spacing='0.05 mm'. Repeatable."
+    ),
+]
+Plot = Annotated[bool, typer.Option("--plot", help="Draw the result beside the output (.png).")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object for programs, errors too; docs/running.md.")
+]
+
+
+class LogLevel(enum.StrEnum):
+    """What a log holds."""
+
+    debug = "debug"
+    info = "info"
+    warning = "warning"
+    error = "error"
+
+
+LogFile = Annotated[
+    Path | None,
+    typer.Option("--log-file", metavar="LOG", help="Append a line for each load step, with time and work."),
+]
+Level = Annotated[
+    LogLevel | None,
+    typer.Option("--log-level", help="What the log holds; without LOG it goes to standard error."),
+]
+
+
+def setting(text: str) -> tuple[str, Any]:
+    """Split KEY=VALUE; a value that is not TOML is text, so that units need no quotes."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise DeckError(f"--set {text}: expected KEY=VALUE, such as load.1.normal_load='20 N'")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()

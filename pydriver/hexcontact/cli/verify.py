@@ -1,0 +1,327 @@
+"""Compare a few quick contacts with known solutions: ``hexcontact verify`` tests an installation.
+
+Decks, quantities, references, tolerances and sources stand in ``data/self_test.toml``. The long comparisons
+with published, analytic and converged solutions are a program of the repository: tests/validation.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.resources
+import math
+import sys
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import DeckError
+
+# display unit -> SI
+UNITS = {
+    "-": 1.0,
+    "s": 1.0,
+    "N": 1.0,
+    "m": 1.0,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "Pa": 1.0,
+    "MPa": 1e6,
+    "GPa": 1e9,
+    "rad": 1.0,
+    "deg": math.pi / 180.0,
+}
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known about a quantity, in SI; nan where there is no such value."""
+
+    published: float = math.nan
+    reference: float = math.nan
+    uncertainty: float = math.nan
+    analytic: float = math.nan
+
+
+@dataclass(frozen=True)
+class Row:
+    """One compared quantity, SI; nan where there is no such value, tolerance nan: reported, not judged."""
+
+    case: str
+    quantity: str
+    unit: str
+    computed: float
+    published: float = math.nan
+    reference: float = math.nan
+    analytic: float = math.nan
+    judge: str = "reference"
+    tolerance: float = math.nan
+    absolute: bool = False
+
+    @property
+    def difference(self) -> float:
+        """Difference from the judge, relative unless ``absolute``; nan without a judge."""
+        against = {"reference": self.reference, "analytic": self.analytic}[self.judge]
+        if self.absolute:
+            return self.computed - against
+        return math.nan if against == 0.0 else self.computed / against - 1.0
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the difference is within the tolerance; None if the row is not judged."""
+        if math.isnan(self.tolerance):
+            return None
+        return bool(abs(self.difference) <= self.tolerance)  # a nan fails
+
+
+@dataclass
+class Comparison:
+    """The rows of one check, and sentences that belong under its table."""
+
+    rows: list[Row] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def add(
+        self,
+        case: str,
+        quantity: str,
+        unit: str,
+        computed: float,
+        *,
+        row: Known | None = None,
+        analytic: float = math.nan,
+        judge: str = "",
+        relative: float = math.nan,
+        absolute: float = math.nan,
+    ) -> None:
+        """Add a row.
+
+        Parameters
+        ----------
+        case, quantity : str
+            What was computed.
+        unit : str
+            Unit to show it in, a key of `UNITS`.
+        computed : float
+            The value, SI.
+        row : Known, optional
+            What is known about it.
+        analytic : float
+            The analytic value, SI, instead of that of `row`.
+        judge : str
+            "reference" or "analytic": what the difference is taken from; by default the reference, if any.
+        relative, absolute : float
+            Bound on the difference, relative or in SI; without one the row is reported, not judged.
+        """
+        known = row or Known()
+        by_reference = judge == "reference" or (not judge and not math.isnan(known.reference))
+        self.rows.append(
+            Row(
+                case,
+                quantity,
+                unit,
+                computed,
+                published=known.published,
+                reference=known.reference,
+                analytic=known.analytic if math.isnan(analytic) else analytic,
+                judge="reference" if by_reference else "analytic",
+                tolerance=relative if math.isnan(absolute) else absolute,
+                absolute=not math.isnan(absolute),
+            )
+        )
+
+    @property
+    def passed(self) -> bool:
+        """Whether no row fails."""
+        return all(row.passed is not False for row in self.rows)
+
+
+@dataclass(frozen=True)
+class Check:
+    """A named check: what it shows, and how to make its comparison."""
+
+    name: str
+    title: str
+    text: str
+    run: Callable[[], Comparison]
+
+
+# ----------------------------------------------------------------------------------- what is printed
+
+HEADERS = (
+    "case",
+    "quantity",
+    "published",
+    "reference",
+    "analytic",
+    "computed",
+    "difference",
+    "tolerance",
+    "",
+)
+
+
+def cells_of(row: Row) -> list[str]:
+    """Return a row as texts in the order of `HEADERS`."""
+    factor = UNITS[row.unit]
+    unit = "" if row.unit == "-" else row.unit.replace("um", "µm")
+    known = [value for value in (row.computed, row.reference, row.analytic) if not math.isnan(value)]
+    power = any(0.0 < abs(value) < 1e-3 * factor for value in known)
+
+    def number(value: float) -> str:
+        if math.isnan(value):
+            return ""
+        digits = ".2g" if row.unit == "s" else ".6e" if power and value else ".7g"
+        return f"{value / factor:{digits}}"
+
+    def deviation(value: float, form: str) -> str:
+        if math.isnan(value):
+            return ""
+        return f"{value / factor:{form}} {unit}".rstrip() if row.absolute else f"{value:{form}}"
+
+    return [
+        row.case,
+        row.quantity + (f" ({unit})" if unit else ""),
+        *map(number, (row.published, row.reference, row.analytic, row.computed)),
+        deviation(row.difference, "+.1e"),
+        deviation(row.tolerance, ".0e"),
+        {True: "ok", False: "FAIL", None: ""}[row.passed],
+    ]
+
+
+def judge_column(row: Row) -> int:
+    """Return the position of the value that judges a row among its cells; -1 if it is not judged."""
+    return HEADERS.index(row.judge) if row.passed is not None else -1
+
+
+def show(check: Check, comparison: Comparison) -> None:
+    """Print a check as a table for terminals."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    screen = Console(highlight=False)
+    screen.width = max(screen.width, 150)  # a narrow terminal wraps lines, it does not lose digits
+    shown = Table(
+        title=Text(check.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    for position, header in enumerate(HEADERS):
+        shown.add_column(header, justify="right" if 2 <= position < 8 else "left", no_wrap=True)
+    style = {True: "green", False: "bold red", None: ""}
+    before = ""
+    for row in comparison.rows:
+        cells, judge = cells_of(row), judge_column(row)
+        first, before = cells[0] if cells[0] != before else "", cells[0]
+        texts = [
+            Text(cell, style="bold" if at == judge else "") for at, cell in enumerate([first, *cells[1:-1]])
+        ]
+        shown.add_row(*texts, Text(cells[-1], style=style[row.passed]))
+    screen.print(shown)
+    for note in comparison.notes:
+        screen.print(note, soft_wrap=True)
+    judged = [row.passed for row in comparison.rows if row.passed is not None]
+    screen.print(f"{check.name}: {sum(judged)} of {len(judged)} comparisons passed\n", soft_wrap=True)
+
+
+def main(
+    names: Sequence[str] = (),
+    *,
+    checks: Mapping[str, Check] | None = None,
+    output: Callable[[Check, Comparison], None] = show,
+    listing: bool = False,
+) -> int:
+    """Run checks and print what they find.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the checks; all of them if empty.
+    checks : mapping of str to Check, optional
+        The checks to choose from; default: those of an installation.
+    output : callable
+        Prints a check with its comparison.
+    listing : bool
+        Only list the checks.
+
+    Returns
+    -------
+    int
+        Exit code: 0 if everything passed, 1 otherwise.
+
+    Raises
+    ------
+    DeckError
+        If there is no check of some name.
+    """
+    chosen = _chosen(names, checks)
+    if listing:
+        width = max(len(check.name) for check in chosen)
+        for check in chosen:
+            print(f"{check.name:<{width}}  {check.title}")
+        return 0
+    failed = []
+    for check in chosen:
+        comparison = check.run()
+        output(check, comparison)
+        if not comparison.passed:
+            failed.append(check.name)
+    if failed:
+        print(f"hexcontact: verify failed: {', '.join(failed)}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def _chosen(names: Sequence[str], checks: Mapping[str, Check] | None = None) -> list[Check]:
+    """Return the checks of these names, all if there are none."""
+    known = self_test() if checks is None else checks
+    if unknown := [name for name in names if name not in known]:
+        raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(known)}")
+    return [known[name] for name in names] if names else list(known.values())
+
+
+def for_programs(names: Sequence[str] = (), *, listing: bool = False) -> dict[str, Any]:
+    """Run checks and return what they find, with the exit code; arguments and errors as `main`."""
+    from .json_output import of_comparison
+
+    chosen = _chosen(names)
+    if listing:
+        return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
+    found = [of_comparison(check, check.run()) for check in chosen]
+    passed = all(check["passed"] for check in found)
+    return {"exit_code": int(not passed), "passed": passed, "checks": found}
+
+
+# ------------------------------------------------------------------------------- the self-test
+
+
+@functools.cache
+def self_test() -> dict[str, Check]:
+    """Return the checks of an installation by name, from data/self_test.toml."""
+    text = importlib.resources.files("hexcontact").joinpath("data/self_test.toml").read_text(encoding="utf-8")
+    return {
+        entry["name"]: Check(entry["name"], entry["title"], "", functools.partial(_solve, entry))
+        for entry in tomllib.loads(text)["check"]
+    }
+
+
+def _solve(entry: Mapping[str, Any]) -> Comparison:
+    """Run a deck and compare the history of its result with the values beside it."""
+    from ..case import Case
+
+    history = Case.from_text(entry["deck"]).run().dataset
+    found = Comparison()
+    for value in entry["values"]:
+        step = history.isel(step=value["step"] - 1)
+        computed = float(step[value["quantity"]])
+        if over := value.get("over"):
+            computed /= float(step[over])
+        found.add(
+            f"step {value['step']}",
+            f"{value['quantity']}/{over}" if over else value["quantity"],
+            value.get("unit", "-"),
+            computed,
+            row=Known(**{value["source"]: value["value"]}),
+            relative=value["relative"],
+        )
+    found.notes.append(entry["note"])
+    return found

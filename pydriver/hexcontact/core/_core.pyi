@@ -1,0 +1,6 @@
+from typing import Any
+
+hc_f2py_normal: Any
+hc_f2py_friction: Any
+hc_f2py_influence: Any
+hc_f2py_cache: Any

@@ -1,0 +1,264 @@
+"""Spectra of influence kernels, kept for the problems to come: in memory, and in a folder if wanted.
+
+Setting a problem up means working its influence kernels out and transforming them. The spectra depend on the
+number of rows and columns alone and, with friction, on the ratios ``beta`` and ``gamma`` of the materials;
+not on spacing, moduli, shapes, loads or the coefficient of friction. So problems alike share them. Answers
+are the same to the bit, whether spectra were made or found.
+
+Four environment variables say what is kept; `configure` does the same from Python.
+
+- ``HEXCONTACT_KERNEL_MEMORY``: bytes in memory at most, such as ``1 GB``; 256 MB if not set, 0 for none.
+- ``HEXCONTACT_KERNEL_FOLDER``: a folder for spectra that other processes may use; none if not set.
+- ``HEXCONTACT_KERNEL_FOLDER_SIZE``: bytes in it at most; 2 GB if not set.
+- ``HEXCONTACT_KERNEL_FOLDER_SHARED``: ``yes`` to take a folder, and files in it, that other users may have
+  written. Otherwise a folder of somebody else, or one that others may write to, is not used.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import json
+import logging
+import os
+import platform
+import re
+import time
+import uuid
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..errors import DeckError, KernelFolderWarning
+from . import _core
+
+_cache: Any = _core.hc_f2py_cache
+
+MEMORY, FOLDER, FOLDER_SIZE, SHARED = (
+    f"HEXCONTACT_KERNEL_{word}" for word in ("MEMORY", "FOLDER", "FOLDER_SIZE", "FOLDER_SHARED")
+)
+_DEFAULTS = {MEMORY: "256 MB", FOLDER_SIZE: "2 GB"}
+_UNITS = {"": 1, "B": 1} | {
+    f"{prefix}{unit}": base**power
+    for power, prefix in enumerate(("k", "M", "G", "T"), start=1)
+    for unit, base in (("B", 1000), ("iB", 1024))
+}
+_FILE = re.compile(r"[a-z-]+-\d+x\d+-[0-9A-F]{16}\.kernels(\.[0-9a-f]+-\d+\.part)?")
+_DAY = 86400.0
+_LOGGER = logging.getLogger("hexcontact")
+_NOT_OURS = f"other users may write to it (chmod go-w, or {SHARED}=yes if all of them are trusted)"
+
+
+class Statistics(NamedTuple):
+    """What the cache of this process holds and has done.
+
+    Attributes
+    ----------
+    memory : int
+        Bytes of the spectra in memory that are kept; those that a problem uses at the moment count, too.
+    found, read, made : int
+        Spectra that were found in memory, read from the folder, and made.
+    """
+
+    memory: int
+    found: int
+    read: int
+    made: int
+
+
+class _Settings:
+    """What this process was told; the environment speaks first."""
+
+    bound: int | None = None  # bytes in memory; None: nothing was said yet
+    folder: Path | None = None
+    folder_size = 0
+    shared = False  # the folder, with other users
+    process = 0  # that the folder was opened by: a fork needs names of its own
+
+
+_settings = _Settings()
+
+
+def configure(
+    *,
+    memory: int | float | str | None = None,
+    folder: str | os.PathLike[str] | bool | None = None,
+    folder_size: int | float | str | None = None,
+    folder_shared: bool | None = None,
+) -> None:
+    """Say what this process keeps; what is not given stays as it is.
+
+    Processes that are started from here, as those of a study, go by the environment.
+
+    Parameters
+    ----------
+    memory : number or str, optional
+        Bytes of spectra in memory at most, such as ``"1 GB"``; 0: none. The least recently used go first.
+    folder : path or False, optional
+        Folder for spectra that other processes may use; it is made if it is not there. False: none.
+    folder_size : number or str, optional
+        Bytes in the folder at most. When a process begins with more, the oldest go.
+    folder_shared : bool, optional
+        Take a folder, and files in it, that other users may have written.
+
+    Raises
+    ------
+    DeckError
+        If a number of bytes is none.
+
+    Warns
+    -----
+    KernelFolderWarning
+        If the folder cannot be used; spectra are kept in memory alone then.
+
+    Examples
+    --------
+    >>> from hexcontact import kernel_cache
+    >>> kernel_cache.configure(memory="1 GB")
+    """
+    bound = None if memory is None else _bytes(memory, "memory")
+    size = None if folder_size is None else _bytes(folder_size, "folder_size")
+    ready()
+    if bound is not None:
+        _settings.bound = bound
+        _cache.limit_kernels(bound)
+    if size is not None:
+        _settings.folder_size = size
+    if folder is not None and not isinstance(folder, bool):
+        _settings.folder = Path(folder).expanduser().absolute()
+    elif folder is not None:
+        _settings.folder = None
+    if folder_shared is not None:
+        _settings.shared = folder_shared
+    if (folder, size, folder_shared) != (None, None, None):
+        _open_folder()
+
+
+def clear() -> None:
+    """Drop the spectra that are kept in memory; those that a problem uses stay until it is gone."""
+    ready()
+    _cache.limit_kernels(0)
+    _cache.limit_kernels(_settings.bound)
+
+
+def statistics() -> Statistics:
+    """Return what the cache of this process holds and has done.
+
+    Examples
+    --------
+    >>> from hexcontact import kernel_cache
+    >>> kernel_cache.statistics().memory <= 256e6
+    True
+    """
+    return Statistics(*(int(n) for n in _cache.kernel_statistics()))
+
+
+def leave(spare: int) -> None:
+    """Let the cache grow by so many bytes at most, or shrink, until this is said again; its bound stays."""
+    ready()
+    _cache.limit_kernels(max(0, min(_settings.bound or 0, statistics().memory + spare)))
+
+
+def ready() -> None:
+    """Take the settings from the environment, once; give a forked process names of its own."""
+    if _settings.bound is None:
+        given = {name: os.environ.get(name, "").strip() for name in (MEMORY, FOLDER, FOLDER_SIZE, SHARED)}
+        memory, size = (_bytes(given[name] or _DEFAULTS[name], name) for name in (MEMORY, FOLDER_SIZE))
+        _settings.bound, _settings.folder_size = memory, size
+        _settings.shared = _yes(given[SHARED], SHARED)
+        _cache.limit_kernels(memory)
+        if given[FOLDER]:
+            _settings.folder = Path(given[FOLDER]).expanduser().absolute()
+            _open_folder()
+    elif _settings.folder is not None and _settings.process != os.getpid():
+        _open_folder()
+
+
+def told() -> None:
+    """Warn of what was wrong with the folder since this was last called."""
+    if _settings.folder is None:
+        return
+    for line in _cache.kernel_complaint().decode(errors="replace").strip().splitlines():
+        _warn(line)
+
+
+def _warn(message: str) -> None:
+    _LOGGER.warning("kernels warning=%s", json.dumps(message, ensure_ascii=False))
+    warnings.warn(message, KernelFolderWarning, stacklevel=4)
+
+
+def _bytes(value: float | str, name: str) -> int:
+    """Return a number of bytes."""
+    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE]\d+)?)\s*(\w*)\s*", str(value))
+    factor = _UNITS.get(match[2]) if match else None
+    if match is None or factor is None or float(match[1]) * factor >= 2**62:
+        raise DeckError(f"{name} = {value!r}: expected a number of bytes such as 512 MB")
+    return int(float(match[1]) * factor)
+
+
+def _yes(text: str, name: str) -> bool:
+    """Return whether an environment variable says yes."""
+    if text.lower() not in ("", "no", "yes"):
+        raise DeckError(f"{name} = {text!r}: expected yes or no")
+    return text.lower() == "yes"
+
+
+# --- the folder ---------------------------------------------------------------------------------------------
+
+
+def _open_folder() -> None:
+    """Tell the core of the folder, with what room is left in it."""
+    _settings.process = os.getpid()
+    folder, room = _settings.folder, 0
+    if folder is not None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o777 if _settings.shared else 0o755)
+            state = folder.stat()
+            if not _settings.shared and (state.st_uid not in (0, os.geteuid()) or state.st_mode & 0o022):
+                raise PermissionError(errno.EPERM, _NOT_OURS, str(folder))
+            room = max(0, _settings.folder_size - _pruned(folder, _settings.folder_size))
+        except OSError as error:
+            _settings.folder = folder = None
+            _warn(f"no kernels are kept in {error.filename}: {error.strerror}")
+    # the core takes blanks at the end for none
+    name = b"" if folder is None else os.fsencode(folder) + b"/"
+    _cache.use_kernel_folder(name, _maker(), uuid.uuid4().hex[:12], room, _settings.shared)
+
+
+def _pruned(folder: Path, bound: int) -> int:
+    """Remove the oldest spectra of a folder until three quarters of the bound are left; return the bytes."""
+    files = []
+    for path in filter(lambda path: _FILE.fullmatch(path.name), folder.iterdir()):
+        with contextlib.suppress(OSError):  # another process has renamed or removed it
+            state = path.stat()
+            if path.suffix == ".part" and time.time() - state.st_mtime > _DAY:
+                path.unlink()  # of a process that was killed
+            else:
+                files.append((state.st_mtime, state.st_size, path))
+    total = sum(size for _, size, _ in files)
+    if total > bound:
+        for _, size, path in sorted(files):
+            if total <= 0.75 * bound:
+                break
+            with contextlib.suppress(OSError):
+                path.unlink()
+                total -= size
+    return total
+
+
+def _maker() -> str:
+    """Say what the bits of a spectrum depend on: the program, the processor, libraries for mathematics."""
+    from .._version import __version__
+
+    core = Path(str(_core.__file__)).stat()
+    parts = [__version__, f"core {core.st_size} {core.st_mtime_ns}", platform.machine()]
+    with contextlib.suppress(OSError):
+        processor = re.findall(
+            r"^(?:model name|flags|Features)\s*:.*$", Path("/proc/cpuinfo").read_text(), re.M
+        )
+        parts += sorted(set(processor))
+        # of the system, by these names; those that packages bring along have others
+        mapped = re.findall(r"/\S*/lib(?:m|fftw3f?|gfortran)\.so\S*", Path("/proc/self/maps").read_text())
+        parts += [f"{path} {Path(path).stat().st_size}" for path in sorted(set(mapped))]
+    return f"hexcontact {__version__} {hashlib.sha256(os.fsencode('; '.join(parts))).hexdigest()}"

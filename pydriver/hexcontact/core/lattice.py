@@ -1,0 +1,166 @@
+"""The lattice of nodes: positions, windows, and moving fields between windows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import integer, number, reals
+from ..errors import DeckError
+from . import _core
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A window of an equilateral lattice.
+
+    Node (row j, col i), with absolute integer indices, lies at ``origin + i*basis[0] + j*basis[1]``;
+    fields over the window are arrays of shape ``(n_row, n_col)``.
+
+    Parameters
+    ----------
+    spacing
+        Distance of neighboring nodes [m].
+    row_first, col_first
+        Smallest row and column index.
+    n_row, n_col
+        Number of rows and columns.
+    origin
+        Position of node (0, 0) [m].
+    """
+
+    spacing: float
+    row_first: int
+    col_first: int
+    n_row: int
+    n_col: int
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        kind = "a positive length in meters"
+        if not 0 < number(self.spacing, "spacing", kind) < np.inf:
+            raise DeckError(f"spacing = {self.spacing!r}: expected {kind}")
+        for name in ("row_first", "col_first", "n_row", "n_col"):
+            integer(getattr(self, name), name)
+        origin = reals(self.origin, "origin")
+        if origin.shape != (2,) or not np.isfinite(origin).all():
+            raise DeckError(f"origin = {self.origin!r}: expected two finite lengths in meters")
+        if self.n_row < 1 or self.n_col < 1:
+            raise DeckError(
+                f"window = [{self.n_row}, {self.n_col}]: expected at least one row and one column"
+            )
+
+    @classmethod
+    def covering(
+        cls,
+        spacing: float,
+        center: tuple[float, float],
+        length_x: float,
+        length_y: float,
+        origin: tuple[float, float] = (0.0, 0.0),
+    ) -> Lattice:
+        """Return the smallest window whose rhombus covers a rectangle.
+
+        Parameters
+        ----------
+        spacing
+            Distance of neighboring nodes [m].
+        center
+            Center of the rectangle [m].
+        length_x, length_y
+            Full sides of the rectangle [m].
+        origin
+            Position of node (0, 0) [m].
+        """
+        unit = cls(spacing, 0, 0, 1, 1, origin)
+        half = 0.5 * np.array([length_x, length_y])
+        corners = (
+            np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)]) * half + np.asarray(center) - origin
+        )
+        indices = corners @ np.linalg.inv(unit.basis)
+        # a rectangle that ends on a row or column keeps it, whatever the rounding
+        first = np.floor(indices.min(axis=0) + 1e-9).astype(int)
+        last = np.ceil(indices.max(axis=0) - 1e-9).astype(int)
+        n_col, n_row = (last - first + 1).tolist()
+        col_first, row_first = first.tolist()
+        return cls(spacing, row_first, col_first, n_row, n_col, origin)
+
+    @cached_property
+    def basis(self) -> NDArray[np.float64]:
+        """Basis vectors, one a row [m]."""
+        basis: NDArray[np.float64] = np.ascontiguousarray(_core.hc_f2py_normal.lattice_basis(self.spacing).T)
+        return basis
+
+    @property
+    def cell_area(self) -> float:
+        """Area of a lattice cell, the volume of a pyramid of height one [m^2]."""
+        (a, b), (c, d) = self.basis.tolist()
+        return float(a * d - b * c)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Shape of a field over the window."""
+        return (self.n_row, self.n_col)
+
+    @property
+    def size(self) -> int:
+        """Number of nodes."""
+        return self.n_row * self.n_col
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Absolute row indices."""
+        return np.arange(self.row_first, self.row_first + self.n_row)
+
+    @property
+    def cols(self) -> NDArray[np.int64]:
+        """Absolute column indices."""
+        return np.arange(self.col_first, self.col_first + self.n_col)
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Coordinate of each node along x [m]."""
+        return self._coordinate(0)
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Coordinate of each node along y [m]."""
+        return self._coordinate(1)
+
+    def _coordinate(self, axis: int) -> NDArray[np.float64]:
+        along = self.cols * self.basis[0, axis]
+        across = self.rows * self.basis[1, axis]
+        return self.origin[axis] + across[:, None] + along[None, :]
+
+    def grown(self, bottom: int = 0, top: int = 0, left: int = 0, right: int = 0) -> Lattice:
+        """Return the window with more rows (bottom, top) and columns (left, right)."""
+        return replace(
+            self,
+            row_first=self.row_first - bottom,
+            col_first=self.col_first - left,
+            n_row=self.n_row + bottom + top,
+            n_col=self.n_col + left + right,
+        )
+
+    def embed(self, field: NDArray[np.generic], other: Lattice, fill: float = 0.0) -> NDArray[np.generic]:
+        """Return a field of this window on another one of the same lattice.
+
+        Parameters
+        ----------
+        field
+            Values over this window, shape ``(n_row, n_col)``.
+        other
+            The other window.
+        fill
+            Value at the nodes that this window does not have.
+        """
+        result = np.full(other.shape, fill, dtype=field.dtype)
+        row, col = self.row_first - other.row_first, self.col_first - other.col_first
+        top, left = max(row, 0), max(col, 0)
+        bottom, right = min(row + self.n_row, other.n_row), min(col + self.n_col, other.n_col)
+        if bottom > top and right > left:
+            result[top:bottom, left:right] = field[top - row : bottom - row, left - col : right - col]
+        return result

@@ -1,0 +1,409 @@
+"""Load histories as time series: the table `series` of a [[load]], and reading it from CSV or netCDF files.
+
+Each row of a file is a load step reached. A case keeps the numbers and not the name of the file, so that its
+result can be run again when the file has gone or changed.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+from pydantic_core import PydanticCustomError
+
+from ..errors import DeckError
+from ..files import require_ordinary, text_of
+from ..text import did_you_mean, listed, shown
+from .kinds import Kind, Quantity, Several, Table, Text, refuse
+from .units import ANGLE, FORCE, LENGTH, TORQUE
+
+LOADS = {
+    "z": ("normal_load", "approach"),
+    "x": ("tangential_load_x", "shift_x"),
+    "y": ("tangential_load_y", "shift_y"),
+    "twist": ("torque", "twist"),
+}
+"""The two keys that drive each rigid motion: by force, by displacement."""
+
+QUANTITIES: dict[str, Quantity] = {
+    "normal_load": Quantity(FORCE, at_least=0),
+    "tangential_load_x": Quantity(FORCE),
+    "tangential_load_y": Quantity(FORCE),
+    "torque": Quantity(TORQUE),
+    "approach": Quantity(LENGTH),
+    "shift_x": Quantity(LENGTH),
+    "shift_y": Quantity(LENGTH),
+    "twist": Quantity(ANGLE),
+}
+"""What each load or motion is."""
+
+_PASSED_OVER = ("time", "step")  # columns of files that need not be deck keys
+_MOST_COMPLAINTS = 10
+_LONGEST_LABEL = 1000  # characters
+_EXPECTED = "a CSV or netCDF file of loads"
+
+MOST_STEPS = 100_000
+"""Load steps of a history, and rows of a series."""
+
+
+# --- the table ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class OrEmpty(Kind):
+    """A value, or "" where a row does not name it."""
+
+    kind: Kind
+
+    def _expected(self) -> str:
+        return self.kind.expected
+
+    def _parse(self, value: object) -> Any:
+        return None if value is None or value == "" else self.kind.parse(value)
+
+
+def _rows_of(kind: Quantity, example: str) -> Several:
+    return Several(OrEmpty(kind), f"values, each {kind.expected} or empty text", example)
+
+
+_Header = Annotated[str, Text()]
+_FORCES, _LENGTHS = '["1 N", "2 N"]', '["1 um", "2 um"]'
+_Forces = Annotated[tuple[float | None, ...], _rows_of(Quantity(FORCE), _FORCES)]
+_Lengths = Annotated[tuple[float | None, ...], _rows_of(Quantity(LENGTH), _LENGTHS)]
+
+
+class Columns(Table):
+    """Which column of a file holds what."""
+
+    normal_load: _Header | None = Field(
+        None, description="header of the column of normal loads", examples=['"P [N]"']
+    )
+    tangential_load_x: _Header | None = Field(
+        None, description="header of the column of tangential_load_x", examples=['"Qx [N]"']
+    )
+    tangential_load_y: _Header | None = Field(
+        None, description="header of the column of tangential_load_y", examples=['"Qy [N]"']
+    )
+    torque: _Header | None = Field(
+        None, description="header of the column of torques", examples=['"M [N mm]"']
+    )
+    approach: _Header | None = Field(
+        None, description="header of the column of approaches", examples=['"depth [um]"']
+    )
+    shift_x: _Header | None = Field(
+        None, description="header of the column of shift_x", examples=['"ux [um]"']
+    )
+    shift_y: _Header | None = Field(
+        None, description="header of the column of shift_y", examples=['"uy [um]"']
+    )
+    twist: _Header | None = Field(
+        None, description="header of the column of twists", examples=['"angle [deg]"']
+    )
+    label: _Header | None = Field(None, description="header of the column of labels", examples=['"phase"'])
+
+
+class Series(Table):
+    """A series of loads and motions, row by row: in a file, or as arrays."""
+
+    file: Annotated[str, Text()] | None = Field(
+        None,
+        description="CSV or netCDF (`.nc`) file of the rows, relative to the deck",
+        examples=['"history.csv"'],
+    )
+    columns: Columns | None = Field(
+        None,
+        description="header of the column for each key, where it is not the key itself",
+        examples=['{ normal_load = "P [N]" }'],
+    )
+    normal_load: Annotated[tuple[float | None, ...], _rows_of(QUANTITIES["normal_load"], _FORCES)] | None = (
+        Field(None, description="normal load of each row, instead of a file; so are the other arrays")
+    )
+    tangential_load_x: _Forces | None = Field(None, description="tangential load along x of each row")
+    tangential_load_y: _Forces | None = Field(None, description="tangential load along y of each row")
+    torque: Annotated[tuple[float | None, ...], _rows_of(Quantity(TORQUE), '["1 N mm", "2 N mm"]')] | None = (
+        Field(None, description="torque of each row")
+    )
+    approach: _Lengths | None = Field(None, description="approach of each row")
+    shift_x: _Lengths | None = Field(None, description="shift along x of each row")
+    shift_y: _Lengths | None = Field(None, description="shift along y of each row")
+    twist: Annotated[tuple[float | None, ...], _rows_of(Quantity(ANGLE), '["0 deg", "1 deg"]')] | None = (
+        Field(None, description="twist of each row")
+    )
+    label: Annotated[tuple[str, ...], Several(Text(), "texts", '["up", "down"]')] | None = Field(
+        None, description="label of each row; rows in turn with the same are one segment of the result"
+    )
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Arrays are of one length, no row drives a motion twice, and a file stands alone."""
+        data = {key: value for key, value in data.items() if value is not None}  # None comes from Python
+        arrays = {key: data[key] for key in (*QUANTITIES, "label") if isinstance(data.get(key), list | tuple)}
+        if "file" in data:
+            for key in (*QUANTITIES, "label"):
+                if key in data:
+                    yield key, "expected in the file, not beside it"
+            return
+        if "columns" in data:
+            yield "columns", "needs a file"
+        if not any(key in data for key in QUANTITIES):
+            yield "", "expected a file, or arrays such as normal_load = [10, 20, 30]"
+        for key, array in arrays.items():
+            if len(array) != (count := len(next(iter(arrays.values())))):
+                yield key, f"expected {count} entries, as many as {next(iter(arrays))} has, not {len(array)}"
+                return
+        for row, force, displacement in driven_twice(arrays):
+            yield displacement, f"expected {force} or {displacement} in each row, not both (entry {row + 1})"
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(next(filled for key in QUANTITIES if (filled := getattr(self, key)) is not None))
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield what each row names, in SI, and its label."""
+        named = {key: array for key in (*QUANTITIES, "label") if (array := getattr(self, key)) is not None}
+        for row in zip(*named.values(), strict=True):
+            yield {key: value for key, value in zip(named, row, strict=True) if value is not None}
+
+
+def driven_twice(arrays: Mapping[str, Any]) -> Iterator[tuple[int, str, str]]:
+    """Yield the first row in which force and displacement of a motion are both given, for each motion."""
+    for force, displacement in LOADS.values():
+        both = zip(arrays.get(force, ()), arrays.get(displacement, ()), strict=False)
+        for row, (one, other) in enumerate(both):
+            if one not in ("", None) and other not in ("", None):
+                yield row, force, displacement
+                break
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column of a file: its header, its unit if the header says one, and where the rows stand."""
+
+    header: str
+    unit: str
+    cells: list[Any]
+
+
+_UNIT_IN_HEADER = re.compile(r"\s*(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))?\s*")
+
+
+def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
+    """Read a series of loads from a file.
+
+    Parameters
+    ----------
+    path : Path
+        A netCDF file if its name ends in ``.nc`` (variables of one dimension, with the attribute ``units``),
+        else text: a line of headers, then rows, separated by commas, semicolons or tabs.
+    columns : mapping of str to str, optional
+        Header of the column for each key. All other columns are passed over then; without it every header
+        has to be a key of [[load]], except for ``time`` and ``step``.
+
+    Returns
+    -------
+    dict of str to list
+        The rows by key: floats in SI (twists as text with their unit), "" where a row is silent; labels.
+
+    Raises
+    ------
+    DeckError
+        With a sentence for each thing that is wrong; they name file, line and column.
+    """
+    netcdf = path.suffix in (".nc", ".nc4", ".cdf")
+    found, lines = (_netcdf_columns if netcdf else _text_columns)(path)
+    chosen = _chosen(path, found, columns)
+    where = "entry" if netcdf else "line"
+    series: dict[str, list[Any]] = {}
+    problems: list[str] = []
+    for key, column in chosen.items():
+        series[key] = []
+        if key != "label" and column.unit and (fault := _unit_fault(key, column.unit)):
+            problems.append(f"{path}, column {shown(column.header)}: {fault}")
+            continue
+        for line, cell in zip(lines, column.cells, strict=True):
+            try:
+                series[key].append(str(cell) if key == "label" else _value(key, cell, column.unit))
+            except PydanticCustomError as error:
+                series[key].append("")
+                place = f"{path}, {where} {line}, column {shown(column.header)}"
+                problems.append(f"{place} = {shown(cell)}: {error.message()}")
+    for row, force, displacement in driven_twice(series):
+        place = f"{path}, {where} {lines[row]}"
+        problems.append(f"{place}: expected {force} or {displacement}, not both; choose one with columns")
+    if problems:
+        more = len(problems) - _MOST_COMPLAINTS
+        raise DeckError("\n".join(problems[:_MOST_COMPLAINTS] + [f"{path}: and {more} more"] * (more > 0)))
+    return series
+
+
+def _unit_fault(key: str, unit: str) -> str:
+    """Return what is wrong with the unit of a column, once instead of in each row."""
+    try:
+        QUANTITIES[key].parse(f"1 {unit}")
+    except PydanticCustomError as error:
+        return error.message()
+    return ""
+
+
+def _value(key: str, cell: Any, unit: str) -> Any:
+    if cell == "":
+        return ""
+    kind = QUANTITIES[key]
+    if isinstance(cell, str):
+        if re.fullmatch(r"[+-]?[\d.]+,\d+", cell):
+            refuse("expected a decimal point, not a comma")
+        number = _number(cell)
+        if number is None and unit and _number(cell.split()[0] if cell.split() else "") is not None:
+            refuse(f"expected a number without a unit, since the header says [{unit}]")
+        quantity: Any = cell if number is None else (f"{cell} {unit}" if unit else number)
+    else:
+        quantity = f"{cell!r} {unit}" if unit else cell
+    value = kind.parse(quantity)
+    return f"{value!r} rad" if kind.dimension is ANGLE else value
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None) -> dict[str, _Column]:
+    """Return the column of each key."""
+    keys, problems = (*QUANTITIES, "label"), []
+    chosen: dict[str, _Column] = {}
+    headers = [column.header for column in found]
+    for twin in dict.fromkeys(header for header in headers if headers.count(header) > 1 and header):
+        problems.append(f"{path}: expected each column once; {shown(twin)} is there more than once")
+    if columns is None:
+        for column in found:
+            if column.header in keys:
+                chosen[column.header] = column
+            elif column.header not in _PASSED_OVER:
+                hint = did_you_mean(column.header, keys) or (
+                    f"; known are {listed(keys, 'and')}; to leave columns out, name the others with columns"
+                )
+                problems.append(f"{path}: unknown column {shown(column.header)}{hint}")
+    else:
+        for key, header in columns.items():
+            match = _UNIT_IN_HEADER.fullmatch(str(header))
+            name, unit = _split(match) if match else (str(header), "")
+            if name not in headers:
+                there = [*map(shown, headers[:_MOST_COMPLAINTS])] + ["others"] * (
+                    len(headers) > _MOST_COMPLAINTS
+                )
+                hint = did_you_mean(name, headers) or f"; there are {listed(there, 'and')}"
+                problems.append(f"{path}: has no column {shown(name)} for {key}{hint}")
+                continue
+            column = found[headers.index(name)]
+            if unit and column.unit and unit != column.unit:
+                problems.append(
+                    f"{path}: column {shown(name)} is in {column.unit}, not in {unit} as columns says"
+                )
+            chosen[key] = _Column(column.header, unit or column.unit, column.cells)
+    if not problems and not any(key in QUANTITIES for key in chosen):
+        problems.append(f"{path}: expected a column of loads or motions, such as normal_load [N]")
+    if not problems and not found[0].cells:
+        problems.append(f"{path}: expected at least one row below the headers")
+    if problems:
+        raise DeckError("\n".join(problems))
+    return chosen
+
+
+def _split(match: re.Match[str]) -> tuple[str, str]:
+    return match["name"], (match["square"] or match["round"] or "").strip()
+
+
+def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
+    """Read a text file; empty lines and those that begin with # are passed over."""
+    lines = [
+        (number, line)
+        for number, line in enumerate(text_of(path, _EXPECTED).splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise DeckError(f"{path}: is empty; expected a line of headers such as normal_load [N], and rows")
+    _refuse_many(path, len(lines) - 1)
+    separator = next((mark for mark in ("\t", ";", ",") if mark in lines[0][1]), ",")
+    try:
+        rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
+    except csv.Error as error:
+        raise DeckError(f"{path}: cannot be read ({error}); expected {_EXPECTED}") from None
+    if len(
+        problems := [
+            f"{path}, line {number}: expected {len(rows[0])} cells, as many as headers, not {len(row)}"
+            for (number, _), row in zip(lines, rows, strict=True)
+            if len(row) != len(rows[0])
+        ]
+    ):
+        raise DeckError("\n".join(problems[:_MOST_COMPLAINTS]))
+    columns = []
+    for place, header in enumerate(rows[0]):
+        match = _UNIT_IN_HEADER.fullmatch(header)
+        name, unit = _split(match) if match else (header, "")
+        columns.append(_Column(name, unit, [row[place] for row in rows[1:]]))
+    return columns, [number for number, _ in lines[1:]]
+
+
+def _refuse_many(path: Path, rows: int) -> None:
+    if rows > MOST_STEPS:
+        raise DeckError(f"{path}: expected at most {MOST_STEPS} rows, not {rows}")
+
+
+def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
+    """Read the variables of one dimension, that of the first load or motion."""
+    import netCDF4
+    import numpy as np
+
+    if not path.exists():
+        raise DeckError(f"{path}: no such file; expected {_EXPECTED}")
+    require_ordinary(path, _EXPECTED)
+    try:
+        with netCDF4.Dataset(path) as file:
+            lengths = {
+                name: variable.shape[0]
+                for name, variable in file.variables.items()
+                if name not in file.dimensions
+                and ((variable.ndim == 1 and _is_readable(variable.dtype)) or _is_text(variable))
+            }
+            longest = max(lengths.values(), default=0)
+            count = next((lengths[key] for key in QUANTITIES if key in lengths), longest)
+            _refuse_many(path, count)
+            columns = []
+            for name in (name for name, length in lengths.items() if length == count):
+                variable = file.variables[name]
+                values = variable[:]
+                if _is_text(variable) and values.dtype == "S1":
+                    values = netCDF4.chartostring(np.ma.filled(values, b""))
+                if _is_text(variable) or variable.dtype is str:
+                    cells = [str(value) for value in values]
+                else:
+                    numbers = np.ma.filled(values.astype(float), np.nan)
+                    cells = ["" if np.isnan(number) else number for number in numbers.tolist()]
+                unit = str(getattr(variable, "units", "")).strip()
+                columns.append(_Column(name, "" if unit == "1" else unit, cells))
+    except DeckError:
+        raise
+    except Exception as error:  # damage takes any form
+        raise DeckError(f"{path}: cannot be read as netCDF ({error})") from None
+    return columns, list(range(1, count + 1))
+
+
+def _is_readable(dtype: Any) -> bool:
+    """Tell whether a variable of this type holds numbers or text."""
+    return dtype is str or getattr(dtype, "kind", "") in tuple("iuf")
+
+
+def _is_text(variable: Any) -> bool:
+    """Tell whether a variable holds texts as characters."""
+    return bool(variable.dtype == "S1" and variable.ndim == 2 and variable.shape[1] <= _LONGEST_LABEL)

@@ -1,0 +1,413 @@
+"""Surface shapes and the initial gap between two of them.
+
+A shape gives its height over the plane z = 0, measured away from the other body: zero where the shape alone
+would touch a flat first, and infinite where it has no surface that could touch at all (outside a punch,
+beyond the rim of a true sphere). Body 2 is described in mirrored coordinates, so the heights of the two
+bodies simply add up to the gap.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
+
+from ..errors import DeckError
+from ..text import did_you_mean
+from .faults import MISSING, Source, deck_error
+from .kinds import Flag, Kind, Quantity, Several, Table, Word, problems_of, refuse, refuse_key
+from .units import ANGLE, LENGTH, NUMBER, Dimension
+
+Array = NDArray[np.float64]
+PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
+LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
+Angle = Annotated[float, Quantity(ANGLE)]
+PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
+Point = Annotated[tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)]
+
+# A node that lies on the rim of a punch belongs to it, whatever the last bit of its coordinates.
+_RIM = 1.0 + 1e-12
+
+
+class Surface(Table):
+    """A surface shape; `offset` moves it in the plane.
+
+    Built from SI numbers or from text with units, ``Sphere(radius=1e-3)`` or ``Sphere(radius="1 mm")``; an
+    angle always needs its unit.
+
+    Raises
+    ------
+    DeckError
+        If a key is unknown, missing or out of range.
+    """
+
+    shape: str = ""
+    offset: Point = Field(default=(0.0, 0.0), description="moves the shape in x and y")
+
+    formula: ClassVar[str] = ""
+    """Height about the shape's own center, for the documentation."""
+
+    def __init__(self, /, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise deck_error(problems_of(error), Source()) from error
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the height (m) at points of the plane.
+
+        Parameters
+        ----------
+        x, y : array_like
+            Coordinates (m), of one shape.
+
+        Returns
+        -------
+        ndarray
+            Heights of the same shape: >= 0, and inf where nothing can touch.
+        """
+        return self._height(np.asarray(x, float) - self.offset[0], np.asarray(y, float) - self.offset[1])
+
+    def candidate(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+        """Tell where the shape has a surface that could touch (False outside a punch)."""
+        return np.isfinite(self.height(x, y))
+
+    @property
+    def curvature(self) -> Array | None:
+        """Curvature tensor (2, 2) in 1/m if the height is h = r . C r / 2 everywhere, else None."""
+        return None
+
+    @property
+    def reach(self) -> float:
+        """Distance (m) from the center beyond which nothing can touch; infinite for most shapes."""
+        return math.inf
+
+    def _height(self, x: Array, y: Array) -> Array:
+        raise NotImplementedError
+
+
+class Flat(Surface):
+    """A plane."""
+
+    shape: Literal["flat"] = "flat"
+    formula: ClassVar[str] = "h = 0"
+
+    @property
+    def curvature(self) -> Array:
+        """Zero."""
+        return np.zeros((2, 2))
+
+    def _height(self, x: Array, y: Array) -> Array:
+        return np.zeros(np.broadcast_shapes(x.shape, y.shape))
+
+
+class Sphere(Surface):
+    """A sphere, as the paraboloid that all of Hertz's theory is about, or as the true arc."""
+
+    shape: Literal["sphere"] = "sphere"
+    radius: PositiveLength = Field(description="radius R")
+    exact: Annotated[bool, Flag()] = Field(default=False, description="take the true arc, not the parabola")
+    formula: ClassVar[str] = "h = r²/(2R); exact: h = R − √(R² − r²) for r ≤ R"
+
+    @property
+    def curvature(self) -> Array | None:
+        """Identity / R; None for the true arc."""
+        return None if self.exact else np.eye(2) / self.radius
+
+    @property
+    def reach(self) -> float:
+        """The radius for the true arc, else infinite."""
+        return self.radius if self.exact else math.inf
+
+    def _height(self, x: Array, y: Array) -> Array:
+        square = x * x + y * y
+        if not self.exact:
+            return square / (2 * self.radius)
+        inside = square <= (self.radius * _RIM) ** 2
+        root = np.sqrt(np.maximum(self.radius**2 - square, 0.0))
+        return np.where(inside, square / (self.radius + root), np.inf)
+
+
+class Paraboloid(Surface):
+    """A surface with two principal radii of curvature."""
+
+    shape: Literal["paraboloid"] = "paraboloid"
+    radius_x: PositiveLength = Field(
+        description="radius of curvature R₁ along the first axis (x if angle is 0)"
+    )
+    radius_y: PositiveLength = Field(description="radius of curvature R₂ across it")
+    angle: Angle = Field(default=0.0, description="angle of the first axis, from x towards y")
+    formula: ClassVar[str] = "h = s²/(2R₁) + t²/(2R₂), s along and t across the first axis"
+
+    @property
+    def curvature(self) -> Array:
+        """Sum of the two rank-one tensors of the axes."""
+        first, across = _axes(self.angle)
+        return np.outer(first, first) / self.radius_x + np.outer(across, across) / self.radius_y
+
+    def _height(self, x: Array, y: Array) -> Array:
+        (a, b), _ = _axes(self.angle)
+        return (a * x + b * y) ** 2 / (2 * self.radius_x) + (a * y - b * x) ** 2 / (2 * self.radius_y)
+
+
+class Cylinder(Surface):
+    """A (parabolic) cylinder lying on its side."""
+
+    shape: Literal["cylinder"] = "cylinder"
+    radius: PositiveLength = Field(description="radius R")
+    angle: Angle = Field(default=0.0, description="angle of its axis, from x towards y")
+    formula: ClassVar[str] = "h = t²/(2R), t the distance from the axis"
+
+    @property
+    def curvature(self) -> Array:
+        """Rank-one tensor across the axis."""
+        _, across = _axes(self.angle)
+        return np.outer(across, across) / self.radius
+
+    def _height(self, x: Array, y: Array) -> Array:
+        _, (a, b) = _axes(self.angle)
+        return (a * x + b * y) ** 2 / (2 * self.radius)
+
+
+class Cone(Surface):
+    """A cone with its tip towards the other body."""
+
+    shape: Literal["cone"] = "cone"
+    slope: PositiveNumber = Field(description="slope m = tangent of the angle between cone and plane")
+    formula: ClassVar[str] = "h = m r"
+
+    def _height(self, x: Array, y: Array) -> Array:
+        return self.slope * np.hypot(x, y)
+
+
+def _coefficient_dimension(exponent: float) -> Dimension:
+    """Return the dimension of the coefficient of a power law, a length to the power 1 - n."""
+    power = f"{1.0 - exponent:g}"
+    if power == "0":
+        return NUMBER
+    return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
+
+
+@dataclass(frozen=True)
+class CoefficientKind(Kind):
+    """The coefficient of a power law, whose unit is known only when the exponent is."""
+
+    def _expected(self) -> str:
+        return 'a coefficient above 0 in m^(1-n) such as "0.1 mm^-1"'
+
+    def _parse(self, value: object) -> Any:
+        return value
+
+
+class Power(Surface):
+    """A body of revolution whose profile is a power of the radius."""
+
+    shape: Literal["power"] = "power"
+    exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = Field(description="exponent n")
+    coefficient: Annotated[float, CoefficientKind()] = Field(description="coefficient C")
+    formula: ClassVar[str] = "h = C rⁿ"
+
+    @field_validator("coefficient")
+    @classmethod
+    def _to_si(cls, value: object, info: ValidationInfo) -> float:
+        if "exponent" not in info.data:  # itself wrong, and reported
+            return 0.0
+        dimension = _coefficient_dimension(info.data["exponent"])
+        return Quantity(dimension, above=0, any_size=True).parse(value)
+
+    def _height(self, x: Array, y: Array) -> Array:
+        return self.coefficient * np.hypot(x, y) ** self.exponent
+
+
+class Punch(Surface):
+    """The flat end of a circular punch; nothing can touch outside it."""
+
+    shape: Literal["punch"] = "punch"
+    radius: PositiveLength = Field(description="radius a of the flat end")
+    formula: ClassVar[str] = "h = 0 for r ≤ a, nothing beyond"
+
+    @property
+    def reach(self) -> float:
+        """The radius."""
+        return self.radius
+
+    def _height(self, x: Array, y: Array) -> Array:
+        return np.where(np.hypot(x, y) <= self.radius * _RIM, 0.0, np.inf)
+
+
+class RoundedPunch(Surface):
+    """A flat punch whose edge is a parabolic fillet."""
+
+    shape: Literal["rounded_punch"] = "rounded_punch"
+    flat_radius: LengthFromZero = Field(description="radius b of the flat middle")
+    edge_radius: PositiveLength = Field(description="radius of curvature R of the rounded edge")
+    formula: ClassVar[str] = "h = (r − b)²/(2R) for r > b, else 0"
+
+    def _height(self, x: Array, y: Array) -> Array:
+        return np.maximum(np.hypot(x, y) - self.flat_radius, 0.0) ** 2 / (2 * self.edge_radius)
+
+
+def _axes(angle: float) -> tuple[Array, Array]:
+    """Return the unit vectors along and across an axis at `angle` from x."""
+    along = np.array([math.cos(angle), math.sin(angle)])
+    return along, np.array([-along[1], along[0]])
+
+
+SHAPES: dict[str, type[Surface]] = {
+    shape.model_fields["shape"].default: shape
+    for shape in (Flat, Sphere, Paraboloid, Cylinder, Cone, Power, Punch, RoundedPunch)
+}
+
+_REFUSED = {
+    "heights": "this version reads no height maps from files; "
+    "give the gap in Python, as an xarray.DataArray with coordinates x and y: hexcontact.Case(gap=...)",
+    "python": "the gap of this case was given in Python and is not in the deck; run the script it came from",
+}
+
+
+@dataclass(frozen=True)
+class SurfaceKind(Kind):
+    """A surface: one of the shapes as an inline table, or a `Surface` made in Python."""
+
+    def _expected(self) -> str:
+        return 'a table such as { shape = "sphere", radius = "1 mm" }'
+
+    def _parse(self, value: object) -> Surface:
+        if isinstance(value, Surface):
+            return value
+        if not isinstance(value, Mapping):
+            refuse(f"expected {self.expected}")
+        shape = value.get("shape")
+        words = Word(tuple(SHAPES))
+        if shape is None:
+            refuse_key("shape", MISSING, f"missing; expected {words.expected}")
+        if not isinstance(shape, str) or shape not in SHAPES:
+            known = f"expected {words.expected}{did_you_mean(shape, SHAPES)}"
+            refuse_key("shape", shape, _REFUSED.get(str(shape), known))
+        try:
+            return SHAPES[shape](**{str(key): entry for key, entry in value.items()})
+        except DeckError as error:
+            # pydantic merges the inner error, with its keys, into that of the deck around it.
+            raise (error.__cause__ or error) from None
+
+
+# --- two surfaces -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Separation:
+    """The initial gap between two surfaces: their heights added, less the height at first touch.
+
+    Attributes
+    ----------
+    surface_1, surface_2 : Surface
+        The surfaces of body 1 and of body 2 (mirrored).
+    """
+
+    surface_1: Surface
+    surface_2: Surface
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the gap (m) at points of the plane: >= 0 up to rounding, inf where nothing can touch."""
+        return self._sum(x, y) - self.first_touch[2]
+
+    @cached_property
+    def first_touch(self) -> tuple[float, float, float]:
+        """Point x, y (m) at which the bodies touch first, and the sum of their heights there (m).
+
+        It is found on the continuous plane, so it does not depend on any window or mesh. Where touching along
+        a line or over an area is possible, it is one of the points.
+
+        Raises
+        ------
+        DeckError
+            If the two surfaces nowhere face each other (two punches side by side).
+        """
+        one, two = self.surface_1, self.surface_2
+        if isinstance(one, Flat) or one.offset == two.offset:
+            return (*two.offset, 0.0)
+        if isinstance(two, Flat):
+            return (*one.offset, 0.0)
+        if one.curvature is not None and two.curvature is not None:
+            # Both quadratic: (C1 + C2) r = C1 o1 + C2 o2, singular if both are cylinders side by side. Solved
+            # about o1, so that far-away offsets cost no digits.
+            apart = np.subtract(two.offset, one.offset)
+            total = one.curvature + two.curvature
+            point = np.linalg.pinv(total, hermitian=True) @ two.curvature @ apart + one.offset
+            x, y = float(point[0]), float(point[1])
+        else:
+            x, y = self._search()
+        return x, y, float(self._sum(x, y))
+
+    def _sum(self, x: ArrayLike, y: ArrayLike) -> Array:
+        return self.surface_1.height(x, y) + self.surface_2.height(x, y)
+
+    def _search(self) -> tuple[float, float]:
+        """Minimize the sum of the heights where no formula does, from the best point between the centers."""
+        from scipy.optimize import minimize
+
+        first, second = np.array(self.surface_1.offset), np.array(self.surface_2.offset)
+        scale = float(np.hypot(*(second - first)))
+
+        def inside(point: Array) -> Array:
+            # Pulled to the nearest point that can touch: the minimum may lie on the rim of a punch, where a
+            # search over the bare height (infinite beyond) would stick.
+            for surface, center in ((self.surface_1, first), (self.surface_2, second)):
+                arm = point - center
+                point = center + arm * min(1.0, surface.reach / max(float(np.hypot(*arm)), 1e-300))
+            return point
+
+        def height(scaled: Array) -> float:
+            return float(self._sum(*inside(first + scale * scaled)))
+
+        along = (second - first) / scale
+        starts = [along * t for t in np.linspace(0.0, 1.0, 101)]
+        best = min(starts, key=height)
+        if not math.isfinite(height(best)):
+            raise DeckError(
+                "the two surfaces nowhere face each other, since their offsets put them side by side"
+            )
+        # A convex sum (all shapes but powers below 1) has no other minima for the simplex to fall into.
+        size = max(height(best), 1e-30)
+        found = minimize(
+            height,
+            best,
+            method="Nelder-Mead",
+            options={"xatol": 1e-9, "fatol": 1e-15 * size, "maxiter": 2000},
+        )
+        point = inside(first + scale * (found.x if found.fun < height(best) else best))
+        return float(point[0]), float(point[1])
+
+
+def principal_curvatures(curvature: ArrayLike) -> tuple[float, float, float]:
+    """Return the principal values of a curvature tensor and the direction of the smaller one.
+
+    For two bodies pass the sum of their tensors; with h = A s² + B t² about the first touch, A and B are half
+    the values returned, and the major axis of the contact ellipse lies along the direction (crossed
+    cylinders: the sum of two rank-one tensors, section 9.3 of the dissertation).
+
+    Parameters
+    ----------
+    curvature : array_like, (2, 2)
+        Symmetric tensor C of h = r . C r / 2, in 1/m.
+
+    Returns
+    -------
+    smaller, larger : float
+        Principal curvatures (1/m).
+    angle : float
+        Direction of the smaller one (rad) from x towards y, in (-pi/2, pi/2].
+    """
+    values, vectors = np.linalg.eigh(np.asarray(curvature, float))
+    angle = math.atan2(vectors[1, 0], vectors[0, 0])
+    if angle > math.pi / 2:
+        angle -= math.pi
+    elif angle <= -math.pi / 2:
+        angle += math.pi
+    return float(values[0]), float(values[1]), angle

@@ -1,0 +1,1 @@
+"""A contact problem in SI units, checked: bodies, gap, window, load steps."""

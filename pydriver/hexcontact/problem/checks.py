@@ -1,0 +1,110 @@
+"""What is wrong with a case as a whole, where no table of its deck can tell alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..deck.faults import MISSING, Mistake
+from ..deck.surfaces import Separation, principal_curvatures
+from ..deck.tables import Deck, Friction, Output, Solver
+from ..errors import DeckError
+from ..variables import FIELDS
+from .loads import load_steps
+
+FRICTIONLESS_FIELDS = (
+    "pressure",
+    "gap",
+    "zone",
+    *(name for name in FIELDS if name.startswith("displacement_")),
+)
+
+
+def checked_deck(
+    data: Mapping[str, Any], problems: Sequence[Mistake], gap_given: bool
+) -> tuple[Deck | None, list[Mistake]]:
+    """Check a deck, table by table and as a whole.
+
+    Parameters
+    ----------
+    data : mapping
+        The deck as dictionaries, without files to include.
+    problems : sequence of Mistake
+        What is known to be wrong with it.
+    gap_given : bool
+        Whether the gap is given instead of the surfaces.
+
+    Returns
+    -------
+    deck : Deck or None
+        The deck; None if a table is wrong.
+    problems : list of Mistake
+        Everything that is wrong. Checks that need several tables are made wherever these are right.
+    """
+    found = list(problems)
+    tables, of_tables = Deck.checked(data)
+    blamed = {problem.key for problem in found}
+    found += [problem for problem in of_tables if problem.key not in blamed]
+    for problem in problems:
+        tables.pop(str(problem.key[0]), None)
+    algorithm = None
+    if {"friction", "solver"} <= tables.keys():
+        friction, solver = tables["friction"], tables["solver"]
+        algorithm, against = algorithm_of(friction, solver)
+        found += against
+        if "load" in tables:
+            mu = None if algorithm == "frictionless" else friction.coefficient if friction else 0.0
+            found += load_steps(tables["load"], mu)[1]
+        if "output" in tables:
+            found += field_problems(tables["output"], algorithm)
+    if "body" in tables:
+        one, two = (body.surface for body in (tables["body"].body_1, tables["body"].body_2))
+        if not gap_given:
+            found += touching_problems(Separation(one, two))
+        elif one.shape != "flat" or two.shape != "flat":
+            sentence = "expected either a gap or surfaces of the bodies, not both"
+            found.append(Mistake(("gap",), MISSING, sentence))
+    return (Deck.model_construct(**tables) if not found else None), found
+
+
+def algorithm_of(friction: Friction | None, solver: Solver) -> tuple[str, list[Mistake]]:
+    """Return the algorithm that a deck asks for, and what stands against it."""
+    mu = friction.coefficient if friction else None
+    algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
+    problems = []
+    if algorithm == "frictionless" and mu:
+        sentence = 'expected 0, since solver.algorithm = "frictionless"'
+        problems.append(Mistake(("friction", "coefficient"), mu, sentence))
+    if algorithm != "frictionless" and mu is None:
+        sentence = (
+            f'missing; expected a number of at least 0 (or inf), since solver.algorithm = "{algorithm}"'
+        )
+        problems.append(Mistake(("friction", "coefficient"), MISSING, sentence))
+    return algorithm, problems
+
+
+def field_problems(output: Output, algorithm: str) -> list[Mistake]:
+    """Complain about fields that a frictionless run does not yield."""
+    known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else FIELDS
+    missing = [name for name in output.fields or () if name not in known]
+    if not missing:
+        return []
+    sentence = f"a frictionless run has no {', '.join(missing)}; it has {', '.join(known)}"
+    return [Mistake(("output", "fields"), output.fields, sentence)]
+
+
+def touching_problems(gap: Separation) -> list[Mistake]:
+    """Complain about surfaces that never touch, or that touch along a line or all over, without end."""
+    try:
+        gap.first_touch  # noqa: B018 (worked out here, kept for later)
+    except DeckError as error:
+        return [Mistake(("body", "2", "surface"), MISSING, str(error))]
+    one, two = gap.surface_1.curvature, gap.surface_2.curvature
+    if one is None or two is None:
+        return []
+    smaller, larger, _ = principal_curvatures(one + two)
+    if smaller > 1e-12 * larger:
+        return []
+    where = "everywhere" if larger == 0 else "along a line"
+    sentence = f"the two surfaces touch {where}, so the contact has no end; expected a shape that bounds it"
+    return [Mistake(("body", "2" if gap.surface_1.shape == "flat" else "1", "surface"), MISSING, sentence)]

@@ -1,0 +1,1 @@
+"""What a run leaves: load steps, the result file and its journal, tables and exports made from them."""

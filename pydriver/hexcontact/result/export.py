@@ -1,0 +1,312 @@
+"""Results for other programs: ParaView (VTK), mesh tools (UGRID), tables (CSV)."""
+
+from __future__ import annotations
+
+import base64
+import re
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DeckError
+from ..text import escaped, visible
+from ..variables import FIELDS, NOT_KEPT, VARIABLES
+from .mesh import triangles
+
+if TYPE_CHECKING:
+    import xarray
+
+    from .result import Result
+
+_VECTORS = {  # name in VTK files -> its components
+    "traction": ("traction_x", "traction_y"),
+    "relative_displacement": ("relative_displacement_x", "relative_displacement_y"),
+    "slip_increment": ("slip_increment_x", "slip_increment_y"),
+    "displacement_1": ("displacement_1_x", "displacement_1_y", "displacement_1_z"),
+    "displacement_2": ("displacement_2_x", "displacement_2_y", "displacement_2_z"),
+}
+_VTK_TYPES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "i1": "Int8", "u1": "UInt8"}
+_TRIANGLE = 5  # number of this kind of cell in VTK
+
+
+def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int]:
+    """Return the numbers of the steps whose fields are in a result.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    numbers : sequence of int, optional
+        Only these steps; -1 is the last one.
+
+    Raises
+    ------
+    DeckError
+        If there is no such step, or nothing was kept of it.
+    """
+    asked = [int(step) for step in result.dataset["step"].values]
+    if numbers is not None:
+        try:
+            asked = [int(result.step(number)["step"]) for number in numbers]
+        except IndexError as error:
+            raise DeckError(f"--step: {error}") from error
+    kept = [number for number in asked if any(_is_kept(field) for _, field in _fields(result, number))]
+    if not kept or (numbers is not None and len(kept) < len(asked)):
+        lost = sorted(set(asked) - set(kept))
+        where = f"step {lost[0]}" if numbers is not None else "any step"
+        raise DeckError(f"the fields of {where} were not kept (output.fields, output.every)")
+    return kept
+
+
+def _fields(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any]]]:
+    one = result.step(number)
+    return ((name, one[name].values) for name in FIELDS if name in one)
+
+
+def _is_kept(values: NDArray[Any]) -> bool:
+    return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())
+
+
+# --- VTK ------------------------------------------------------------------------------------------
+
+
+def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | None = None) -> Path:
+    """Write a series of VTK files, one for each load step, and a ``.pvd`` file that lists them.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    folder : Path
+        Folder for the files; made if it is not there.
+    stem : str
+        Start of the names of the files.
+    numbers : sequence of int, optional
+        Only these steps.
+
+    Returns
+    -------
+    Path
+        The ``.pvd`` file, which ParaView opens.
+
+    Raises
+    ------
+    DeckError
+        If there is nothing to export.
+    """
+    steps = kept_steps(result, numbers)
+    if min(result.lattice.shape) < 2:
+        raise DeckError("a window of one row or one column has no triangles to export")
+    _make(folder)
+    width = max(4, len(str(steps[-1])))
+    names = []
+    for number in steps:
+        names.append(f"{stem}_{number:0{width}d}.vtu")
+        (folder / names[-1]).write_text(_vtu(result, number), encoding="utf-8")
+    series = folder / f"{stem}.pvd"
+    sets = "".join(
+        f'    <DataSet timestep="{number}" part="0" file="{escaped(name)}"/>\n'
+        for number, name in zip(steps, names, strict=True)
+    )
+    series.write_text(
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n'
+        f"  <Collection>\n{sets}  </Collection>\n</VTKFile>\n",
+        encoding="utf-8",
+    )
+    return series
+
+
+def _vtu(result: Result, number: int) -> str:
+    """Return a load step as an unstructured grid in XML."""
+    lattice, one = result.lattice, result.step(number)
+    points = np.stack([lattice.x.ravel(), lattice.y.ravel(), np.zeros(lattice.size)], axis=1)
+    faces = triangles(lattice.n_row, lattice.n_col)
+    history = {
+        name: one[name].values.reshape(1)
+        for name, variable in VARIABLES.items()
+        if variable.dims == ("step",) and variable.dtype != "str" and name in one.variables
+    }
+    data = [_array(name, values, VARIABLES[name].units) for name, values in history.items()]
+    fields = [_array(name, values, unit) for name, values, unit in _point_data(result, number)]
+    cells = [
+        _array("connectivity", faces.ravel().astype("i4")),
+        _array("offsets", np.arange(3, 3 * len(faces) + 1, 3, dtype="i4")),
+        _array("types", np.full(len(faces), _TRIANGLE, dtype="u1")),
+    ]
+    return (
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
+        'compressor="vtkZLibDataCompressor">\n'
+        f"<!-- {re.sub('-(?=-)', '- ', escaped(_about(result, number)))} -->\n"
+        f"<UnstructuredGrid>\n<FieldData>\n{''.join(data)}</FieldData>\n"
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(faces)}">\n'
+        f"<PointData>\n{''.join(fields)}</PointData>\n<CellData/>\n"
+        f"<Points>\n{_array('Points', points, 'm')}</Points>\n<Cells>\n{''.join(cells)}</Cells>\n"
+        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
+    )
+
+
+def _about(result: Result, number: int) -> str:
+    return (
+        f"{result.case_title or 'hexcontact'}, load step {number}; {result.dataset.attrs['source']}; SI units"
+    )
+
+
+def _point_data(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any], str]]:
+    """Yield name, values at the nodes and unit of what a step holds; components joined to vectors."""
+    fields = dict(_fields(result, number))
+    if "initial_gap" in result.dataset:
+        yield "initial_gap", result.dataset["initial_gap"].values.ravel(), "m"
+    for vector, parts in _VECTORS.items():
+        if all(part in fields for part in parts):
+            columns = [fields.pop(part).ravel() for part in parts]
+            columns += [np.zeros_like(columns[0])] * (3 - len(parts))
+            yield vector, np.stack(columns, axis=1), VARIABLES[parts[0]].units
+    for name, values in fields.items():
+        yield name, values.ravel(), VARIABLES[name].units
+
+
+def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
+    """Return an array in XML, compressed, with its unit as ParaView shows it."""
+    data = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
+    raw = data.tobytes()
+    packed = zlib.compress(raw, 6)
+    header = np.array([1, len(raw), 0, len(packed)], dtype="<u8").tobytes()  # one block, not a partial one
+    text = (base64.b64encode(header) + base64.b64encode(packed)).decode()
+    shape = f' NumberOfComponents="{data.shape[1]}"' if data.ndim > 1 else ""
+    alone = ' NumberOfTuples="1"' if data.size == 1 else ""
+    key = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">' + unit + "</InformationKey>\n"
+    kind = _VTK_TYPES[data.dtype.str[1:]]
+    return (
+        f'<DataArray type="{kind}" Name="{escaped(name)}"{shape}{alone} format="binary">\n{text}\n'
+        f"{key if unit not in ('', '1') else ''}</DataArray>\n"
+    )
+
+
+# --- UGRID ----------------------------------------------------------------------------------------
+
+
+def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None) -> Path:
+    """Write a netCDF file whose fields lie on the nodes of a mesh, for xugrid and others.
+
+    The result itself describes the same mesh, but has its fields by row and column.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    target : Path
+        File to write.
+    numbers : sequence of int, optional
+        Only these steps.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    DeckError
+        If there is nothing to export.
+    """
+    import netCDF4
+
+    from ..variables import CONVENTIONS
+    from . import mesh
+
+    steps = kept_steps(result, numbers)
+    if min(result.lattice.shape) < 2:
+        raise DeckError("a window of one row or one column has no triangles to export")
+    _make(target.parent)
+    with netCDF4.Dataset(target, "w", format="NETCDF4_CLASSIC") as file:
+        file.setncatts({"Conventions": CONVENTIONS, **_named(result.dataset, ("title", "source", "history"))})
+        file.createDimension("step", len(steps))
+        column = file.createVariable("step", "i4", ("step",))
+        column.setncatts(VARIABLES["step"].attributes)
+        column[...] = steps
+        mesh.write_mesh(file, result.lattice)
+        on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
+        for name in (name for name in ("initial_gap", *FIELDS) if name in result.dataset):
+            variable = VARIABLES[name]
+            column = file.createVariable(
+                name, variable.dtype, (*variable.dims[:-2], mesh.NODE), zlib=True, complevel=1,
+                fill_value=variable.missing if variable.dtype == "f8" else None,
+            )  # fmt: skip
+            column.setncatts(variable.attributes | on_nodes)
+            if name == "initial_gap":
+                column[...] = result.dataset[name].values.ravel()
+                continue
+            for position, number in enumerate(steps):
+                column[position] = result.step(number)[name].values.ravel()
+    return target
+
+
+def _named(dataset: xarray.Dataset, names: Sequence[str]) -> Mapping[str, Any]:
+    return {name: dataset.attrs[name] for name in names if name in dataset.attrs}
+
+
+# --- CSV ------------------------------------------------------------------------------------------
+
+
+def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | None = None) -> list[Path]:
+    """Write the history as a table, and of the steps that are asked for the fields, a line for each node.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    folder : Path
+        Folder for the files; made if it is not there.
+    stem : str
+        Start of the names of the files.
+    numbers : sequence of int, optional
+        Steps whose fields are written.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    DeckError
+        If there are no such steps.
+    """
+    import pandas as pd  # type: ignore[import-untyped]
+
+    steps = [] if numbers is None else kept_steps(result, numbers)
+    _make(folder)
+    written = [folder / f"{stem}_history.csv"]
+    result.history.rename(columns=_with_unit).map(_cell).to_csv(written[0])
+    for number in steps:
+        rows, cols = np.meshgrid(result.lattice.rows, result.lattice.cols, indexing="ij")
+        columns = {"row": rows, "col": cols, "x": result.lattice.x, "y": result.lattice.y}
+        table = pd.DataFrame({k: v.ravel() for k, v in (columns | dict(_fields(result, number))).items()})
+        written.append(folder / f"{stem}_{number:04d}.csv")
+        table.rename(columns=_with_unit).to_csv(written[-1], index=False)
+    return written
+
+
+def _cell(value: Any) -> Any:
+    """Return what stands in a table; text that a spreadsheet would run as a formula begins with ' there."""
+    if not isinstance(value, str):
+        return value
+    text = visible(value)
+    return f"'{text}" if text.lstrip().startswith(("=", "+", "-", "@")) else text
+
+
+def _with_unit(name: str) -> str:
+    unit = VARIABLES[name].units
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise DeckError(f"{folder} is a file; expected a folder to write into") from None

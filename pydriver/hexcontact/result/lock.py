@@ -1,0 +1,156 @@
+"""Keeps two runs from writing one file."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import json
+import math
+import os
+import socket
+import stat
+import time
+from pathlib import Path
+from typing import Any
+
+from ..errors import DeckError
+
+_CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
+_LONGEST = 1000  # bytes of a lock
+
+
+class Lock:
+    """Keeps two runs from writing one output.
+
+    The lock is held through the operating system, which lets go of it when the process dies.
+    File systems differ in whether another machine notices, so the file names process and host:
+    a lock left by another host counts as held.
+
+    Parameters
+    ----------
+    path : Path
+        Lock file.
+    output : Path
+        What is being protected, for the message.
+
+    Raises
+    ------
+    DeckError
+        If another run holds it, or what is there is no lock: that stays as it is.
+    """
+
+    def __init__(self, path: Path, output: Path) -> None:
+        self.path = path
+        while True:
+            self._descriptor = _opened(path)
+            try:
+                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                held = False
+            except BlockingIOError:
+                held = True
+            except OSError:  # a file system without locks: only the process number is left to go by
+                held = _is_running(self._holder())
+            if held or _same_file(path, self._descriptor):
+                break
+            os.close(self._descriptor)  # the one who held it deleted the file in between
+        holder = self._holder()
+        if holder is None:
+            os.close(self._descriptor)
+            raise _no_lock(path)
+        if held or holder.get("host", socket.gethostname()) != socket.gethostname():
+            os.close(self._descriptor)
+            since = f" since {holder['since']}" if "since" in holder else ""
+            advice = f"if that run is over, delete {path}"
+            if holder.get("process") == os.getpid() and held:
+                advice = "it belongs to this program, which may close the session or wait for the run"
+            raise DeckError(
+                f"{output} is being written by another run, process {holder.get('process', '?')} "
+                f"on {holder.get('host', '?')}{since}; {advice}"
+            )
+        text = {
+            "process": os.getpid(),
+            "host": socket.gethostname(),
+            "since": time.strftime("%F %T"),
+            "time": time.time(),
+        }
+        try:
+            os.ftruncate(self._descriptor, 0)
+            os.pwrite(self._descriptor, json.dumps(text).encode(), 0)
+        except BaseException:  # a full disk
+            self.release()
+            raise
+
+    def _holder(self) -> dict[str, Any] | None:
+        """Return who has written the lock, nobody if it is blank; None if it is no lock."""
+        return holder_of(os.pread(self._descriptor, _LONGEST + 1, 0))
+
+    def release(self) -> None:
+        """Let go of the lock; a file that came in its place stays."""
+        if _same_file(self.path, self._descriptor):
+            self.path.unlink(missing_ok=True)
+        os.close(self._descriptor)
+
+
+def holder_of(text: bytes) -> dict[str, Any] | None:
+    """Return who has written the text of a lock, nobody if it is blank or cut short; None if it is none."""
+    if not text.strip(b"\0"):  # nothing yet; zeros after a power failure
+        return {}
+    with contextlib.suppress(ValueError, RecursionError):
+        holder = json.loads(text)
+        return holder if isinstance(holder, dict) and holder.keys() >= {"process", "host"} else None
+    return {} if text.startswith(b'{"process": ') and len(text) <= _LONGEST else None
+
+
+def names_a_run(path: Path) -> bool:
+    """Tell whether a run has written this lock, or made it: it is blank for a moment."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)  # a pipe would block
+        try:
+            regular = stat.S_ISREG(os.fstat(descriptor).st_mode)
+            return regular and holder_of(os.pread(descriptor, _LONGEST + 1, 0)) is not None
+        finally:
+            os.close(descriptor)
+    return False
+
+
+def _opened(path: Path) -> int:
+    """Open a lock, or make it; DeckError for anything but a file of this one name."""
+    try:
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+        descriptor = os.open(path, flags, 0o666)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):  # a link, a folder, a socket
+            raise _no_lock(path) from None
+        raise
+    there = os.fstat(descriptor)
+    if not stat.S_ISREG(there.st_mode) or there.st_nlink > 1:
+        os.close(descriptor)
+        raise _no_lock(path)
+    return descriptor
+
+
+def _no_lock(path: Path) -> DeckError:
+    return DeckError(f"{path} is not a lock of hexcontact; move it away")
+
+
+def _is_running(holder: dict[str, Any] | None) -> bool:
+    """Tell whether a process of this machine holds the lock, not one that got its number since."""
+    import psutil
+
+    if not holder or holder.get("host") != socket.gethostname():
+        return False
+    try:
+        began = psutil.Process(int(holder.get("process", -1))).create_time()
+    except (psutil.NoSuchProcess, ValueError, TypeError):
+        return False
+    except psutil.Error:
+        return True
+    return bool(began < float(holder.get("time", math.inf)) + _CLOCKS)
+
+
+def _same_file(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.lstat(path), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False

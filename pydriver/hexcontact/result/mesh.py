@@ -1,0 +1,91 @@
+"""The triangular lattice as a mesh: its triangles, and how a netCDF file describes them (UGRID-1.0)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import netCDF4
+
+    from ..core.lattice import Lattice
+
+NODE, FACE, CORNER = "mesh_node", "mesh_face", "mesh_corner"  # dimensions
+TOPOLOGY, FACE_NODES = "mesh", "mesh_face_nodes"
+VARIABLES = (TOPOLOGY, "mesh_node_x", "mesh_node_y", FACE_NODES)
+_CHUNK = 1 << 16  # triangles
+
+
+def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
+    """Return the triangles between the nodes of a window.
+
+    The short diagonal halves each cell, so that all triangles are equilateral: the tractions of the solution
+    are linear on them.
+
+    Parameters
+    ----------
+    n_row, n_col : int
+        Size of the window. Node (row j, col i) of the window has the number ``j*n_col + i``.
+
+    Returns
+    -------
+    ndarray of int, shape (2*(n_row - 1)*(n_col - 1), 3)
+        Numbers of the nodes at their corners, counterclockwise, from 0.
+    """
+    first = np.arange(n_row * n_col, dtype=np.int32).reshape(n_row, n_col)[:-1, :-1].ravel()
+    right, up, across = first + 1, first + n_col, first + n_col + 1
+    return np.stack([first, right, up, right, across, up], axis=1, dtype=np.int32).reshape(-1, 3)
+
+
+def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
+    """Describe the window of a result in its file, if it is wide enough for triangles.
+
+    Parameters
+    ----------
+    file : netCDF4.Dataset
+        File open for writing.
+    lattice : Lattice
+        The window.
+    """
+    if min(lattice.shape) < 2:
+        return
+    faces = triangles(lattice.n_row, lattice.n_col)
+    for name, size in ((NODE, lattice.size), (FACE, len(faces)), (CORNER, 3)):
+        file.createDimension(name, size)
+    topology = file.createVariable(TOPOLOGY, "i4", ())
+    topology.setncatts(
+        {
+            "cf_role": "mesh_topology",
+            "long_name": "triangles of the lattice; node = (row - row[0])*n_col + (col - col[0])",
+            "topology_dimension": np.int32(2),
+            "node_coordinates": "mesh_node_x mesh_node_y",
+            "face_node_connectivity": FACE_NODES,
+            "face_dimension": FACE,
+        }
+    )
+    topology[...] = 0
+    packed: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
+    for axis, values in (("x", lattice.x), ("y", lattice.y)):
+        chunks = [min(_CHUNK, lattice.size)]
+        column = file.createVariable(f"mesh_node_{axis}", "f8", (NODE,), chunksizes=chunks, **packed)
+        column.setncatts(
+            {
+                "standard_name": f"projection_{axis}_coordinate",
+                "long_name": f"{axis} coordinate of the node",
+                "units": "m",
+            }
+        )
+        column[...] = values.ravel()
+    column = file.createVariable(
+        FACE_NODES, "i4", (FACE, CORNER), chunksizes=[min(_CHUNK, len(faces)), 3], **packed
+    )
+    column.setncatts(
+        {
+            "cf_role": "face_node_connectivity",
+            "long_name": "nodes at the corners of each triangle, counterclockwise",
+            "start_index": np.int32(0),
+        }
+    )
+    column[...] = faces

@@ -1,0 +1,266 @@
+"""Fields between the nodes: at any point, and along lines.
+
+A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
+a polygon, whose corners lie where the line crosses the edges of triangles; nothing is smoothed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DeckError
+from ..text import did_you_mean
+from ..variables import NOT_KEPT, VARIABLES
+from .pressure_field import linear
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..core.lattice import Lattice
+
+Array = NDArray[np.float64]
+Point = tuple[float, float]
+Fields = Mapping[str, NDArray[Any]]
+
+_MARGIN = 0.15  # of a section on both sides, in widths of the contact
+_SAME = 1e-9  # spacings between corners that are one
+
+
+def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike, y: ArrayLike) -> Array:
+    """Return a field at points of the plane, as the solution means it: linear on the triangles.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    name : str
+        Name of the field, see `hexcontact.variables`. The zone has no values in between: that of the nearest
+        node is returned.
+    values : ndarray, (n_row, n_col)
+        Its values at the nodes.
+    x, y : array_like
+        Points (m), broadcast.
+
+    Returns
+    -------
+    ndarray
+        Values at the points. Outside the window tractions and slip are 0, other fields NaN.
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    start = float(lattice.x[0, 0]), float(lattice.y[0, 0])
+    variable = VARIABLES[name]
+    if variable.flags:
+        return _nearest(lattice, values, start, x, y, variable.padding)
+    found = linear(np.asarray(values, dtype=float), lattice.basis, start, x, y)
+    if math.isnan(variable.padding):
+        inside = linear(np.ones(lattice.shape), lattice.basis, start, x, y)
+        found = np.where(inside > 1.0 - _SAME, found, np.nan)
+    return found
+
+
+def _nearest(
+    lattice: Lattice, values: NDArray[Any], start: Point, x: Array, y: Array, outside: float
+) -> Array:
+    """Return values at the nodes next to some points."""
+    away = np.stack([x - start[0], y - start[1]], axis=-1)
+    corner = np.floor(away @ np.linalg.inv(lattice.basis))
+    corners = corner + np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).reshape(4, *(1,) * x.ndim, 2)
+    distance = np.linalg.norm(corners @ lattice.basis - away, axis=-1)
+    chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0].astype(int)
+    col, row = chosen[..., 0], chosen[..., 1]
+    inside = (row >= 0) & (row < lattice.n_row) & (col >= 0) & (col < lattice.n_col)
+    at = values[np.clip(row, 0, lattice.n_row - 1), np.clip(col, 0, lattice.n_col - 1)]
+    return np.where(inside, at, outside).astype(float)
+
+
+# --- lines --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Line:
+    """A piece of a straight line in the plane.
+
+    Attributes
+    ----------
+    start : tuple of float
+        Where it starts, m.
+    end : tuple of float
+        Where it ends, m.
+    zero : float
+        Distance (m) from the start at which distances along the line are counted as 0.
+    """
+
+    start: Point
+    end: Point
+    zero: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, point in (("start", self.start), ("end", self.end)):
+            if np.shape(point) != (2,) or not np.isfinite(np.asarray(point, dtype=float)).all():
+                raise DeckError(f"{name} = {point!r}: expected a point (x, y) in meters")
+        if not self.length > 0.0:
+            raise DeckError(f"end = {self.end!r}: expected another point than the start of the line")
+
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        return math.hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
+
+    def corners(self, lattice: Lattice) -> Array:
+        """Return the distances (m) from the start at which the line crosses edges of triangles, and its ends.
+
+        Parameters
+        ----------
+        lattice : Lattice
+            The lattice; its edges count outside of its window too.
+        """
+        origin = np.asarray(lattice.origin)
+        ends = (np.array([self.start, self.end], dtype=float) - origin) @ np.linalg.inv(lattice.basis)
+        shares = []
+        for first, last in (*ends.T, ends.sum(axis=1)):  # columns, rows, and the edges between them
+            low, high = sorted((first, last))
+            if high - low > _SAME:
+                lines = np.arange(math.ceil(low), math.floor(high) + 1)
+                shares.append((lines - first) / (last - first))
+        share = np.unique(np.concatenate(shares))
+        same = _SAME * lattice.spacing / self.length
+        inside = share[(share > same) & (share < 1.0 - same)]
+        inside = inside[np.diff(inside, prepend=-1.0) > same]
+        return np.concatenate([[0.0], inside, [1.0]]) * self.length
+
+    def points(self, distance: Array) -> tuple[Array, Array]:
+        """Return the coordinates (m) of points at some distances (m) from the start."""
+        x, y = (a + (b - a) * (distance / self.length) for a, b in zip(self.start, self.end, strict=True))
+        return np.asarray(x), np.asarray(y)
+
+
+def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point | None) -> Line:
+    """Return the line across a contact at an angle (rad) from x, with a margin on both sides.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    pressure : ndarray, (n_row, n_col)
+        Contact pressure, Pa.
+    angle : float
+        Direction from x, rad.
+    through : tuple of float or None
+        A point (m) on the line, from which distances count; None: the node next to the center of pressure.
+
+    Raises
+    ------
+    DeckError
+        If nothing is in contact.
+    """
+    contact = pressure > 0.0
+    if not contact.any():
+        raise DeckError("there is no contact in this load step, so it has no section; give start and end")
+    x, y = lattice.x, lattice.y
+    if through is None:
+        center = np.average([x[contact], y[contact]], axis=1, weights=pressure[contact])
+        node = np.argmin(np.hypot(x - center[0], y - center[1]))
+        through = float(x.flat[node]), float(y.flat[node])
+    way = math.cos(angle), math.sin(angle)
+    along = (x[contact] - through[0]) * way[0] + (y[contact] - through[1]) * way[1]
+    margin = max(_MARGIN * float(np.ptp(along)), 2.0 * lattice.spacing)
+    first, last = float(along.min()) - margin, float(along.max()) + margin
+    ends = [(through[0] + place * way[0], through[1] + place * way[1]) for place in (first, last)]
+    return Line(ends[0], ends[1], zero=-first)
+
+
+def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
+    """Return those of the fields of a load step that were asked for; all that were kept if none was.
+
+    Parameters
+    ----------
+    names : sequence of str
+        What was asked for.
+    fields : mapping of str to array_like
+        The fields that there are.
+    step : int
+        Number of the step, for messages.
+
+    Raises
+    ------
+    DeckError
+        If there is no such field, or it was not kept.
+    """
+    for name in names:
+        if name not in fields:
+            known = name in VARIABLES and VARIABLES[name].is_field
+            what = "was not kept (output.fields)" if known else "is no field"
+            hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
+            raise DeckError(f"{name} {what}{hint}")
+    found = {name: np.asarray(fields[name]) for name in names or fields}
+    kept = {name: values for name, values in found.items() if _is_kept(name, values)}
+    for name in names:
+        if name not in kept:
+            raise DeckError(f"{name} of step {step} was not kept (output.every)")
+    if not names and not any(VARIABLES[name].is_field for name in kept):
+        raise DeckError(f"no field of step {step} was kept (output.fields, output.every)")
+    return kept
+
+
+def _is_kept(name: str, values: NDArray[Any]) -> bool:
+    return bool((values != NOT_KEPT).any() if VARIABLES[name].flags else (~np.isnan(values)).any())
+
+
+def profile(
+    lattice: Lattice, fields: Fields, line: Line, points: int | None = None, **attributes: Any
+) -> xarray.Dataset:
+    """Return fields along a line.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    fields : mapping of str to ndarray
+        Values at the nodes, by the names of `hexcontact.variables`.
+    line : Line
+        The line.
+    points : int, optional
+        Number of points, evenly spaced. By default the points are the corners of the polygon that a field is
+        along the line, so that joining them by straight lines is exact.
+    **attributes
+        What the data set says about itself.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``distance`` (m), with the coordinates ``x`` and ``y`` (m).
+
+    Raises
+    ------
+    DeckError
+        If the number of points is below 2.
+    """
+    import xarray
+
+    if points is not None and (isinstance(points, bool) or not isinstance(points, int) or points < 2):
+        raise DeckError(f"points = {points!r}: expected a whole number of at least 2")
+    distance = line.corners(lattice) if points is None else np.linspace(0.0, line.length, points)
+    x, y = line.points(distance)
+    length = {"units": "m"}
+    return xarray.Dataset(
+        {
+            name: ("distance", interpolate(lattice, name, values, x, y), VARIABLES[name].attributes)
+            for name, values in fields.items()
+        },
+        coords={
+            "distance": (
+                "distance",
+                distance - line.zero,
+                {"long_name": "distance along the line", **length},
+            ),
+            "x": ("distance", x, {"long_name": "x coordinate", **length}),
+            "y": ("distance", y, {"long_name": "y coordinate", **length}),
+        },
+        attrs=attributes,
+    )

@@ -1,0 +1,71 @@
+"""Fields of a result as small pictures: points of a plane, and their shades."""
+
+from __future__ import annotations
+
+import base64
+import io
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .view import StepView
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Pixels over a rectangle of the plane.
+
+    Attributes
+    ----------
+    limits : tuple of float
+        x_min, x_max, y_min, y_max, m.
+    longer : int
+        Pixels of the longer side.
+    """
+
+    limits: tuple[float, float, float, float]
+    longer: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        x0, x1, y0, y1 = self.limits
+        pixel = max(x1 - x0, y1 - y0) / self.longer
+        return max(1, round((y1 - y0) / pixel)), max(1, round((x1 - x0) / pixel))
+
+    @cached_property
+    def points(self) -> tuple[Array, Array]:
+        """Centers of the pixels, from the upper left one on, m."""
+        x0, x1, y0, y1 = self.limits
+        rows, cols = self.shape
+        x = x0 + (np.arange(cols) + 0.5) * (x1 - x0) / cols
+        y = y1 - (np.arange(rows) + 0.5) * (y1 - y0) / rows
+        x, y = np.meshgrid(x, y)
+        return x, y
+
+    def nearest(self, view: StepView) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
+        """Return row and column of the node next to each pixel, and whether the window has it."""
+        x, y = self.points
+        away = np.stack([x - view.start[0], y - view.start[1]], axis=-1)
+        index = away @ np.linalg.inv(view.basis)
+        corner = np.floor(index).astype(np.intp)
+        corners = corner + np.array([(0, 0), (1, 0), (0, 1), (1, 1)])[:, None, None, :]
+        distance = np.linalg.norm(corners @ view.basis - away, axis=-1)
+        chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0]
+        col, row = chosen[..., 0], chosen[..., 1]
+        n_row, n_col = view.x.shape
+        inside = (row >= 0) & (row < n_row) & (col >= 0) & (col < n_col)
+        return np.clip(row, 0, n_row - 1), np.clip(col, 0, n_col - 1), inside
+
+
+def png_of(gray: NDArray[np.uint8]) -> str:
+    """Return a picture, gray or in colors, as PNG in base64."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(gray).save(file, format="PNG", compress_level=9)
+    return base64.b64encode(file.getvalue()).decode()

@@ -1,0 +1,435 @@
+"""Result files: a journal of finished steps, and one netCDF file made from it.
+
+While a run goes on, each finished step is a small file of its own in the journal beside the output
+(``out.nc.d/000012.npz``), with all its fields, written under a temporary name, flushed to disk and renamed.
+``out.nc`` is assembled from the records, one step in memory at a time, and only ever replaced as a
+whole. So a run that is killed at any moment loses at most the step it was working on, and what stood
+in ``out.nc`` before stays readable.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import errno
+import os
+import shlex
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from ..errors import LACKING, DeckError, HexcontactError, ResourceError
+from ..files import require_utf8
+from .journal import STOPPED
+from .journal import Journal as Journal
+from .journal import journal_of as journal_of
+from .lock import Lock, names_a_run
+from .netcdf import flush, is_ours, read_output, reading, write
+from .record import SUFFIX, write_record
+from .result import Layout, Metadata, Result, Step
+from .trials import TrialFolder
+
+PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
+_LACKING = {*LACKING, None}
+
+
+def open_result(path: str | os.PathLike[str]) -> Result:
+    """Open the result of a run, finished or not.
+
+    Parameters
+    ----------
+    path : path
+        The output file. The journal of an unfinished run beside it is read too; the output may
+        even be missing. The folder of a journal can also be given itself.
+
+    Returns
+    -------
+    Result
+        Fields of a finished run are read from the file when they are asked for.
+
+    Raises
+    ------
+    DeckError
+        If there is no such file, or it is damaged, of another kind or of another version.
+    """
+    target = Path(path)
+    for _ in range(2):  # again if a run that just finished took its journal away while we read it
+        with contextlib.suppress(FileNotFoundError):
+            if target.is_dir():
+                if journal := Journal(target):
+                    return journal.result(target)
+                raise DeckError(f"{target} is a folder without finished steps in it")
+            output = read_output(target) if target.exists() else None
+            if output is not None and output.complete:
+                return output
+            journal = Journal(journal_of(target))
+            if not journal and output is None and (trials := TrialFolder(journal.folder)):
+                return trials.result(target)
+            if journal and (output is None or _continues(journal, output)):
+                if output is not None:
+                    output.close()
+                return journal.result(target)
+            if output is not None:
+                return output
+    raise DeckError(f"there is no file {target}")
+
+
+def _continues(journal: Journal, output: Result) -> bool:
+    """Whether the steps of `output` are the first ones of `journal`."""
+    return len(journal) >= len(output) and same_run(journal, output)
+
+
+def same_run(journal: Journal, output: Result) -> bool:
+    """Whether `output` and the steps of `journal` come from one run."""
+    return journal.metadata.run == output.dataset.attrs.get("run")
+
+
+class Store:
+    """Writes a run: each step to the journal as it is finished, all of them to the output.
+
+    Use it as a context manager, or call `close`. A run that does not come to `finish` leaves its
+    journal behind.
+
+    Parameters
+    ----------
+    path : path
+        Output file.
+    metadata : Metadata
+        Where the steps come from, and what the output keeps of them.
+    overwrite : bool
+        Replace an output, or an unfinished run, that is there already. It stays until `finish`.
+
+    Raises
+    ------
+    DeckError
+        If the output is there already, is being written by another run or cannot be written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], metadata: Metadata, overwrite: bool = False) -> None:
+        self._at(path)
+        self.metadata = metadata
+        with self.writing("the journal"):
+            self._lock = self._locked()
+        try:
+            self._take_over(overwrite)
+        except BaseException:
+            self.close()
+            raise
+        self._in_the_way = self.path.exists()
+
+    @classmethod
+    def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
+        """Open the journal of a run that ended before its time, to go on with it.
+
+        Nothing is changed before `go_on`. The store may also turn out to be `finished`.
+
+        Parameters
+        ----------
+        path : path
+            Output file.
+
+        Returns
+        -------
+        store : Store
+            Holds the lock.
+        last : Step or None
+            The last finished step with all its fields; None if the run is finished, or refines its lattice.
+
+        Raises
+        ------
+        DeckError
+            If there are no finished steps, one is missing or damaged, or another run is writing them.
+        FileNotFoundError
+            If there is no journal.
+        """
+        store = cls.__new__(cls)
+        store._at(path)
+        if not store.folder.is_dir():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(store.folder))
+        with store.writing("the journal", missing=True):
+            store._lock = Lock(store.folder / "lock", store.path)
+        try:
+            return store, store._read_again()
+        except BaseException:
+            store.close()
+            raise
+
+    def _at(self, path: str | os.PathLike[str]) -> None:
+        """Take up a place where an output can be written."""
+        require_utf8(path, "a netCDF file")
+        self.path = Path(os.path.realpath(path))
+        self.folder = journal_of(self.path)
+        self.heads: list[Step] = []
+        self._mutex = threading.RLock()  # close() may come from another thread than append()
+        self._closed = False
+        self.finished = False  # whether the output is complete and in its place
+        self._published = (0, time.monotonic())
+        self.interim = True  # whether a long run also writes outputs on the way
+        if self.path.is_dir():
+            raise DeckError(f"{self.path} is a folder; a file name is expected")
+        if self.path.exists() and not self.path.is_file():  # to replace it would take a device away
+            raise DeckError(f"{self.path} is not a regular file; choose another output")
+        if not self.path.parent.is_dir():
+            raise DeckError(f"cannot write {self.path}: the folder {self.path.parent} does not exist")
+        with self.writing("the journal"):
+            if not os.access(self.path.parent, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def _read_again(self) -> Step | None:
+        """Read all records, so that damage shows now and not after the last step; return the last one."""
+        journal, trials = Journal(self.folder), TrialFolder(self.folder)
+        left = trials.read()[0] if trials else None
+        output = None
+        with contextlib.suppress(DeckError):  # what is no result may not be replaced
+            output = read_output(self.path) if self.path.exists() else None
+        if left is not None:
+            ours = output is not None and output.dataset.attrs.get("run") == left.run
+        else:
+            ours = output is not None and (not journal or same_run(journal, output))
+        steps, complete = (len(output), output.complete) if output is not None else (0, False)
+        if output is not None:
+            output.close()
+        if ours and complete:  # killed while it cleared the journal away
+            journal.remove()
+            return None
+        if left is not None:
+            self.metadata = left
+            self._refuse_newer(not ours, trials.ledger)
+            return None
+        if not journal and output is not None:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self.folder))
+        if not journal:
+            raise DeckError(
+                f"no load step of {self.path} was finished, so it has to be run from the beginning"
+            )
+        last = None
+        try:
+            for last in journal:
+                self.heads.append(last.head)
+        except DeckError as error:
+            error.add_note(
+                f"without it and those after it, hexcontact resume goes on after step {len(self.heads)}"
+            )
+            raise
+        self.metadata = journal.metadata
+        with reading(self.folder, "a journal"):
+            Layout(self.metadata, self.heads)  # fails if the steps do not belong together
+        self._refuse_newer(not ours, journal.records[0])
+        if ours:
+            self._published = (steps, time.monotonic())
+        return last
+
+    def _refuse_newer(self, foreign: bool, left: Path) -> None:
+        """Refuse an output of another run that is newer than what this one left."""
+        self._in_the_way = self.path.exists() and foreign
+        if self._in_the_way and self.path.stat().st_mtime > left.stat().st_mtime:
+            raise DeckError(
+                f"{self.path} is not of the run that left its steps in {self.folder}, and newer; move it away"
+            )
+
+    def go_on(self, metadata: Metadata) -> None:
+        """Begin to add steps to those of a journal that was opened again."""
+        self.metadata = metadata
+        with self.writing("the journal"):
+            Journal(self.folder).tidy()
+
+    def _locked(self) -> Lock:
+        while True:
+            self.folder.mkdir(exist_ok=True)
+            flush(self.path.parent)
+            left = names_a_run(self.folder / "lock")
+            if not left and (foreign := Journal(self.folder).foreign()):
+                raise DeckError(
+                    f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
+                    f"{self.folder} away or choose another output"
+                )
+            with contextlib.suppress(FileNotFoundError):  # a run that just ended took the folder away
+                return Lock(self.folder / "lock", self.path)
+
+    def _take_over(self, overwrite: bool) -> None:
+        """Deal with what is there: an output, or what an unfinished run left."""
+        left, trials = Journal(self.folder), TrialFolder(self.folder)
+        if (left or trials) and not overwrite:
+            count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
+            raise DeckError(
+                f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
+                f"hexcontact resume {shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in "
+                "Python) starts anew"
+            )
+        if self.path.exists() and not overwrite:
+            raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
+        if self.path.exists() and self.path.stat().st_size and not is_ours(self.path):
+            raise DeckError(
+                f"{self.path} is not a result of hexcontact that can be read, so it is not overwritten; "
+                "delete it or choose another output"
+            )
+        with self.writing("the journal"):
+            if left:  # they become the old output, which is only replaced by a complete new one
+                with contextlib.suppress(DeckError):
+                    old = read_output(self.path) if self.path.exists() else None
+                    if old is None or (not old.complete and _continues(left, old)):
+                        layout = Layout(left.metadata, [step.head for step in left])
+                        self._put_together(layout, left, left.complete)
+                    if old is not None:
+                        old.close()
+            left.remove()
+
+    def __enter__(self) -> Self:
+        """Return the store."""
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        """Close it; an error on its way out is written down, and told what is kept."""
+        known = isinstance(error, HexcontactError | KeyboardInterrupt)
+        self.close((str(error) or "interrupted") if known else "")
+        if isinstance(error, HexcontactError) and self.kept:
+            error.add_note(self.kept)
+
+    @property
+    def has_all_steps(self) -> bool:
+        """Whether only the output is to be made of the steps."""
+        return bool(self.heads) and (
+            len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
+        )
+
+    @property
+    def kept(self) -> str:
+        """Sentence about what is finished: how much, where, how to go on; empty if nothing is."""
+        where = self.folder if self.folder.exists() else self.path
+        planned, count = self.metadata.planned_steps, len(self.heads)
+        finished = TrialFolder(self.folder).kept
+        if self.heads and planned:
+            finished = f"{count} of {planned} load steps are finished"
+        elif self.heads:
+            finished = f"{count} load step{'s are' if count != 1 else ' is'} finished"
+        if not finished:
+            return ""
+        return f"{finished} and kept in {where}; to go on: hexcontact resume {shlex.quote(str(self.path))}"
+
+    @contextlib.contextmanager
+    def writing(self, what: str, missing: bool = False) -> Iterator[None]:
+        """Turn a failure to write into one sentence that names the file and the step."""
+        try:
+            yield
+        except OSError as error:
+            if missing and isinstance(error, FileNotFoundError):
+                raise
+            reason = error.strerror or str(error)
+            if error.errno is None:
+                free = shutil.disk_usage(self.path.parent).free
+                reason = f"{reason}; is the disk full? {free / 1e6:.0f} MB are free"
+            kind = ResourceError if error.errno in _LACKING else DeckError
+            raise kind(f"cannot write {what} of {self.path}: {reason}") from error
+
+    def _replace(self, target: Path, write_to: Callable[[Path], None]) -> None:
+        """Have `target` written under a temporary name, then put it in its place."""
+        temporary = self.folder / (target.name + ".tmp")
+        try:
+            write_to(temporary)
+            os.replace(temporary, target)
+            flush(target.parent)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise
+
+    def _put_together(self, layout: Layout, journal: Journal, complete: bool) -> None:
+        """Make the output of all finished steps."""
+        self._replace(self.path, lambda path: write(path, layout, journal, complete))
+
+    def append(self, step: Step) -> None:
+        """Commit a finished step: when this returns it is on the disk.
+
+        Raises
+        ------
+        DeckError, ResourceError
+            If it cannot be written; the steps before it are kept.
+        """
+        with self._mutex:
+            if self._closed:
+                raise ValueError("the store is closed")
+            if step.number != len(self.heads) + 1:
+                raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
+            with self.writing(f"step {step.number}"):
+                record = self.folder / f"{step.number:06d}{SUFFIX}"
+                self._replace(record, lambda path: write_record(path, self.metadata, step))
+            self.heads.append(step.head)
+            steps, moment = self._published
+            due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
+            if (
+                due and self.interim and not self._in_the_way
+            ):  # doubling keeps the cost of all interim versions linear
+                self._publish(complete=False)
+
+    def _publish(self, complete: bool) -> None:
+        with self.writing("the output"):
+            self._put_together(Layout(self.metadata, self.heads), Journal(self.folder), complete)
+        self._published = (len(self.heads), time.monotonic())
+
+    def finish(self) -> None:
+        """Put the output in its place and clear the journal away.
+
+        Raises
+        ------
+        DeckError, ResourceError
+            If it cannot be written; the journal is kept.
+        """
+        with self._mutex:
+            if self._closed:  # by a signal, while the last step was on its way
+                raise ValueError("the store is closed")
+            self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
+            self._publish(complete=True)
+            self.finished = True
+            Journal(self.folder).remove()
+            self.close()
+
+    def finish_with(
+        self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]
+    ) -> None:
+        """Put an output of steps that are kept elsewhere in its place and clear the journal away.
+
+        Parameters
+        ----------
+        metadata : Metadata
+            What the output says about the run.
+        steps : iterable of Step
+            The steps; gone through twice, so not a generator.
+        trials : mapping of str to sequence
+            What was solved on other lattices, as for `hexcontact.result.Layout`.
+
+        Raises
+        ------
+        DeckError, ResourceError
+            If it cannot be written; the journal is kept.
+        """
+        layout = Layout(metadata, [step.head for step in steps], trials)
+        with self._mutex:
+            if self._closed:
+                raise ValueError("the store is closed")
+            with self.writing("the output"):
+                self._replace(self.path, lambda path: write(path, layout, steps, complete=True))
+            self.finished = True
+            Journal(self.folder).remove()
+            self.close()
+
+    def close(self, reason: str = "") -> None:
+        """Let go of the files; the journal of an unfinished run stays.
+
+        Parameters
+        ----------
+        reason : str
+            Why the run ends before its time, kept beside its finished steps.
+        """
+        with self._mutex:
+            if self._closed:
+                return
+            self._closed = True
+            if reason and (self.heads or TrialFolder(self.folder)):
+                with contextlib.suppress(OSError):
+                    (self.folder / STOPPED).write_text(reason, encoding="utf-8")
+            self._lock.release()
+            with contextlib.suppress(OSError):  # unless there are records in it
+                self.folder.rmdir()

@@ -1,0 +1,225 @@
+"""The lattices of an unfinished run that refines, in the journal of its output.
+
+``out.nc.d/lattices/trials.json`` holds the histories of the lattices that are finished. The load steps of the
+lattice at work, and of the finest finished one, are in journals of their own beside it: ``2_0.nc.d`` is level
+2, not shifted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import DeckError
+from .netcdf import flush, reading
+from .result import Metadata, Result
+
+if TYPE_CHECKING:
+    from .journal import Journal
+
+VERSION = 2  # 1 had no checksum
+_JOURNAL = re.compile(r"\d+_\d+\.nc\.d")
+FOLDER = "lattices"  # in the journal
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What the solution on one lattice came to.
+
+    Parameters
+    ----------
+    level : int
+        How often the lattice was refined.
+    copy : int
+        0: the lattice itself, else the number of its shifted copy.
+    spacing : float
+        Spacing, m.
+    origin : tuple of float
+        Position of a node, m.
+    nodes : int
+        Nodes of the largest window that it was solved on.
+    histories : sequence of mapping
+        History of each load step.
+    """
+
+    level: int
+    copy: int
+    spacing: float
+    origin: tuple[float, float]
+    nodes: int
+    histories: Sequence[Mapping[str, Any]]
+
+
+class TrialFolder:
+    """The lattices of an unfinished run.
+
+    Parameters
+    ----------
+    journal : Path
+        The journal of the output.
+    """
+
+    def __init__(self, journal: Path) -> None:
+        self.folder = journal / FOLDER
+        self.ledger = self.folder / "trials.json"
+
+    def __bool__(self) -> bool:
+        """Tell whether there are any."""
+        return self.ledger.exists()
+
+    def path(self, level: int, copy: int = 0) -> Path:
+        """Return what the output of a lattice would be called; its journal is beside it."""
+        return self.folder / f"{level}_{copy}.nc"
+
+    def read(self) -> tuple[Metadata, list[Solution]]:
+        """Return where the run comes from, and the finished lattices.
+
+        Raises
+        ------
+        DeckError
+            If the file is damaged or of another version.
+        """
+        path = self.ledger
+        with reading(path, "a list of finished lattices"):
+            about = json.loads(path.read_bytes())
+            if about["trials_version"] not in (1, VERSION):
+                raise DeckError(
+                    f"{path} has the layout {about['trials_version']}; this version reads {VERSION}"
+                )
+            digest = about.pop("sha256", "")
+            if about["trials_version"] == VERSION and digest != _digest(about):
+                raise DeckError(f"{path} is damaged: its content is not what was written (SHA-256)")
+            found = [
+                Solution(**{**solution, "origin": tuple(solution["origin"])})
+                for solution in about["solutions"]
+            ]
+            return Metadata.from_plain(about["metadata"]), found
+
+    def write(self, metadata: Metadata, solutions: Sequence[Solution]) -> None:
+        """Put the finished lattices on the disk, in one go."""
+        self.folder.mkdir(exist_ok=True)
+        about = {
+            "trials_version": VERSION,
+            "metadata": dataclasses.asdict(metadata),
+            "solutions": [dataclasses.asdict(solution) for solution in solutions],
+        }
+        about = json.loads(json.dumps(about, default=np.generic.item))  # as it will be read
+        try:
+            with self._temporary.open("w", encoding="utf-8") as file:
+                json.dump({"sha256": _digest(about), **about}, file)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(self._temporary, self.ledger)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                self._temporary.unlink()
+            raise
+        flush(self.folder)
+
+    def drop(self, level: int, copy: int = 0) -> None:
+        """Delete the load steps of a lattice."""
+        from .journal import Journal, journal_of
+
+        _clear(Journal(journal_of(self.path(level, copy))))
+
+    def _latest(self) -> tuple[int, Journal]:
+        """Return the level of the finest finished lattice, else 0, and its load steps."""
+        from .journal import Journal, journal_of
+
+        metadata, solutions = self.read()
+        level = max((solution.level for solution in solutions if not solution.copy), default=0)
+        journal = Journal(journal_of(self.path(level)))
+        if journal:
+            self.check(metadata, journal.metadata)
+        return level, journal
+
+    def check(self, metadata: Metadata, of_lattice: Metadata) -> None:
+        """See to it that the load steps of a lattice are of the run of the folder; else DeckError."""
+        if metadata.run != of_lattice.run:
+            raise DeckError(f"{self.folder} holds load steps of another run than {self.ledger}")
+
+    @property
+    def kept(self) -> str:
+        """Say what is finished; empty if nothing is."""
+        if not self:
+            return ""
+        if count := len(self.read()[1]):
+            return f"{count} lattice{'s are' if count > 1 else ' is'} finished"
+        return "load steps on the first lattice are finished" if self._latest()[1] else ""
+
+    def result(self, path: Path) -> Result:
+        """Return what there is of the finest finished lattice, else of the first; `path` names it.
+
+        Raises
+        ------
+        DeckError
+            If there is nothing.
+        """
+        level, journal = self._latest()
+        if not journal:
+            raise DeckError(f"no load step of {path} was finished")
+        result = journal.result(path)
+        result.dataset.attrs["complete"] = np.int32(0)
+        result.dataset.attrs["stopped"] = (
+            f"refinement is not finished; these are the steps on lattice {level + 1}"
+        )
+        return result
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether a run has written the list of finished lattices."""
+        with contextlib.suppress(OSError):
+            return b'"trials_version": ' in self.ledger.read_bytes()[:200]
+        return False
+
+    def foreign(self) -> Iterator[Path]:
+        """Go through the files with names of a run's, in a folder with no list of finished lattices."""
+        yield from (path for path in (self.ledger, self._temporary) if path.exists())
+        for journal in self._journals():
+            if (found := journal.foreign()) is not None:
+                yield found
+
+    @property
+    def _temporary(self) -> Path:
+        return self.ledger.with_name(self.ledger.name + ".tmp")
+
+    def _journals(self) -> list[Journal]:
+        """Return the load steps of all lattices."""
+        from .journal import Journal
+
+        names = sorted(os.listdir(self.folder)) if self.folder.is_dir() else []
+        return [Journal(self.folder / name) for name in names if _JOURNAL.fullmatch(name)]
+
+    def remove(self) -> None:
+        """Delete what runs have written, and nothing else."""
+        for journal in self._journals():
+            _clear(journal)
+        for path in (self.ledger, self._temporary):
+            path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # there is none, or there are other files in it
+            self.folder.rmdir()
+
+
+def _clear(journal: Journal) -> None:
+    """Delete a journal that no run is writing."""
+    from .lock import names_a_run
+
+    journal.remove()
+    if names_a_run(lock := journal.folder / "lock"):
+        lock.unlink()
+    with contextlib.suppress(OSError):
+        journal.folder.rmdir()
+
+
+def _digest(about: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(about).encode()).hexdigest()

@@ -1,0 +1,163 @@
+"""How far a result is from the limit of vanishing spacing, told from solutions on several lattices.
+
+The lattice is refined by the square root of two from solution to solution. The difference of a solution and
+the limit has two parts: a trend, c h^p with an order p from 1 (areas of whole cells) to 2 (approach, loads,
+energies), and a scatter, since the contact lies differently on every lattice. The scatter is often the
+larger part, so that a pair of lattices tells little; it is measured where it costs least, on shifted copies
+of a coarser lattice: of the same spacing, with the origin moved by fractions of it.
+
+Both follow from a least-squares fit of q + c h^p to the last solutions, each weighted by 1/h, as a scatter
+in proportion to h asks for. The procedure is the same for every scalar of the history and every load step.
+It follows Eca and Hoekstra, Journal of Computational Physics 262 (2014) 104-130; factors and numbers here are
+those with which errors known from closed solutions stay within the estimate (docs/theory.md, section 12).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..deck.series import LOADS
+from ..result.trials import Solution
+from ..variables import ESTIMATED
+
+if TYPE_CHECKING:
+    from ..problem.loads import LoadStep
+
+Array = NDArray[np.float64]
+History = Mapping[str, Any]
+
+RATIO = math.sqrt(2.0)  # of the spacings of a lattice and the next finer one
+LEAST_LEVELS = 3
+LEVELS_FITTED = 4  # the finest ones, with their shifted copies
+ORDERS = (1.0, 1.5, 2.0)
+SAFETY = 1.25  # on the trend
+DEVIATIONS = 2.0  # standard errors of the limit that the fit finds
+_ALIKE = 1.5  # orders whose residual is at most so many times the least one are all possible
+# Origins of the shifted copies, in spacings along both basis vectors: multiples of (1/g, 1/g^2) with
+# g^3 = g + 1, which no row or symmetry of the lattice takes to each other.
+SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794))
+
+JUDGED = ("max_pressure", "contact_area_fit", "stick_area_fit", "approach")
+"""Quantities that are to reach the target."""
+
+
+def finest(solutions: Sequence[Solution]) -> Solution:
+    """Return the solution on the finest lattice, which becomes the result."""
+    return max(solutions, key=lambda solution: (solution.level, -solution.copy))
+
+
+def driven(target: LoadStep) -> set[str]:
+    """Return the loads and motions that a load step prescribes; they have no error."""
+    motions = zip(LOADS.values(), target.targets, strict=True)
+    return {pair[motion.control == "displacement"] for pair, motion in motions}
+
+
+def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep]) -> list[dict[str, float]]:
+    """Estimate the discretization error of every scalar of the finest solution.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        Three levels at least, and shifted copies.
+    targets : sequence of LoadStep
+        The load steps.
+
+    Returns
+    -------
+    list of dict of str to float
+        For each load step the error (>= 0, in the unit of the quantity) by the name of the quantity: 0 if the
+        step prescribes it, NaN if it has no value on one of the lattices.
+
+    Raises
+    ------
+    ValueError
+        If there are too few solutions for three unknowns.
+    """
+    best = finest(solutions)
+    used = [s for s in solutions if s.level > best.level - LEVELS_FITTED]
+    used.sort(key=lambda solution: (-solution.level, solution.copy))
+    names = [name for name in ESTIMATED if name in best.histories[0]]
+    values = np.array([[[h[name] for name in names] for h in s.histories] for s in used], dtype=float)
+    spacings = np.array([s.spacing for s in used]) / best.spacing
+    errors = limits_of_error(spacings, values.reshape(len(used), -1)).reshape(values.shape[1:])
+    found = []
+    for target, row in zip(targets, errors, strict=True):
+        prescribed = driven(target)
+        found.append({
+            name: 0.0 if name in prescribed else float(error) for name, error in zip(names, row, strict=True)
+        })  # fmt: skip
+    return found
+
+
+def limits_of_error(spacings: Array, values: Array) -> Array:
+    """Estimate how far values on the first, finest lattice are from their limit for a vanishing spacing.
+
+    Parameters
+    ----------
+    spacings : ndarray, (n,)
+        Spacings in units of the first.
+    values : ndarray, (n, m)
+        m quantities, on each of the lattices.
+
+    Returns
+    -------
+    ndarray, (m,)
+        What hardly any error exceeds; NaN where a value is.
+    """
+    n = len(spacings)
+    if n < 4:
+        raise ValueError(f"expected solutions on four lattices at least, not {n}")
+    scale = np.abs(values).max(axis=0)
+    scale[~(scale > 0.0)] = 1.0
+    weighted = values / scale / spacings[:, None]
+    scatters, widths = [], []
+    for order in ORDERS:
+        forms = np.stack([np.ones(n), spacings**order], axis=1) / spacings[:, None]
+        covariance = np.linalg.inv(forms.T @ forms)
+        unknowns = covariance @ (forms.T @ weighted)
+        scatter = np.sqrt(((weighted - forms @ unknowns) ** 2).sum(axis=0) / (n - 2))
+        trend = np.abs(weighted[0] - unknowns[0])
+        scatters.append(scatter)
+        widths.append(SAFETY * trend + DEVIATIONS * math.sqrt(covariance[0, 0]) * scatter)
+    possible = np.array(scatters) <= _ALIKE * np.min(scatters, axis=0)
+    return np.asarray(scale * np.where(possible, widths, 0.0).max(axis=0) + 0.0 * values.sum(axis=0))
+
+
+def relative_errors(histories: Sequence[History], errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return the errors of the quantities that are to reach the target, in their largest value.
+
+    Parameters
+    ----------
+    histories : sequence of mapping
+        History of each load step.
+    errors : sequence of mapping
+        Their errors.
+    """
+    found = {}
+    for name in JUDGED:
+        if name in errors[0]:
+            largest = max(abs(float(history[name])) for history in histories)
+            error = float(np.max([step[name] for step in errors]))  # which hands NaN on
+            found[name] = error / largest if largest else math.inf if error else 0.0
+    return found
+
+
+def changes(coarse: Solution, fine: Solution, targets: Sequence[LoadStep]) -> dict[str, float]:
+    """Return by how much two solutions differ, as `relative_errors`; no error is estimated to be less."""
+    names = [name for name in JUDGED if name in fine.histories[0]]
+    differences = [
+        {name: 0.0 if name in driven(target) else abs(float(one[name]) - float(two[name])) for name in names}
+        for target, one, two in zip(targets, coarse.histories, fine.histories, strict=True)
+    ]
+    return relative_errors(fine.histories, differences)
+
+
+def worst(relative: Mapping[str, float]) -> tuple[str, float]:
+    """Return the quantity that is furthest from its limit, and how far."""
+    name = max(relative, key=lambda name: relative[name] if relative[name] == relative[name] else math.inf)
+    return name, relative[name]

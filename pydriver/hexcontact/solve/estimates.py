@@ -1,0 +1,85 @@
+"""How much work a case will be, roughly, before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..problem.problem import Problem
+
+# Operator applications of a load step to 1e-8, as measured on meshes of 20 to 60 spacings in the radius.
+# Without friction they are of the pressure alone, a third of an application each.
+_FRICTIONLESS, _SIMILAR, _DISSIMILAR = 8 / 3, 20.0, 45.0
+_INTERPOLATED = 4.0  # times as many, where nodes enter the contact
+_ADAPTIVE, _ADAPTIVE_SIMILAR = (
+    30,
+    6,
+)  # solutions in a segment of adaptive steps: as measured, within a factor of 3
+
+# Seconds per application and node of the window on one core of 2020 or so, with all that goes with it.
+_SECONDS_FRICTIONLESS, _SECONDS = 2e-7, 1.3e-7
+_SECONDS_LEAST = 5e-3  # of a step, whatever its size
+
+
+def operator_applications(case: Problem) -> float | None:
+    """Return about how many operator applications all load steps take; None for the direct method."""
+    if case.method_for(case.lattice) == "direct":
+        return None
+    if not case.frictional:
+        return _FRICTIONLESS * len(case.load_steps)
+    each = _DISSIMILAR if case.coupled else _SIMILAR
+    if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
+        each *= _INTERPOLATED
+    return each * _solutions(case)
+
+
+def _solutions(case: Problem) -> int:
+    """Return how many solutions a case takes; a guess for segments whose steps are chosen on the way."""
+    adaptive = sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
+    each = _ADAPTIVE if case.coupled else _ADAPTIVE_SIMILAR
+    return len(case.load_steps) - adaptive + each * adaptive
+
+
+def seconds(case: Problem) -> float | None:
+    """Return about how long a run takes on one core (s); None for the direct method."""
+    applications = operator_applications(case)
+    if applications is None:
+        return None
+    each = (_SECONDS if case.frictional else _SECONDS_FRICTIONLESS) * case.lattice.size
+    return applications * each + _SECONDS_LEAST * _solutions(case)
+
+
+def work(case: Problem) -> str:
+    """Say it in words: "about 1,800 operator applications, about 4 s on one core"."""
+    from .lattices import least_and_most
+
+    runs = least_and_most(case) if case.accuracy else ([case],)
+    applications = [_total(operator_applications(one) for one in cases) for cases in runs]
+    times = [_total(seconds(one) for one in cases) for cases in runs]
+    if None in applications or None in times:
+        return "LAPACK on the nodes in contact, not estimated"
+    count = " to ".join(f"{_rounded(number):,}" for number in applications if number)
+    durations = " to ".join(dict.fromkeys(_duration(time) for time in times if time))
+    guess = "; load steps are chosen on the way, so a third or three times as much may be needed"
+    return f"about {count} operator applications, about {durations} on one core" + guess * case.adaptive
+
+
+def _total(parts: Iterable[float | None]) -> float | None:
+    """Return the sum, or None if a part is not known."""
+    known = list(parts)
+    return None if None in known else sum(part for part in known if part is not None)
+
+
+def _rounded(number: float) -> int:
+    """Round to two digits; more would pretend to be exact."""
+    return round(float(f"{number:.2g}"))
+
+
+def _duration(time: float) -> str:
+    if time < 1:
+        return "a second or less"
+    for size, name in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if time >= 2 * size:
+            return f"{_rounded(time / size)} {name}"
+    return f"{_rounded(time)} s"

@@ -1,0 +1,179 @@
+"""Contact with friction on one window of the lattice, and the state of a run as its records keep it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.edges import ContactEdges, Edge
+from ..core.estimators import area_radius
+from ..errors import DeckError
+from ..problem.loads import LoadStep
+from ..result.history import RESIDUALS
+from ..result.result import Step
+from .frictionless import Array, Window
+
+if TYPE_CHECKING:
+    from ..core.friction import ContactState, FrictionalContact
+    from ..core.lattice import Lattice
+
+_SCALARS = (  # of a state, besides the residuals, that have the names of the history
+    *("normal_load", "tangential_load_x", "tangential_load_y", "torque"),
+    *("approach", "shift_x", "shift_y", "twist", "dissipated_energy", "operator_applications"),
+)
+_ROUGHLY = 1e-4  # residual of a solution that only tells how large the contact becomes
+
+
+class FrictionWindow(Window["ContactState"]):
+    """Contact with friction; a step starts from the state at the end of the step before."""
+
+    state = (
+        *("pressure", "traction_x", "traction_y", "gap", "zone"),
+        *("relative_displacement_x", "relative_displacement_y"),
+        *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
+    )
+    arrays = 34  # the state before, itself and on its way through the core both ways; gaps, coordinates
+
+    def _set_up(self, gap: Array) -> None:
+        from ..core.friction import FrictionalContact
+
+        self._contact: FrictionalContact = FrictionalContact(
+            self.lattice,
+            self.case.pair,
+            gap,
+            self.candidate,
+            friction_coefficient=self.case.friction_coefficient,
+            coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
+            method=self.case.method_for(self.lattice),
+        )
+
+    def _let_go(self) -> None:
+        del self._contact
+
+    def advance(
+        self, state: ContactState | None, target: LoadStep, values: tuple[float, ...]
+    ) -> ContactState:
+        """Go on from a state to new loads and motions."""
+        return self._contact.advance(
+            self._contact.virgin() if state is None else state,
+            [motion.control for motion in target.targets],
+            values,
+            static=self.case.solver.algorithm == "static",
+            entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
+            tolerance=self.case.solver.tolerance,
+        )
+
+    def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
+        """Return a state on this window; what the new nodes have been through follows from it."""
+        return None if state is None else self._contact.extended(state, lattice)
+
+    def restored(self, step: Step) -> ContactState | None:
+        """Return the whole state."""
+        return state_of(step)
+
+    # --- what a step leaves -------------------------------------------------------------------------------
+
+    def _more_fields(self, solution: ContactState) -> dict[str, NDArray[Any]]:
+        known = ("pressure", "gap", "zone")
+        return {name: getattr(solution, name) for name in self.state if name not in known}
+
+    def _more_history(
+        self, solution: ContactState, before: ContactState | None, edges: ContactEdges
+    ) -> dict[str, float]:
+        static = self.case.solver.algorithm == "static"  # nothing has gone before
+        spent_before = 0.0 if before is None or static else before.dissipated_energy
+        return {
+            **{name: getattr(solution, name) for name in (*_SCALARS, *RESIDUALS.values())},
+            **self._stick_measures(solution, edges),
+            "max_traction": float(np.hypot(solution.traction_x, solution.traction_y).max()),
+            "dissipated_energy_step": solution.dissipated_energy - spent_before,
+            "elastic_energy": self._elastic_energy(solution),
+            "sweeps": solution.sweeps,
+            "cuts": solution.cuts,
+        }
+
+    def stick_edge(self, solution: ContactState, edges: ContactEdges) -> Edge:
+        """Return the edge of the stick zone."""
+        stick, mu = solution.zone == 1, self.case.friction_coefficient
+        reserve = np.zeros(stick.shape)  # not looked at where nothing slips
+        if math.isfinite(mu):
+            reserve = mu * solution.pressure - np.hypot(solution.traction_x, solution.traction_y)
+        return edges.stick(stick, reserve)
+
+    def largest_contact_area(self) -> float:
+        """Return the contact area at the largest load of the history, without friction (m2)."""
+        from ..core.contact import NormalContact
+
+        gap, candidate = self.case.initial_gap(self.lattice)
+        method = self.case.method_for(self.lattice)
+        contact = NormalContact(self.lattice, self.case.pair, gap, candidate, method)
+        areas = []
+        for control, name in (("force", "normal_load"), ("displacement", "approach")):
+            values = [step.z.value for step in self.case.load_steps if step.z.control == control]
+            if (value := max(values, default=0.0)) > 0:
+                driven: dict[str, Any] = {name: value}
+                solution = contact.solve(**driven, tolerance=_ROUGHLY)
+                areas.append(self.lattice.cell_area * int((solution.zone > 0).sum()))
+        return max([self.lattice.cell_area, *areas])
+
+    def _stick_measures(self, solution: ContactState, edges: ContactEdges) -> dict[str, float]:
+        """Return size and place of the stick zone; NaN for its place where there is none."""
+        stick = solution.zone == 1
+        edge = self.stick_edge(solution, edges)
+        x, y = self.lattice.x[stick], self.lattice.y[stick]
+        some = x.size > 0
+        return {
+            "stick_area": self.lattice.cell_area * x.size,
+            "stick_radius": area_radius(stick, self.lattice.cell_area),
+            "stick_area_fit": edge.area,
+            "stick_radius_fit": edge.radius,
+            "stick_center_x": float(x.mean()) if some else math.nan,
+            "stick_center_y": float(y.mean()) if some else math.nan,
+            "stick_min_x": float(x.min()) if some else math.nan,
+            "stick_max_x": float(x.max()) if some else math.nan,
+            "stick_min_y": float(y.min()) if some else math.nan,
+            "stick_max_y": float(y.max()) if some else math.nan,
+        }
+
+    def _elastic_energy(self, solution: ContactState) -> float:
+        """U = sum A_p (p w + q . (u1 - u2))/2, with u1 - u2 = s + shift + twist x r."""
+        inside = solution.zone > 0
+        x, y = self.lattice.x[inside], self.lattice.y[inside]
+        moved_x = solution.relative_displacement_x[inside] + solution.shift_x - solution.twist * y
+        moved_y = solution.relative_displacement_y[inside] + solution.shift_y + solution.twist * x
+        work = (
+            solution.pressure[inside] @ self.closing(solution)[inside]
+            + solution.traction_x[inside] @ moved_x
+            + solution.traction_y[inside] @ moved_y
+        )
+        return 0.5 * self.lattice.cell_area * float(work)
+
+
+def state_of(step: Step) -> ContactState:
+    """Return the state of a contact with friction at the end of a step, as the run had it.
+
+    Parameters
+    ----------
+    step : Step
+        A step of a frictional run, or its record in the journal; all its fields are needed.
+
+    Raises
+    ------
+    DeckError
+        If a field or a value is missing, as in a frictionless run.
+    """
+    from ..core.friction import ContactState
+
+    needed = {*FrictionWindow.state, *_SCALARS, *RESIDUALS.values(), "sweeps", "cuts"}
+    if missing := needed - step.fields.keys() - step.history.keys():
+        raise DeckError(
+            f"step {step.number} holds no state of a contact with friction: it lacks "
+            f"{', '.join(sorted(missing))}"
+        )
+    state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
+    state |= {name: float(step.history[name]) for name in (*_SCALARS, *RESIDUALS.values())}
+    state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
+    return ContactState(**state)  # a finished step has converged, and away from the rim

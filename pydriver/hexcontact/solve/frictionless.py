@@ -1,0 +1,369 @@
+"""A case on one window of its lattice: gap, solver, operators, and what a load step leaves.
+
+`Window` is what all algorithms share, `NormalWindow` contact without friction; for contact with friction see
+`hexcontact.window_friction`.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import memory
+from ..core.edges import ContactEdges
+from ..core.estimators import area_radius, pressure_center
+from ..deck.series import LOADS
+from ..errors import DeckError
+from ..problem.loads import MOTIONS
+from ..result.result import Step
+from ..text import listed
+from ..variables import FIELDS
+
+if TYPE_CHECKING:
+    from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution
+    from ..core.friction import ContactState
+    from ..core.lattice import Lattice
+    from ..problem.loads import LoadStep
+    from ..problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"))
+S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
+
+_ITEM = 8  # bytes of a float
+_WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
+_LOADED = 3 * 2**20  # bytes of modules that a run imports on its way
+_LEFT = 0.7  # share of what solving takes that the system does not have back by then, as measured
+_COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
+_ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
+
+
+# --- memory ---------------------------------------------------------------------------------------
+
+
+def peak_memory(case: Problem, lattice: Lattice) -> int:
+    """Return the memory (bytes) that a run on a window takes at most, with interpreter and libraries."""
+    return memory.resident() + memory_needed(case, lattice)
+
+
+def memory_needed(case: Problem, lattice: Lattice) -> int:
+    """Return the memory (bytes) that solving and writing load steps on a window takes.
+
+    The contact is taken as large as estimated at the largest load; as the window where there is no estimate.
+    """
+    from ..core import contact as native
+
+    bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
+    operator, set_up = (
+        native.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
+        for part in ("operator", "set-up of the operator")
+    )
+    arrays = kind_of(case).arrays
+    if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
+        arrays += _ENTRY_ARRAYS
+    if case.adaptive:
+        arrays += _COMPANION_ARRAYS
+    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size
+    if bodies:
+        # beside a solver with friction, whose vectors are gone by then, the set-up needs nothing more
+        needed += len(bodies) * operator + (0 if case.frictional else set_up)
+    return _LOADED + max(needed, int(_LEFT * needed) + _WRITING)
+
+
+def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
+    """Refuse a window that does not fit into memory.
+
+    Parameters
+    ----------
+    case : Problem
+        The problem.
+    lattice : Lattice
+        The window.
+    steps_held : int
+        Load steps whose fields the result will keep in memory.
+
+    Raises
+    ------
+    ResourceError
+        If less memory is available.
+    """
+    advice = ["a smaller window" if case.window_fixed else "a larger grid.spacing"]
+    if (method := case.method_for(lattice)) == "direct":
+        advice.append('solver.method = "fft"')
+    if steps_held:
+        advice.append("an output file")
+    memory.require(
+        memory_needed(case, lattice) + steps_held * len(fields_of(case)) * _ITEM * lattice.size,
+        f"a window of {lattice.n_row} x {lattice.n_col} nodes (method {method})",
+        f"choose {listed(advice, 'or')}",
+    )
+
+
+def fields_of(case: Problem) -> tuple[str, ...]:
+    """Return the fields that each step of a case has: its whole state, and displacements if asked for."""
+    return (*kind_of(case).state, *(name for name in DISPLACEMENTS if name in case.output.fields))
+
+
+# --- windows --------------------------------------------------------------------------------------
+
+
+class Window(ABC, Generic[S]):
+    """A case on one window.
+
+    Parameters
+    ----------
+    case : Problem
+        The problem.
+    lattice : Lattice
+        The window.
+    steps_held : int
+        Load steps whose fields the result will keep in memory.
+
+    Attributes
+    ----------
+    initial_gap : ndarray, (n_row, n_col)
+        Gap before loading (m), NaN where the bodies can never touch.
+    candidate : ndarray of bool, (n_row, n_col)
+        Nodes that can touch.
+
+    Raises
+    ------
+    ResourceError
+        If it does not fit into memory.
+    """
+
+    state: ClassVar[tuple[str, ...]]  # fields that every step has, all that the next step needs among them
+    arrays: ClassVar[int]  # fields that Python holds while a step is solved and written
+
+    def __init__(self, case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
+        require_memory(case, lattice, steps_held)
+        self.case, self.lattice, self.steps_held = case, lattice, steps_held
+        gap, self.candidate = case.initial_gap(lattice)
+        self.initial_gap: Array = np.where(self.candidate, gap, np.nan)
+        self._bodies: dict[int, FlexibilityOperator] = {}
+        self._set_up(gap)
+
+    @abstractmethod
+    def _set_up(self, gap: Array) -> None:
+        """Make the solver, given the initial gap (inf where nothing can touch)."""
+
+    @abstractmethod
+    def _let_go(self) -> None:
+        """Free the memory of the solver."""
+
+    @abstractmethod
+    def advance(self, state: S | None, target: LoadStep, values: tuple[float, ...]) -> S:
+        """Solve a load step.
+
+        Parameters
+        ----------
+        state : solution or None
+            End of the step before, None before the first load.
+        target : LoadStep
+            How z, x, y and the twist are driven.
+        values : tuple of float
+            The load or motion prescribed for each of them.
+        """
+
+    @abstractmethod
+    def carried(self, state: S | None, lattice: Lattice) -> S | None:
+        """Return a state that was solved on a smaller window on this one."""
+
+    @abstractmethod
+    def restored(self, step: Step) -> S | None:
+        """Return the state at the end of a step that was solved on this window, as the next one needs it."""
+
+    @abstractmethod
+    def _more_fields(self, solution: S) -> dict[str, NDArray[Any]]:
+        """Return the fields of a step beyond initial gap, pressure, gap and zone."""
+
+    @abstractmethod
+    def _more_history(self, solution: S, before: S | None, edges: ContactEdges) -> dict[str, float]:
+        """Return what has one value by step beyond load, approach and contact area."""
+
+    def outgrown(self, solution: S) -> bool:
+        """Tell whether the contact reached the rim of the window, be it in a part of the step only."""
+        return solution.touches_rim
+
+    def grown(self, solution: S, target: LoadStep) -> Self:
+        """Return a larger window for a contact that reached the rim; this one is of no use any more.
+
+        Raises
+        ------
+        DeckError
+            If the deck fixed the window.
+        """
+        if self.case.window_fixed:
+            raise DeckError(
+                f"grid: in step {target.index + 1} the contact reaches the rim of the window of "
+                f"{self.lattice.n_row} x {self.lattice.n_col} nodes; "
+                'expected a larger grid.extent or grid.window, or grid.extent = "auto"'
+            )
+        self._let_go()  # its memory goes before that of the next comes
+        self._bodies.clear()
+        return type(self)(self.case, self.case.grown(self.lattice, solution.zone > 0), self.steps_held)
+
+    def step(self, target: LoadStep, solution: S, before: S | None, started: float) -> Step:
+        """Return what a load step leaves.
+
+        Parameters
+        ----------
+        target : LoadStep
+            The load step.
+        solution, before : solution
+            Its end, and that of the step before (None: none).
+        started : float
+            When work on it began (s, `time.perf_counter`).
+        """
+        fields = {
+            "initial_gap": self.initial_gap,
+            "pressure": solution.pressure,
+            "gap": np.where(self.candidate, solution.gap, np.nan),
+            "zone": solution.zone,
+            **self._more_fields(solution),
+        }
+        for body in (1, 2):
+            wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
+            if wanted:
+                moved = self._displacement(body, fields)
+                fields |= {name: moved[name[-1]] for name in wanted}
+        edges = self.edges_of(solution)
+        history: dict[str, float | int | str] = {
+            **self._contact_measures(solution, edges),
+            **self._more_history(solution, before, edges),
+            "segment": target.segment + 1,
+            "label": target.label,
+            "seconds": time.perf_counter() - started,
+        }
+        return Step(
+            target.index,
+            self.lattice,
+            fields,
+            history,
+            prescribed=self._prescribed(target, history),
+            load_fraction=(target.index + 1) / len(self.case.load_steps),
+            ramp_done=target.fraction,
+        )
+
+    def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
+        """Return what drives a load step, by the keys of the deck."""
+        driven = {}
+        for motion, drive in zip(MOTIONS, target.targets, strict=True):
+            if motion == "z" or self.case.frictional:
+                name = LOADS[motion][drive.control == "displacement"]
+                # a ramp that takes over from the other control begins where that one ended
+                driven[name] = float(history[name] if drive.from_start else drive.value)
+        return driven
+
+    def edges_of(self, solution: S) -> ContactEdges:
+        """Return the edges of the contact, and of what is inside."""
+        return ContactEdges(
+            solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
+        )
+
+    def closing(self, solution: S) -> Array:
+        """Return u_1z + u_2z (m), by which the deformation opens the gap; NaN where nothing can touch."""
+        with np.errstate(invalid="ignore"):  # inf - NaN there
+            return np.asarray(solution.gap - self.initial_gap + solution.approach)
+
+    def _contact_measures(self, solution: S, edges: ContactEdges) -> dict[str, float]:
+        """Return load, approach and the size of the contact."""
+        inside, edge = solution.zone > 0, edges.contact()
+        center = pressure_center(self.lattice.x, self.lattice.y, solution.pressure)
+        return {
+            "normal_load": solution.normal_load,
+            "approach": solution.approach,
+            "contact_area": self.lattice.cell_area * int(inside.sum()),
+            "contact_radius": area_radius(inside, self.lattice.cell_area),
+            "contact_area_fit": edge.area,
+            "contact_radius_fit": edge.radius,
+            "pressure_center_x": center[0],
+            "pressure_center_y": center[1],
+            "max_pressure": float(solution.pressure.max()),
+        }
+
+    def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
+        """Surface displacement of one body, z into the body itself.
+
+        Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z.
+        """
+        from ..core.contact import ElasticPair, FlexibilityOperator
+
+        body = self.case.body_1 if number == 1 else self.case.body_2
+        if body.rigid:
+            return dict.fromkeys("xyz", np.zeros(self.lattice.shape))
+        if number not in self._bodies:
+            material, rigid = (body.young_modulus, body.poisson_ratio), (None, None)
+            pair = ElasticPair.from_materials(*(material + rigid if number == 1 else rigid + material))
+            self._bodies[number] = FlexibilityOperator(self.lattice, pair)
+        operator, pressure = self._bodies[number], fields["pressure"]
+        z, x, y = operator.apply(pressure, fields.get("traction_x"), fields.get("traction_y"))
+        if self.case.solver.coupling == "goodman" and "traction_x" in fields:
+            z = operator.apply(pressure)[0]  # in this approximation shear does not move the surfaces along z
+        sign = 1.0 if number == 1 else -1.0
+        return {"x": sign * x, "y": sign * y, "z": z}
+
+
+class NormalWindow(Window["NormalSolution"]):
+    """Contact without friction; every step stands for itself."""
+
+    state = ("pressure", "gap", "zone")
+    arrays = 8  # initial gap, pressure, gap, zones, on their way through the core
+
+    def _set_up(self, gap: Array) -> None:
+        from ..core.contact import NormalContact
+
+        self._contact: NormalContact = NormalContact(
+            self.lattice, self.case.pair, gap, self.candidate, self.case.method_for(self.lattice)
+        )
+
+    def _let_go(self) -> None:
+        del self._contact
+
+    def advance(
+        self, state: NormalSolution | None, target: LoadStep, values: tuple[float, ...]
+    ) -> NormalSolution:
+        """Press with a force or to an approach."""
+        tolerance = self.case.solver.tolerance
+        if target.z.control == "force":
+            return self._contact.solve(normal_load=values[0], tolerance=tolerance)
+        return self._contact.solve(approach=values[0], tolerance=tolerance)
+
+    def carried(self, state: NormalSolution | None, lattice: Lattice) -> NormalSolution | None:
+        """Return the state as it is: the next step does not look at its fields."""
+        return state
+
+    def restored(self, step: Step) -> NormalSolution | None:
+        """Return nothing: every step stands for itself."""
+        return None
+
+    def _more_fields(self, solution: NormalSolution) -> dict[str, NDArray[Any]]:
+        return {}
+
+    def _more_history(
+        self, solution: NormalSolution, before: NormalSolution | None, edges: ContactEdges
+    ) -> dict[str, float]:
+        inside = solution.zone > 0
+        work = float(solution.pressure[inside] @ self.closing(solution)[inside])
+        return {
+            "elastic_energy": 0.5 * self.lattice.cell_area * work,
+            "sweeps": solution.sweeps,
+            "operator_applications": solution.operator_applications,
+            "residual_normal": solution.residual_normal,
+            "residual_force": solution.residual_force,
+        }
+
+
+def kind_of(case: Problem) -> type[Window[Any]]:
+    """Return the kind of window that the algorithm of a case needs."""
+    if not case.frictional:
+        return NormalWindow
+    from .frictional import FrictionWindow
+
+    return FrictionWindow

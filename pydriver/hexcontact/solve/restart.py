@@ -1,0 +1,251 @@
+"""Goes on with a run that ended before its time, from the journal that it left."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import tomllib
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._version import __version__
+from ..errors import DeckError, HexcontactError
+from ..result.netcdf import read_output
+from ..result.record import PHYSICS, physics
+from ..result.result import Metadata, Result, Step, now
+from ..result.store import Store, journal_of, open_result
+from ..result.trials import TrialFolder
+from .progress import Reporter, reporter
+from .run import checked, metadata_of, record
+
+if TYPE_CHECKING:
+    from ..problem.problem import Problem
+
+_SAME = 1e-9  # relative difference of initial gaps that are the same
+
+
+@dataclass
+class Restart:
+    """A run that can go on.
+
+    Attributes
+    ----------
+    case : Problem
+        What is solved.
+    store : Store
+        Where its steps are, and go.
+    before : list of Step
+        The steps that are finished: heads, the last one with all its fields.
+    warning : str
+        Why the result may not be to the bit that of an uninterrupted run; may be empty.
+    """
+
+    case: Problem
+    store: Store
+    before: list[Step]
+    warning: str = ""
+
+
+def resume(
+    path: str | os.PathLike[str],
+    *,
+    case: Problem | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    on_step: Callable[[Step], object] | None = None,
+    progress: Reporter | bool | None = None,
+) -> Result:
+    """Go on with a run that was interrupted, was killed, met a full disk or did not converge.
+
+    The result is to the bit that of a run in one go, on the same machine with as many threads.
+
+    Parameters
+    ----------
+    path : path
+        The output of the run; the steps that are finished are in the journal beside it.
+    case : Problem, optional
+        The problem. Only needed if the deck does not say all of it, as with a gap given in Python.
+    overrides : mapping, optional
+        New values for keys of the solver, as ``{"solver.tolerance": 1e-7}``, for the steps to come.
+    on_step : callable, optional
+        Called with each further `Step`.
+    progress : Reporter or bool, optional
+        Who is told about each step; True: a bar on a terminal, lines otherwise.
+
+    Returns
+    -------
+    Result
+        Also if the run is finished already.
+
+    Raises
+    ------
+    DeckError
+        If there is nothing to go on with, another run is writing it, or the case is not the one of the run.
+    ConvergenceError, ResourceError
+        As `hexcontact.Case.run`.
+
+    Examples
+    --------
+    >>> result = hexcontact.resume("fretting.nc")  # doctest: +SKIP
+    """
+    shown = progress if isinstance(progress, Reporter) else reporter(quiet=not progress)
+    with reopened(path, case, overrides) as restart:
+        if restart is None:
+            return checked(open_result(path))
+        if restart.warning:
+            warnings.warn(restart.warning, stacklevel=2)
+        with shown.watching(restart.case.title, restart.case.planned_steps):
+            record(restart.case, restart.store, shown, on_step, restart.before)
+    return checked(open_result(restart.store.path))
+
+
+@contextlib.contextmanager
+def reopened(
+    path: str | os.PathLike[str], case: Problem | None = None, overrides: Mapping[str, Any] | None = None
+) -> Iterator[Restart | None]:
+    """Open a run to go on with it, and close it in the end; arguments and errors as `resume`.
+
+    Yields
+    ------
+    Restart or None
+        None if the run is finished already.
+    """
+    store, last = _found(_output_of(Path(path)))
+    refines = store is not None and bool(TrialFolder(store.folder))
+    if store is None or (last is None and not refines):
+        if store is not None:
+            store.close()
+        yield None
+        return
+    try:
+        case = _case(store.metadata, case, overrides or {}, store.path)
+        _check(case, store, last)
+        about = _continued(store, case)
+        store.go_on(about)
+    except BaseException:
+        store.close()  # and leave the reason why the run stopped as it is
+        raise
+    with store:
+        before = [] if last is None else [*store.heads[:-1], last]
+        yield Restart(case, store, before, _warning(store.metadata))
+
+
+def _output_of(path: Path) -> Path:
+    """Return the output, be it that its journal was named."""
+    if path.is_dir() and path.name.endswith(".d"):
+        output = path.with_name(path.name.removesuffix(".d"))
+        return output if journal_of(output) == path else path
+    return path
+
+
+def _found(path: Path) -> tuple[Store | None, Step | None]:
+    """Open the journal of an output; no store if there is none since the run is finished."""
+    for _ in range(2):  # again if a run that just finished took its journal away
+        with contextlib.suppress(FileNotFoundError):
+            return Store.reopened(path)
+        with contextlib.suppress(FileNotFoundError):
+            output = read_output(path)
+            output.close()
+            if output.complete:
+                return None, None
+            planned = output.dataset.attrs["planned_steps"] or "an open number of"
+            raise DeckError(
+                f"{path} has {len(output)} of {planned} load steps, but its "
+                f"journal {journal_of(path)} is not there, which the next step would start from"
+            )
+    raise DeckError(f"there is neither a file {path} nor a journal {journal_of(path)} of a run")
+
+
+def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any], path: Path) -> Problem:
+    """Make the case again that the run solves."""
+    from ..problem.problem import Problem
+
+    for key in overrides:
+        table, _, name = key.partition(".")
+        if table != "solver" or name.partition(".")[0] in ("", *PHYSICS):
+            raise DeckError(
+                f"{key}: a run that goes on may only change how it is solved, such as solver.tolerance"
+            )
+    if case is not None:
+        if overrides:
+            raise DeckError("expected a case or overrides, not both")
+        if not metadata.deck or physics(metadata.deck) != physics(case.deck_text):
+            raise DeckError(f"the case is not the one that {path} is the result of: their decks differ")
+        return case
+    if not metadata.deck:
+        raise DeckError(f"the journal of {path} holds no deck")
+    if _from_python(metadata.deck):
+        raise DeckError(
+            f"the gap of {path} was given in Python; go on there: hexcontact.resume({str(path)!r}, case=case)"
+        )
+    try:
+        again = Problem.from_text(metadata.deck, metadata.deck_file or f"deck of {path}", overrides)
+    except HexcontactError as error:
+        if metadata.version != __version__:
+            error.add_note(f"the run was started by hexcontact {metadata.version}, this is {__version__}")
+        raise
+    again.deck_file = Path(metadata.deck_file) if metadata.deck_file else None
+    return again
+
+
+def _from_python(deck: str) -> bool:
+    body = tomllib.loads(deck).get("body", {})
+    return body.get("1", {}).get("surface", {}).get("shape") == "python"
+
+
+def _check(case: Problem, store: Store, last: Step | None) -> None:
+    """See to it that the case is the one of the steps, though files that its deck names may have changed."""
+    found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
+    planned = store.metadata.planned_steps
+    if last is not None:
+        planned = int(last.control.get("load_steps", planned))
+    if len(case.load_steps) != planned:
+        raise DeckError(f"the deck now has {len(case.load_steps)} load steps; the {found} are of {planned}")
+    if last is not None:
+        check_step(case, last, found)
+
+
+def check_step(case: Problem, last: Step, found: str) -> None:
+    """See to it that lattice and surfaces of a case are those of a finished step; `found` names it."""
+    if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
+        raise DeckError(f"the deck now leads to another lattice than that of the {found}")
+    gap, touching = case.initial_gap(last.lattice)
+    then = last.fields["initial_gap"]
+    if (touching != np.isfinite(then)).any() or not np.allclose(
+        gap[touching], then[touching], rtol=_SAME, atol=_SAME * np.abs(then[touching]).max(initial=0.0)
+    ):
+        raise DeckError(f"the surfaces are no longer those of the {found}")
+
+
+def _continued(store: Store, case: Problem) -> Metadata:
+    """Return what the result says from now on: as before, and that it went on."""
+    old, new = store.metadata, metadata_of(case)
+    changed = [
+        f"{name} = {value:g} instead of {old.parameters[name]:g}"
+        for name, value in new.parameters.items()
+        if name in ("tolerance", "step_tolerance") and value != old.parameters.get(name)
+    ]
+    done = f"step {len(store.heads)}"
+    if trials := TrialFolder(store.folder):
+        done = f"{len(trials.read()[1])} lattices"
+    line = f"{now()} resumed after {done} by hexcontact {__version__}"
+    return dataclasses.replace(
+        old,
+        deck=new.deck,
+        parameters=new.parameters,
+        resumed=(*old.resumed, ", ".join([line, *changed])),
+    )
+
+
+def _warning(metadata: Metadata) -> str:
+    if metadata.version == __version__:
+        return ""
+    return (
+        f"the run was started by hexcontact {metadata.version} and goes on with {__version__}; the result "
+        "may differ from what either of them gives alone"
+    )

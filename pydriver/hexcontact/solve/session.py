@@ -1,0 +1,391 @@
+"""A case driven by a script, one load step at a time: the next load may depend on the last answer."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import tomllib
+import weakref
+from collections import deque
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import ValidationError
+
+from ..deck.faults import Source, deck_error
+from ..deck.kinds import problems_of
+from ..deck.tables import Load
+from ..errors import DeckError
+from ..problem.arguments import given, middle_of, with_radians
+from ..problem.loads import LoadStep, load_steps
+from ..result.result import Result, Step, assemble
+from . import log
+from . import run as solve
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
+
+    from ..problem.problem import Problem
+    from ..result.store import Store
+
+_AT_REST = ("tangential_load_x", "tangential_load_y", "twist")  # what is zero where nothing is said
+_FINENESS = ("spacing", "nodes_across", "nodes_in_radius", "origin")
+
+
+class Session:
+    """A run that waits between its load steps; made by `hexcontact.Case.start`.
+
+    Iterating over it solves the loads of the case one by one. `advance` applies other loads instead; the
+    loads of the case that are left by then are not solved any more.
+
+    A step that does not converge, or slides, raises an exception and leaves the session where it was: another
+    load may be tried.
+
+    With an output each step is on the disk before the next begins; `close`, or the end of a ``with`` block,
+    completes the file. Its deck has the loads that were applied. If loads of the case are left and none was
+    applied by hand, the run stays unfinished, and `hexcontact.resume` goes on with it.
+
+    Parameters
+    ----------
+    case : Problem
+        The problem; its loads choose the size of the first window, which grows with the contact.
+    output : path, optional
+        netCDF file to write. Without it all steps stay in memory.
+    overwrite : bool
+        Replace an output that is there already.
+
+    Attributes
+    ----------
+    case : Problem
+        The problem.
+
+    Raises
+    ------
+    DeckError
+        If the output cannot be written.
+
+    Examples
+    --------
+    >>> from hexcontact import Case
+    >>> from hexcontact.surfaces import Sphere
+    >>> steel = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    >>> case = Case(
+    ...     body_1={**steel, "surface": Sphere(radius=10e-3)},
+    ...     body_2=steel,
+    ...     nodes_in_radius=8,
+    ...     friction_coefficient=0.3,
+    ...     normal_load=100.0,
+    ... )
+    >>> session = case.start()
+    >>> pressed = next(session)
+    >>> while session.step.stick_area > 0.5 * pressed.stick_area:
+    ...     step = session.advance(tangential_load_x=session.step.tangential_load_x + 2.0)
+    >>> f"half of the stick area is gone at {session.step.tangential_load_x:.0f} N"
+    'half of the stick area is gone at 20 N'
+    """
+
+    def __init__(self, case: Problem, output: str | Path | None = None, overwrite: bool = False) -> None:
+        self.case = case
+        self._about = solve.metadata_of(case)
+        self._steps: list[Step] = []  # with an output all but the last without their fields
+        self._march: Iterator[Step] | None = None
+        self._queue: deque[LoadStep] = deque()
+        self._by_hand = False
+        self._loads: list[dict[str, Any]] = []  # entries of [[load]], once they are those of the script
+        self._driven = copy.copy(case)
+        self._closed = False
+        self._store: Store | None = None
+        if output is not None:
+            from ..result.store import Store
+
+            self._store = Store(output, self._about, overwrite)
+            # a session that nobody has any more, as when the cell of a notebook is run again, holds no file
+            weakref.finalize(self, self._store.close, "the session was dropped")
+
+    # --- what is known --------------------------------------------------------------------------------------
+
+    @property
+    def step(self) -> Step:
+        """The last finished step."""
+        if not self._steps:
+            raise DeckError("no load step of the session is finished yet")
+        return self._steps[-1]
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """All finished steps; with an output, only the last has its fields."""
+        return tuple(self._steps)
+
+    @property
+    def history(self) -> pandas.DataFrame:
+        """Table of everything that has one value by step, by the number of the step."""
+        import pandas
+
+        numbers = pandas.Index([step.number for step in self._steps], name="step")
+        return pandas.DataFrame([dict(step.history) for step in self._steps], index=numbers)
+
+    def result(self) -> Result:
+        """Return all finished steps as a result.
+
+        Raises
+        ------
+        DeckError
+            If there is none.
+        """
+        _ = self.step
+        if self._store is None:
+            return Result(assemble(self._about, self._steps, self._whole))
+        from ..result.store import open_result
+
+        return open_result(self._store.path)
+
+    @property
+    def _whole(self) -> bool:
+        """Whether all is solved that is to be solved."""
+        return bool(self._steps) and (self._by_hand or self._steps[-1].load_fraction >= 1.0)
+
+    # --- steps ----------------------------------------------------------------------------------------------
+
+    def __iter__(self) -> Self:
+        """Return the session: each step is solved when it is asked for."""
+        return self
+
+    def __next__(self) -> Step:
+        """Solve the next load step of the case.
+
+        Raises
+        ------
+        StopIteration
+            If all loads of the case are done, or other loads were applied.
+        DeckError, ConvergenceError, ResourceError
+            As `hexcontact.Case.run`.
+        """
+        if self._whole:
+            raise StopIteration
+        self._check_open()
+        if self._march is None:
+            self._march = solve.steps(self.case, self._store is None, self._steps)
+        return self._kept(self._solved(self._march))
+
+    def advance(
+        self,
+        *,
+        normal_load: float | None = None,
+        approach: float | None = None,
+        tangential_load_x: float | None = None,
+        shift_x: float | None = None,
+        tangential_load_y: float | None = None,
+        shift_y: float | None = None,
+        torque: float | None = None,
+        twist: float | None = None,
+        steps: int = 1,
+        label: str = "",
+    ) -> Step:
+        """Go on to other loads or motions, at most one of each pair; the others stay as they are.
+
+        Parameters
+        ----------
+        normal_load, approach : float, optional
+            Normal load (N), or approach (m).
+        tangential_load_x, shift_x, tangential_load_y, shift_y : float, optional
+            Tangential loads (N), or shifts (m).
+        torque, twist : float, optional
+            Torque (N m), or twist (rad).
+        steps : int
+            Number of equal increments.
+        label : str
+            Name of the segment in the result.
+
+        Returns
+        -------
+        Step
+            The last one.
+
+        Raises
+        ------
+        DeckError
+            If the loads are wrong, such as more than friction can carry, or the contact outgrows a fixed
+            window.
+        ConvergenceError
+            If a step does not converge, or the bodies slide; the steps before it are done.
+        ResourceError
+            If there is not enough memory or disk.
+        """
+        self._check_open()
+        entry = with_radians(
+            given(
+                normal_load=normal_load,
+                approach=approach,
+                tangential_load_x=tangential_load_x,
+                shift_x=shift_x,
+                tangential_load_y=tangential_load_y,
+                shift_y=shift_y,
+                torque=torque,
+                twist=twist,
+                steps=steps,
+                label=label or None,
+            )
+        )
+        before = self._loads if self._by_hand else self._loads_so_far()
+        targets = self._unrolled(before, entry)
+        if not self._by_hand:
+            self._by_hand, self._loads, self._march = True, before, None
+        self._driven.load_steps = targets
+        segment = int(self._steps[-1].history["segment"]) if self._steps else 0
+        done = len(self._steps)
+        for target in targets[-steps:]:
+            self._queue.append(dataclasses.replace(target, index=len(self._steps), segment=segment))
+            if self._march is None:
+                self._march = solve.steps(self._driven, False, self._steps, self._asked())
+            try:
+                step = self._solved(self._march)
+            except BaseException:
+                self._queue.clear()
+                self._loads = [*self._loads, *self._resolved(self._steps[done:])]
+                raise
+            last = len(self._steps) + 1 == done + steps
+            solved = [*self._steps[done:], step]
+            self._change([*self._loads, *([entry] if last else self._resolved(solved))], step.number)
+            self._kept(step)
+        self._loads = [*self._loads, entry]
+        return self.step
+
+    def back(self, steps: int = 1) -> None:
+        """Take the last steps back; the session stands where it stood before them.
+
+        Parameters
+        ----------
+        steps : int
+            How many.
+
+        Raises
+        ------
+        DeckError
+            If there are not so many, or the session writes a file.
+        """
+        self._check_open()
+        if self._store is not None:
+            raise DeckError("a session that writes a file cannot go back; start it without an output")
+        if not 1 <= steps <= len(self._steps):
+            raise DeckError(f"steps = {steps!r}: expected 1 to {len(self._steps)}, as many as are finished")
+        del self._steps[-steps:]
+        self._march = None
+        if self._by_hand:
+            self._loads = self._resolved(self._steps)
+            self._change(self._loads, len(self._steps))
+
+    def _solved(self, march: Iterator[Step]) -> Step:
+        """Solve one step; after a failure the next is solved from the last finished step."""
+        try:
+            return next(march)
+        except BaseException:
+            self._march = None
+            raise
+
+    def _kept(self, step: Step) -> Step:
+        """Take a step to the finished ones."""
+        if self._store is not None:
+            try:
+                self._store.append(step)
+            except BaseException:
+                self._march = None
+                raise
+            self._steps[-1:] = [before.head for before in self._steps[-1:]]
+        self._steps.append(step)
+        log.finished(step, None if self._by_hand else self.case.planned_steps)
+        return step
+
+    def _asked(self) -> Iterator[LoadStep]:
+        while self._queue:
+            yield self._queue.popleft()
+
+    # --- loads as a deck has them ---------------------------------------------------------------------------
+
+    def _loads_so_far(self) -> list[dict[str, Any]]:
+        """Return the loads that were applied by iterating: those of the case, or as many as were solved."""
+        if self._whole and not self.case.adaptive:
+            return list(tomllib.loads(self.case.deck_text)["load"])
+        return self._resolved(self._steps)
+
+    def _resolved(self, steps: Sequence[Step]) -> list[dict[str, Any]]:
+        """Return an entry of [[load]] for each of some steps."""
+        resting = {
+            name
+            for name in _AT_REST
+            if all(step.prescribed.get(name) == 0.0 for step in (*self._steps, *steps))
+        }
+        return [
+            with_radians(
+                {name: value for name, value in step.prescribed.items() if name not in resting}
+                | ({"label": step.history["label"]} if step.history.get("label") else {})
+            )
+            for step in steps
+        ]
+
+    def _unrolled(self, before: Sequence[dict[str, Any]], entry: dict[str, Any]) -> tuple[LoadStep, ...]:
+        """Return the load steps of a history that ends with a new entry; DeckError if that is wrong."""
+        try:
+            new = Load.model_validate(entry)
+        except ValidationError as error:
+            raise deck_error(problems_of(error), Source()) from None
+        mu = self.case.friction_coefficient if self.case.frictional else None
+        targets, problems = load_steps([*map(Load.model_validate, before), new], mu)
+        if problems:
+            raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], Source())
+        return targets
+
+    def _change(self, loads: Sequence[dict[str, Any]], count: int) -> None:
+        """Have the result say that these loads, in so many steps, are all of them."""
+        import tomli_w
+
+        tables = tomllib.loads(self.case.deck_text)
+        lattice = self._steps[-1].lattice if self._steps else self.case.lattice
+        # the same nodes, whatever the largest load is in the end
+        grid = {key: value for key, value in tables["grid"].items() if key not in _FINENESS}
+        grid |= {"spacing": lattice.spacing, "origin": list(lattice.origin)}
+        if self.case.window_fixed:
+            grid = {key: value for key, value in grid.items() if key != "extent"}
+            grid |= {"window": list(lattice.shape), "center": middle_of(lattice)}
+        tables.pop("accuracy", None)  # this lattice and no other
+        deck = tomli_w.dumps({**tables, "grid": grid, "load": list(loads)})
+        self._about = dataclasses.replace(self._about, deck=deck, planned_steps=count)
+        if self._store is not None:
+            self._store.metadata = self._about
+
+    # --- the end --------------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """End the session; with an output, complete the file, or leave a run that can be resumed."""
+        if self._closed:
+            return
+        self._closed, self._march = True, None
+        if self._store is not None:
+            if self._whole:
+                self._store.finish()
+            else:
+                self._store.close(f"the session was closed after step {len(self._steps)}")
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise DeckError("the session is closed")
+
+    def __enter__(self) -> Self:
+        """Return the session."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the session; after an exception the finished steps stay as an unfinished run."""
+        if error is not None and self._store is not None:
+            self._closed, self._march = True, None
+            self._store.__exit__(kind, error, trace)
+        self.close()
+
+    def __repr__(self) -> str:
+        """Say where the session stands."""
+        if not self._steps:
+            return f"Session of {self.case!r}, nothing solved yet"
+        return f"Session of {self.case!r}, after {self.step!r}"

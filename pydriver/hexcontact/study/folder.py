@@ -1,0 +1,205 @@
+"""The folder of a study: one netCDF file by finished case, one note by failed case, an index of both.
+
+A case is known by the hash of its merged deck and keeps its number for good, so that a study can be changed:
+cases that are still in it are found again, new ones get new numbers, files of others are left alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import operator
+import os
+import re
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import ConvergenceError, DeckError, ResourceError
+from ..files import require_ordinary, text_of
+from ..result.lock import Lock
+from ..result.netcdf import flush
+from .plan import Plan, PlannedCase, hash_of
+
+_INDEX = "index.json"
+_FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fails in the same way again
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case has ended.
+
+    Attributes
+    ----------
+    hash : str
+        Name of the case.
+    exit_code : int
+        0 if it is done, else what ``hexcontact run`` would have exited with.
+    message : str
+        Why it failed.
+    seconds : float
+        Wall time of this attempt.
+    lasting : bool
+        Whether a failure is of the case itself, not of the circumstances.
+    """
+
+    hash: str
+    exit_code: int = 0
+    message: str = ""
+    seconds: float = 0.0
+    lasting: bool = True
+
+
+class StudyFolder:
+    """What is on the disk of a study.
+
+    Parameters
+    ----------
+    output : Path
+        The netCDF file of the study; the folder has its name without the ending.
+
+    Raises
+    ------
+    DeckError
+        If the folder or the file cannot be what belongs to a study.
+    """
+
+    def __init__(self, output: Path) -> None:
+        if output.suffix != ".nc":
+            raise DeckError(f"output {output}: expected a netCDF file, such as {output.with_suffix('.nc')}")
+        require_ordinary(output, "a netCDF file")
+        if not output.parent.is_dir():
+            raise DeckError(f"cannot write {output}: the folder {output.parent} does not exist")
+        self.output = output
+        self.folder = output.with_suffix("")
+        if self.folder.exists() and not self.folder.is_dir():
+            raise DeckError(f"{self.folder} is a file; the study needs a folder of this name for its cases")
+        there = os.listdir(self.folder) if self.folder.is_dir() else []
+        if there and not {_INDEX, "lock"} & set(there):
+            raise DeckError(
+                f"the folder {self.folder} holds other things than cases of a study; choose another output"
+            )
+        self.numbers: dict[str, int] = {}
+        self._entries: dict[str, Any] = {}
+        if (self.folder / _INDEX).exists():
+            self._read()
+
+    def _read(self) -> None:
+        path = self.folder / _INDEX
+        content = text_of(path, "the index of a study")
+        try:
+            self._entries = json.loads(content)["cases"]
+            self.numbers = {name: operator.index(entry["number"]) for name, entry in self._entries.items()}
+            numbers = sorted(self.numbers.values())
+            if len(set(numbers)) < len(numbers) or any(not 1 <= n <= 10**9 for n in numbers):
+                raise ValueError("its numbers are not those of cases")
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise DeckError(f"{path} is damaged ({error}); move the folder {self.folder} away") from None
+
+    def lock(self) -> Lock:
+        """Keep other runs of the study away; `Lock.release` it."""
+        self.folder.mkdir(exist_ok=True)
+        return Lock(self.folder / "lock", self.folder)
+
+    def enter(self, plan: Plan) -> None:
+        """Give every case its number and write the index, if there is anything new."""
+        new = dict.fromkeys(case.hash for case in plan.cases if case.hash not in self.numbers)
+        if not new:
+            return
+        self.folder.mkdir(exist_ok=True)
+        start = max(self.numbers.values(), default=0) + 1
+        self.numbers |= {name: number for number, name in enumerate(new, start=start)}
+        for case in plan.cases:
+            if case.hash in new:
+                settings = {"number": self.numbers[case.hash], "parameters": dict(case.settings)}
+                self._entries[case.hash] = settings
+        self._write(_INDEX, {"index_version": 1, "cases": self._entries})
+
+    def _write(self, name: str, content: Any) -> None:
+        temporary = self.folder / f"{name}.{os.getpid()}.tmp"
+        try:
+            with temporary.open("w", encoding="utf-8") as file:
+                json.dump(content, file, indent=1, ensure_ascii=False, default=str)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, self.folder / name)
+            flush(self.folder)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise ResourceError(f"cannot write {self.folder / name}: {error.strerror or error}") from error
+
+    def number(self, case: PlannedCase) -> int:
+        """Return the number of a case, from 1."""
+        return self.numbers[case.hash]
+
+    def path(self, case: PlannedCase) -> Path:
+        """Return the file of a case."""
+        return self.folder / f"{self.number(case):04d}.nc"
+
+    def done(self, case: PlannedCase) -> bool:
+        """Tell whether the file of a case is there, complete and its own."""
+        import netCDF4
+
+        path = self.path(case)
+        if not path.is_file():
+            return False
+        try:
+            with netCDF4.Dataset(path) as file:
+                return bool(file.complete) and hash_of(file.deck) == case.hash
+        except (OSError, AttributeError, RuntimeError):
+            return False
+
+    def failure(self, case: PlannedCase) -> Outcome | None:
+        """Return the failure that is noted of a case."""
+        return self._noted(case)[0]
+
+    def _noted(self, case: PlannedCase) -> tuple[Outcome | None, str]:
+        """Return the failure that is noted of a case, and the version that has written it."""
+        with contextlib.suppress(DeckError, ValueError, TypeError, AttributeError, RecursionError):
+            note = json.loads(text_of(self.path(case).with_suffix(".json"), "a note"))
+            version = str(note.pop("hexcontact_version", ""))
+            outcome = Outcome(**note)
+            whole = type(outcome.exit_code), type(outcome.message), type(outcome.lasting)
+            if outcome.hash == case.hash and whole == (int, str, bool) and outcome.message.strip():
+                return outcome, version
+        return None, ""
+
+    def _is_final(self, case: PlannedCase) -> bool:
+        """Tell whether a case has failed for good: by itself, in this version of the program."""
+        from .._version import __version__
+
+        failure, version = self._noted(case)
+        if failure is None or not failure.lasting or failure.exit_code not in _FINAL:
+            return False
+        return version == __version__
+
+    def missing(self, cases: Iterable[PlannedCase], retry: bool = False) -> list[PlannedCase]:
+        """Return the cases that are to be run; those that failed for good only to `retry`."""
+        wanted = {case.hash: case for case in cases}
+        return [
+            case for case in wanted.values() if not self.done(case) and (retry or not self._is_final(case))
+        ]
+
+    def note(self, case: PlannedCase, outcome: Outcome) -> None:
+        """Write down how a case has ended, and clear away what attempts have left."""
+        from .._version import __version__
+
+        path = self.path(case)
+        if outcome.exit_code:
+            self._write(
+                f"{path.stem}.json", dataclasses.asdict(outcome) | {"hexcontact_version": __version__}
+            )
+            return
+        path.with_suffix(".json").unlink(missing_ok=True)
+        pattern = re.compile(re.escape(path.stem) + r"\.[0-9a-f]{8}\.nc(\.d)?")
+        for name in os.listdir(self.folder):
+            if pattern.fullmatch(name):
+                left = self.folder / name
+                if left.is_dir():
+                    shutil.rmtree(left, ignore_errors=True)
+                else:
+                    left.unlink(missing_ok=True)

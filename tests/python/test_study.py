@@ -29,7 +29,7 @@ from hexcontact.deck import starters
 from hexcontact.deck.tables import with_overrides
 from hexcontact.result.store import Store
 from hexcontact.solve.events import Callback
-from hexcontact.solve.run import metadata_of, record
+from hexcontact.solve.run import metadata_of, run_into
 from hexcontact.study import pool as study_run
 from hexcontact.study.pool import Job, LocalPool, solve_case
 from hexcontact.study.study import Study, run_study
@@ -539,7 +539,7 @@ def test_a_case_that_was_interrupted_goes_on_after_its_last_step(folder: Path, n
     assert whole.exit_code == 0
     case = Case.from_text(SHEARED, "0001.nc")
     with pytest.raises(KeyboardInterrupt), Store(folder / name, metadata_of(case), overwrite=True) as store:
-        record(case, store, Callback(stop_after_third))
+        run_into(case, store, Callback(stop_after_third))
     again = solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=name != "0001.nc")
     assert again.exit_code == 0, again.message
     assert sorted(path.name for path in folder.glob("0001*")) == ["0001.nc"]
@@ -553,7 +553,7 @@ def test_an_attempt_that_is_still_under_way_or_damaged_is_left_alone(folder: Pat
     case = Case.from_text(SHEARED, "0001.nc")
     with Store(folder / "0001.0123abcd.nc", metadata_of(case), overwrite=True) as store:
         with pytest.raises(KeyboardInterrupt):
-            record(case, store, Callback(stop_after_third))
+            run_into(case, store, Callback(stop_after_third))
         (folder / "0001.ffffffff.nc.d").mkdir()
         assert solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=True).exit_code == 0
         assert len(store.heads) == 3

@@ -160,7 +160,7 @@ def solved(
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
         with listener.following(title, case.planned_steps):
-            in_background(lambda: solve.record(case, store, listener, before), pipe, ends)
+            in_background(lambda: solve.run_into(case, store, listener, before), pipe, ends)
     except Interrupted as signaled:
         listeners.leave(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories

@@ -22,7 +22,7 @@ from ..result.step import Step
 from ..result.store import Store, journal_of, open_result
 from ..result.trials import TrialFolder
 from .events import Listener
-from .run import checked, listeners, metadata_of, record
+from .run import checked, listeners, metadata_of, run_into
 from .steps import check_step
 
 
@@ -96,7 +96,7 @@ def resume(
             warnings.warn(restart.warning, stacklevel=2)
         listener = listeners(restart.case, progress, on_step)
         with listener.following(restart.case.title, restart.case.planned_steps):
-            record(restart.case, restart.store, listener, restart.before)
+            run_into(restart.case, restart.store, listener, restart.before)
     return checked(open_result(restart.store.path))
 
 

@@ -104,7 +104,7 @@ def run(
         Store(output, metadata_of(case), overwrite) as store,
         listener.following(case.title, case.planned_steps),
     ):
-        record(case, store, listener)
+        run_into(case, store, listener)
     return checked(open_result(store.path))
 
 
@@ -134,7 +134,7 @@ def _in_memory(case: Problem, listener: Listener) -> Result:
     return Result(dataset.assign_attrs(stopped=stopped) if stopped else dataset)
 
 
-def record(case: Problem, store: Store, listener: Listener, before: Sequence[Step] = ()) -> None:
+def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[Step] = ()) -> None:
     """Solve a case into a store, up to the finished output.
 
     Parameters
@@ -160,7 +160,7 @@ def record(case: Problem, store: Store, listener: Listener, before: Sequence[Ste
         else:
             for step in steps(case, before=before, listener=listener):
                 store.append(step)
-                _announce(step, store, listener)
+                _announce_finished(step, store, listener)
             store.finish()
     except Stopped as reason:
         listener.said("stopped", level=logging.WARNING, reason=str(reason))
@@ -169,7 +169,7 @@ def record(case: Problem, store: Store, listener: Listener, before: Sequence[Ste
         listener.said("written", file=store.path)
 
 
-def _announce(step: Step, store: Store, listener: Listener) -> None:
+def _announce_finished(step: Step, store: Store, listener: Listener) -> None:
     """Say that a step is safe; an exception of a callback ends the run, and the store says so."""
     try:
         listener.step(step)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _SAME = 1e-9  # relative difference of initial gaps that are the same
 
 
-def kind_of(case: Problem) -> type[Window[Any]]:
+def window_type(case: Problem) -> type[Window[Any]]:
     """Return the kind of window that the algorithm of a case needs."""
     return FrictionWindow if case.frictional else NormalWindow
 
@@ -91,7 +91,7 @@ def steps(
     started, done = time.perf_counter(), len(before)
     _announce(case, lattice, done, listener)
     held = len(case.load_steps) if in_memory else 0
-    for step in _solved(case, kind_of(case)(case, lattice, held, listener), before, targets):
+    for step in _solved(case, window_type(case)(case, lattice, held, listener), before, targets):
         case.check_contact(step.number, step.lattice, step.fields["zone"] > 0)
         yield step
         done = step.number

@@ -62,7 +62,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
     """
     from ..case import Case
     from ..result.store import Store
-    from ..solve.run import listeners, metadata_of, record
+    from ..solve.run import listeners, metadata_of, run_into
 
     started = time.perf_counter()
     target = Path(job.path)
@@ -89,7 +89,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
                 own, began, store, before = restart.store.path, True, restart.store, restart.before
             follower = listeners(case, listener)
             with follower.following(case.title or target.stem, case.planned_steps):
-                record(case, store, follower, before)
+                run_into(case, store, follower, before)
         apart = own != target
         if apart:
             os.replace(own, target)

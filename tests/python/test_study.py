@@ -26,7 +26,7 @@ import hexcontact
 from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
 from hexcontact.deck import starters
-from hexcontact.deck.tables import with_overrides
+from hexcontact.deck.toml import with_overrides
 from hexcontact.result.store import Store
 from hexcontact.solve.progress import Reporter
 from hexcontact.solve.run import metadata_of, record

@@ -17,7 +17,7 @@ from ..core import friction as native_friction
 from ..core import memory
 from ..core.contact import ElasticPair, Method
 from ..core.lattice import Lattice
-from ..deck import tables as decks
+from ..deck import tables, toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
@@ -106,7 +106,7 @@ class Problem:
         DeckError
             If it cannot be read, or with a sentence for each thing that is wrong with it.
         """
-        data, text = decks.read_toml(path)
+        data, text = toml.read_toml(path)
         case = cls._made(data, text, Source(str(path), text), Path(path).parent, overrides)
         case.deck_file = Path(path).absolute()
         return case
@@ -114,7 +114,7 @@ class Problem:
     @classmethod
     def from_text(cls, text: str, name: str = "deck", overrides: Mapping[str, Any] | None = None) -> Self:
         """Read a deck from its text (as a result file keeps it); `name` is what messages call it."""
-        return cls._made(decks.parse_toml(text, name), text, Source(name, text), overrides=overrides)
+        return cls._made(toml.parse_toml(text, name), text, Source(name, text), overrides=overrides)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -340,7 +340,7 @@ class Problem:
         DeckError
             With a sentence for each thing that is wrong then.
         """
-        data = decks.parse_toml(self.deck_text, "deck")
+        data = toml.parse_toml(self.deck_text, "deck")
         if self._given_gap is not None:
             del data["body"]["1"]["surface"]  # stands for the gap
         folder = self.deck_file.parent if self.deck_file else Path()
@@ -414,7 +414,7 @@ class Problem:
             raise DeckError(f"gap: expected numbers, or inf where nothing can touch; it is NaN at {where}")
         return gap
 
-    def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:
+    def _size(self, grid: tables.Grid, source: Source, lattice: Lattice | None) -> Lattice:
         """Return the window, checked against an estimate of the contact wherever there is one."""
         if isinstance(self._given_gap, np.ndarray) and lattice is not None:
             self.initial_gap(lattice)
@@ -450,6 +450,6 @@ class Problem:
         return found[0] if len(found) == 1 else found[0].joined(found[1])
 
 
-def _body(body: decks.Body) -> Body:
+def _body(body: tables.Body) -> Body:
     surface = None if body.surface.shape == "flat" else body.surface
     return Body(body.young_modulus, body.poisson_ratio, body.rigid, surface)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import ValidationError
 
 from ..deck.faults import Source, deck_error
-from ..deck.kinds import problems_of
+from ..deck.model import problems_of
 from ..deck.tables import Load
 from ..errors import DeckError
 from ..problem.arguments import given, middle_of, with_radians

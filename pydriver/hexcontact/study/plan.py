@@ -13,8 +13,10 @@ import numpy as np
 
 from ..case import Case
 from ..deck.faults import Source
-from ..deck.kinds import Kind, Quantity, Table, Whole, WordOr
-from ..deck.tables import Deck, with_overrides
+from ..deck.kinds import Kind, Quantity, Whole, WordOr
+from ..deck.model import Table
+from ..deck.tables import Deck
+from ..deck.toml import with_overrides
 from ..deck.units import ANGLE
 from ..errors import DeckError
 from ..problem.arguments import as_toml

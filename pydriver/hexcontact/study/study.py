@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
-from ..deck.tables import read_toml
+from ..deck.toml import read_toml
 from ..errors import DeckError
 from ..solve import log
 from . import plan as study_plan

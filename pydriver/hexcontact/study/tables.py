@@ -10,7 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from ..deck.kinds import Kind, Several, Table, Text, Whole, Word, refuse, refuse_key
+from ..deck.kinds import Kind, Several, Text, Whole, Word, refuse
+from ..deck.model import Table, refuse_key
 
 MOST_CASES = 100_000
 

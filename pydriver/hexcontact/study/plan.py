@@ -18,8 +18,8 @@ from ..deck.model import Table
 from ..deck.tables import Deck
 from ..deck.toml import with_overrides
 from ..deck.units import ANGLE
+from ..deck.write import as_toml
 from ..errors import DeckError
-from ..problem.arguments import as_toml
 from ..text import shown
 from .tables import MOST_CASES, Parameter, StudyFile
 
@@ -160,7 +160,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
             merged = with_overrides(base, values)
             if check:
                 Case._made(merged, None, about)
-            cases.append(PlannedCase(position, values, as_toml(merged, gap_given=False)))
+            cases.append(PlannedCase(position, values, as_toml(merged)))
         except DeckError as error:
             sentences.append(_with_case(str(error), about, position + 1, values))
     if sentences:

@@ -89,7 +89,7 @@ class Study:
         name: str = "study",
         **keys: Any,
     ) -> None:
-        from ..problem.arguments import plain
+        from ..deck.write import plain
 
         if isinstance(parameters, Mapping):
             parameters = [

@@ -13,7 +13,8 @@ from typing import Any
 from hexcontact.deck import series, surfaces, tables
 from hexcontact.deck.kinds import Flag, Kind, Quantity, Several, Text, Whole, Word, WordOr
 from hexcontact.deck.model import Table, expectation, kind_of
-from hexcontact.study.tables import Dask, Parameter, StudyFile
+from hexcontact.study.backends.dask import Dask
+from hexcontact.study.tables import Parameter, StudyFile
 from hexcontact.text import shown
 
 PAGE = Path(__file__).with_name("deck.md")
@@ -46,7 +47,7 @@ def row(cells: Iterable[str]) -> str:
 def default_of(info: Any) -> str:
     if info.is_required():
         return "required"
-    if info.default in (None, "", ()) or info.default_factory is not None:
+    if info.default in (None, "", (), {}) or info.default_factory is not None:
         return ""
     return f"`{shown(info.default)}`" if info.default != 0.0 or info.default is False else "0"
 

@@ -1,7 +1,7 @@
 """The quantities of a result, each defined once, with all that tables, pictures, files and the core need.
 
-`VARIABLES` has a row for each quantity. What the rooms need in another order stands below it, derived from its
-columns: fields, loads and motions, residuals, panels and maps, arrays of the compiled core.
+`VARIABLES` has a row for each quantity. What the rooms need in another order stands below it, derived from
+its columns: fields, loads and motions, residuals, panels and maps, arrays of the compiled core.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from ..files import require_utf8
 from .journal import STOPPED
 from .journal import Journal as Journal
 from .journal import journal_of as journal_of
-from .lock import Lock, names_a_run
+from ..lock import Lock, names_a_run
 from .netcdf import flush, is_ours, read_output, reading, write
 from .record import SUFFIX, write_record
 from .result import Layout, Metadata, Result, Step

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..variables import VARIABLES
-from .profiles import Line, Point, chosen_fields, interpolate, profile, section_line
+from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]

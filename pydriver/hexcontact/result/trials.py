@@ -212,7 +212,7 @@ class TrialFolder:
 
 def _clear(journal: Journal) -> None:
     """Delete a journal that no run is writing."""
-    from .lock import names_a_run
+    from ..lock import names_a_run
 
     journal.remove()
     if names_a_run(lock := journal.folder / "lock"):

@@ -20,7 +20,7 @@ from typing import Any
 
 from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import require_ordinary, text_of
-from ..result.lock import Lock
+from ..lock import Lock
 from ..result.netcdf import flush
 from .plan import Plan, PlannedCase, hash_of
 

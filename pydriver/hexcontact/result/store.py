@@ -23,10 +23,10 @@ from typing import Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import require_utf8
+from ..lock import Lock, names_a_run
 from .journal import STOPPED
 from .journal import Journal as Journal
 from .journal import journal_of as journal_of
-from ..lock import Lock, names_a_run
 from .netcdf import flush, is_ours, read_output, reading, write
 from .record import SUFFIX, write_record
 from .result import Layout, Metadata, Result, Step

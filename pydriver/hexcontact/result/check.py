@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..variables import FIELDS, LARGEST, NOT_KEPT, VARIABLES
+from .layout import Metadata, lattice_of
 
 if TYPE_CHECKING:
     import xarray
 
-    from .result import Metadata, Step
+    from .step import Step
 
 _CLOSE = 1e-6  # spacings by which a node may be away from where it belongs; relative difference of sums
 _ROUNDED = 1 + 1e-5  # of tolerances in the story of a run
@@ -158,9 +159,7 @@ def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
     for name in ("step", "row", "col"):
         if (np.diff(dataset[name].values.astype(float)) != 1).any():
             return f"its coordinate {name} does not count one by one"
-    from .result import window_of
-
-    lattice = window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
+    lattice = lattice_of(dataset)
     for name, place in (("x", lattice.x), ("y", lattice.y)):
         if not (abs(dataset[name].values - place) < _CLOSE * lattice.spacing).all():
             return f"its coordinate {name} is not that of the lattice"

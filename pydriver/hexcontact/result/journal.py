@@ -9,9 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import DeckError
+from .layout import Metadata, assemble
 from .netcdf import reading
 from .record import SUFFIX, begins_like_record, fault_of_sequence, read_record
-from .result import Metadata, Result, Step, assemble
+from .result import Result
+from .step import Step
 from .trials import TrialFolder
 
 STOPPED = "stopped.txt"  # why the run ended before its time

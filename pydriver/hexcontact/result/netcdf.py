@@ -20,8 +20,10 @@ from ..files import require_ordinary, require_utf8
 from ..variables import SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
-from .result import Layout, Metadata, Result, Step
+from .layout import Layout, Metadata
+from .result import Result
 from .seal import check_seal, is_sealed, seal
+from .step import Step
 
 if TYPE_CHECKING:
     import netCDF4

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from ..core.lattice import Lattice
 from ..errors import DeckError
 from .check import MATERIALS, fault_of_record
+from .layout import Layout, Metadata
 from .netcdf import reading
-from .result import Layout, Metadata, Step
+from .step import Step
 
 SUFFIX = ".npz"
 VERSION = 1

@@ -27,9 +27,11 @@ from ..lock import Lock, names_a_run
 from .journal import STOPPED
 from .journal import Journal as Journal
 from .journal import journal_of as journal_of
+from .layout import Layout, Metadata
 from .netcdf import flush, is_ours, read_output, reading, write
 from .record import SUFFIX, write_record
-from .result import Layout, Metadata, Result, Step
+from .result import Result
+from .step import Step
 from .trials import TrialFolder
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output

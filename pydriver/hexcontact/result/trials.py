@@ -21,8 +21,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DeckError
+from .layout import Metadata
 from .netcdf import flush, reading
-from .result import Metadata, Result
+from .result import Result
 
 if TYPE_CHECKING:
     from .journal import Journal

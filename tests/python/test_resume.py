@@ -19,7 +19,7 @@ import hexcontact
 from hexcontact import Case, ConvergenceError, DeckError, ResourceError
 from hexcontact.core import contact as native
 from hexcontact.result import store as store_module
-from hexcontact.result.record import read_record, write_record
+from hexcontact.result.journal import read_record, write_record
 from hexcontact.result.result import Metadata, Step
 from hexcontact.result.store import Journal, Store, journal_of, open_result
 

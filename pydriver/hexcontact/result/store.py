@@ -17,22 +17,21 @@ import shlex
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
-from ..files import require_utf8
+from ..files import flush, reading, replacing, require_utf8
 from ..lock import Lock, names_a_run
-from .journal import STOPPED
+from .journal import STOPPED, SUFFIX, write_record
 from .journal import Journal as Journal
 from .journal import journal_of as journal_of
 from .layout import Layout, Metadata
-from .netcdf import flush, is_ours, read_output, reading, write
-from .record import SUFFIX, write_record
+from .netcdf import is_ours, read_output, write
 from .result import Result
 from .step import Step
-from .trials import TrialFolder
+from .trials import TrialFolder, foreign_file, remove_all
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _LACKING = {*LACKING, None}
@@ -195,7 +194,7 @@ class Store:
         if output is not None:
             output.close()
         if ours and complete:  # killed while it cleared the journal away
-            journal.remove()
+            remove_all(self.folder)
             return None
         if left is not None:
             self.metadata = left
@@ -243,7 +242,7 @@ class Store:
             self.folder.mkdir(exist_ok=True)
             flush(self.path.parent)
             left = names_a_run(self.folder / "lock")
-            if not left and (foreign := Journal(self.folder).foreign()):
+            if not left and (foreign := foreign_file(self.folder)):
                 raise DeckError(
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"
@@ -277,7 +276,7 @@ class Store:
                         self._put_together(layout, left, left.complete)
                     if old is not None:
                         old.close()
-            left.remove()
+            remove_all(self.folder)
 
     def __enter__(self) -> Self:
         """Return the store."""
@@ -326,21 +325,14 @@ class Store:
             kind = ResourceError if error.errno in _LACKING else DeckError
             raise kind(f"cannot write {what} of {self.path}: {reason}") from error
 
-    def _replace(self, target: Path, write_to: Callable[[Path], None]) -> None:
-        """Have `target` written under a temporary name, then put it in its place."""
-        temporary = self.folder / (target.name + ".tmp")
-        try:
-            write_to(temporary)
-            os.replace(temporary, target)
-            flush(target.parent)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
-            raise
+    def _replacing(self, target: Path) -> contextlib.AbstractContextManager[Path]:
+        """Give the name in the journal under which a file is written that then replaces `target`."""
+        return replacing(target, self.folder / (target.name + ".tmp"))
 
-    def _put_together(self, layout: Layout, journal: Journal, complete: bool) -> None:
-        """Make the output of all finished steps."""
-        self._replace(self.path, lambda path: write(path, layout, journal, complete))
+    def _put_together(self, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
+        """Make the output of finished steps."""
+        with self._replacing(self.path) as path:
+            write(path, layout, steps, complete)
 
     def append(self, step: Step) -> None:
         """Commit a finished step: when this returns it is on the disk.
@@ -355,9 +347,9 @@ class Store:
                 raise ValueError("the store is closed")
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
-            with self.writing(f"step {step.number}"):
-                record = self.folder / f"{step.number:06d}{SUFFIX}"
-                self._replace(record, lambda path: write_record(path, self.metadata, step))
+            record = self.folder / f"{step.number:06d}{SUFFIX}"
+            with self.writing(f"step {step.number}"), self._replacing(record) as path:
+                write_record(path, self.metadata, step)
             self.heads.append(step.head)
             steps, moment = self._published
             due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
@@ -385,7 +377,7 @@ class Store:
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
             self._publish(complete=True)
             self.finished = True
-            Journal(self.folder).remove()
+            remove_all(self.folder)
             self.close()
 
     def finish_with(
@@ -412,9 +404,9 @@ class Store:
             if self._closed:
                 raise ValueError("the store is closed")
             with self.writing("the output"):
-                self._replace(self.path, lambda path: write(path, layout, steps, complete=True))
+                self._put_together(layout, steps, complete=True)
             self.finished = True
-            Journal(self.folder).remove()
+            remove_all(self.folder)
             self.close()
 
     def close(self, reason: str = "") -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .frictionless import EllipticContact, hertz_ellipse
+from .elliptic import EllipticContact, hertz_ellipse
 
 if TYPE_CHECKING:
     import xarray

@@ -23,7 +23,7 @@ from .hertz_gap import SIMILAR, QuadraticGap
 if TYPE_CHECKING:
     import xarray
 
-    from .frictionless import EllipticContact
+    from .elliptic import EllipticContact
 
 Array = NDArray[np.float64]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Unpack
 
@@ -39,12 +40,22 @@ class EllipticContact:
     normal_load: float
     max_pressure: float
 
-    def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Contact pressure (Pa) at the points (x, y) (m, broadcast); 0 outside the contact."""
+    @property
+    def radius(self) -> float:
+        """Radius of the disc as large as the contact, m."""
+        return math.sqrt(self.semi_major * self.semi_minor)
+
+    def local(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """Return points (m) relative to the ellipse: coordinates along its axes, as shares of them."""
         x, y = reals(x, "x"), reals(y, "y")
         along = x * np.cos(self.angle) + y * np.sin(self.angle)
         across = y * np.cos(self.angle) - x * np.sin(self.angle)
-        inside = 1.0 - (along / self.semi_major) ** 2 - (across / self.semi_minor) ** 2
+        return along / self.semi_major, across / self.semi_minor
+
+    def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Contact pressure (Pa) at the points (x, y) (m, broadcast); 0 outside the contact."""
+        along, across = self.local(x, y)
+        inside = 1.0 - along**2 - across**2
         return np.asarray(self.max_pressure * np.sqrt(np.maximum(inside, 0.0)))
 
 
@@ -100,15 +111,8 @@ def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[
     angle = np.arctan2(axes[1, 0], axes[0, 0]) if m1 < 1.0 else 0.0
     angle = np.pi / 2 - (np.pi / 2 - angle) % np.pi  # an axis has no sense: (-pi/2, pi/2]
     b = a * np.sqrt(m1)
-    return EllipticContact(
-        effective_modulus,
-        float(a),
-        float(b),
-        float(angle),
-        float(delta),
-        float(load),
-        float(1.5 * load / (np.pi * a * b)),
-    )
+    peak = 1.5 * load / (np.pi * a * b)
+    return EllipticContact(effective_modulus, *map(float, (a, b, angle, delta, load, peak)))
 
 
 def crossed_cylinders(

@@ -325,7 +325,6 @@ FRICTIONLESS_FIELDS = names_where(lambda v: v.is_field and not v.frictional)
 DISPLACEMENTS = names_where(lambda v: v.is_field and not v.core)
 """Fields that are computed if a deck asks for them; the other ones are the state of a contact."""
 
-LOADS_AND_MOTIONS = names_where(lambda v: v.motion)
 LOADS = grouped(lambda name, v: v.motion)
 """The load and the motion of each rigid motion."""
 

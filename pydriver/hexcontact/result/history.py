@@ -7,12 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..text import listed, percent, quantity
-from ..variables import LOADS_AND_MOTIONS as LOADS_AND_MOTIONS
 from ..variables import RESIDUALS as RESIDUALS
-from ..variables import SUMMARY, VARIABLES, label_of, spelled
+from ..variables import SUMMARY, VARIABLES, label_of, names_where, spelled
 
 History = Mapping[str, Any]
 Row = tuple[str, ...]
+
+LOADS_AND_MOTIONS = {
+    name: (label_of(name), VARIABLES[name].units) for name in names_where(lambda v: v.motion)
+}
+"""What each load and motion is called where there is little room, and its unit."""
 
 _NOTICED = 1e-6  # share of the normal load or approach from which something tangential is worth showing
 _NOISE = 1e-9  # ... below which it is written as zero

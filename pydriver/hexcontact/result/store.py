@@ -343,8 +343,7 @@ class Store:
             If it cannot be written; the steps before it are kept.
         """
         with self._mutex:
-            if self._closed:
-                raise ValueError("the store is closed")
+            self._require_open()
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
             record = self.folder / f"{step.number:06d}{SUFFIX}"
@@ -352,16 +351,13 @@ class Store:
                 write_record(path, self.metadata, step)
             self.heads.append(step.head)
             steps, moment = self._published
+            # doubling keeps the cost of all interim versions linear
             due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
-            if (
-                due and self.interim and not self._in_the_way
-            ):  # doubling keeps the cost of all interim versions linear
-                self._publish(complete=False)
-
-    def _publish(self, complete: bool) -> None:
-        with self.writing("the output"):
-            self._put_together(Layout(self.metadata, self.heads), Journal(self.folder), complete)
-        self._published = (len(self.heads), time.monotonic())
+            if due and self.interim and not self._in_the_way:
+                with self.writing("the output"):
+                    layout = Layout(self.metadata, self.heads)
+                    self._put_together(layout, Journal(self.folder), complete=False)
+                self._published = (len(self.heads), time.monotonic())
 
     def finish(self) -> None:
         """Put the output in its place and clear the journal away.
@@ -372,13 +368,9 @@ class Store:
             If it cannot be written; the journal is kept.
         """
         with self._mutex:
-            if self._closed:  # by a signal, while the last step was on its way
-                raise ValueError("the store is closed")
+            self._require_open()  # a signal may have closed it while the last step was on its way
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
-            self._publish(complete=True)
-            self.finished = True
-            remove_all(self.folder)
-            self.close()
+            self._finish(Layout(self.metadata, self.heads), Journal(self.folder))
 
     def finish_with(
         self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]
@@ -392,22 +384,27 @@ class Store:
         steps : iterable of Step
             The steps; gone through twice, so not a generator.
         trials : mapping of str to sequence
-            What was solved on other lattices, as for `hexcontact.result.Layout`.
+            What was solved on other lattices, as for `hexcontact.result.layout.Layout`.
 
         Raises
         ------
         DeckError, ResourceError
             If it cannot be written; the journal is kept.
         """
-        layout = Layout(metadata, [step.head for step in steps], trials)
         with self._mutex:
-            if self._closed:
-                raise ValueError("the store is closed")
-            with self.writing("the output"):
-                self._put_together(layout, steps, complete=True)
-            self.finished = True
-            remove_all(self.folder)
-            self.close()
+            self._finish(Layout(metadata, [step.head for step in steps], trials), steps)
+
+    def _finish(self, layout: Layout, steps: Iterable[Step]) -> None:
+        self._require_open()
+        with self.writing("the output"):
+            self._put_together(layout, steps, complete=True)
+        self.finished = True
+        remove_all(self.folder)
+        self.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise ValueError("the store is closed")
 
     def close(self, reason: str = "") -> None:
         """Let go of the files; the journal of an unfinished run stays.

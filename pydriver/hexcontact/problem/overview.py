@@ -16,8 +16,8 @@ from .refinement import least_and_most
 if TYPE_CHECKING:
     from ..core.lattice import Lattice
     from ..deck.surfaces import Surface
+    from ..deck.tables import Body
     from .problem import Problem
-    from .settings import Body
 
 Row = tuple[str, ...]
 

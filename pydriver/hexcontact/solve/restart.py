@@ -15,8 +15,8 @@ from typing import Any
 from .._version import __version__
 from ..errors import DeckError, HexcontactError
 from ..problem.problem import Problem
+from ..result.journal import PHYSICS, physics
 from ..result.netcdf import read_output
-from ..result.record import PHYSICS, physics
 from ..result.result import Metadata, Result, now
 from ..result.step import Step
 from ..result.store import Store, journal_of, open_result

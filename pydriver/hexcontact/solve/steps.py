@@ -14,7 +14,7 @@ from .._version import __version__
 from ..deck.series import LOADS
 from ..errors import DeckError, PathWarning
 from ..problem.overview import parameters_of
-from ..result.remarks import unasked_path
+from ..result.history import unasked_path
 from ..result.step import Step
 from . import nonconvergence
 from .adaptive import AdaptivePath

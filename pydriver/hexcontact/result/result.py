@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..text import did_you_mean, html_table, text_table
 from ..variables import FIELDS, VARIABLES, Variable
-from . import html
 from .interpolate import (
     Line,
     Point,
@@ -413,6 +412,8 @@ class Result:
 
     def __repr__(self) -> str:
         """Say in a few lines what is there."""
+        from . import html  # with pictures
+
         fields = [name for name in FIELDS if name in self.dataset]
         table = text_table(("", ""), html.result_rows(self.dataset))
         header = html.result_header(self.dataset, self.path)
@@ -420,4 +421,6 @@ class Result:
         return "\n  ".join([*lines, *([self.stopped] if self.stopped else [])])
 
     def _repr_html_(self) -> str:
+        from . import html
+
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())

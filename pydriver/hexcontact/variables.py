@@ -326,7 +326,7 @@ DISPLACEMENTS = names_where(lambda v: v.is_field and not v.core)
 """Fields that are computed if a deck asks for them; the other ones are the state of a contact."""
 
 LOADS = grouped(lambda name, v: v.motion)
-"""The load and the motion of each rigid motion."""
+"""What drives each rigid motion: a load or a displacement. Decks have keys of the same names."""
 
 SUMMARY = tuple(sorted(names_where(lambda v: v.summary), key=lambda name: VARIABLES[name].summary))
 RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.core == "residuals")}

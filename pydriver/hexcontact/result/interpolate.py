@@ -251,12 +251,12 @@ def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point
 
 
 def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
-    """Return those of the fields of a load step that were asked for; all that were kept if none was.
+    """Return the named fields of a load step; without names, all that the output has of it.
 
     Parameters
     ----------
     names : sequence of str
-        What was asked for.
+        Names of fields.
     fields : mapping of str to array_like
         The fields that there are.
     step : int

@@ -160,7 +160,7 @@ class Result:
 
     @property
     def shortfall(self) -> str:
-        """Why the accuracy that was asked for is not reached; empty if it is, or none was asked for."""
+        """Why the accuracy that the deck demands is not reached; empty if it is, or none is demanded."""
         return str(self.dataset.attrs.get("accuracy_shortfall", ""))
 
     @property
@@ -324,7 +324,7 @@ class Result:
         """Return the values at the nodes of some fields of a step, or of all."""
         data = self.step(step)
         known = [str(n) for n, values in data.data_vars.items() if values.dims == ("row", "col")]
-        # xarray reads from the file what is asked for only
+        # xarray reads from the file only what is used
         return chosen_fields(names, {name: cast(Any, data[name]) for name in known}, int(data["step"]))
 
     # --- tables ---------------------------------------------------------------------------------------------

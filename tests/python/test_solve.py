@@ -380,6 +380,8 @@ def test_silence() -> None:
         (0.19, "", "0.19"),
         (1e-20, "m", "1e-20 m"),
         (math.nan, "m", "-"),
+        (1.234e-7, "m2", "0.1234 mm²"),
+        (3.3, "m2", "3.300 m²"),
     ],
 )
 def test_quantities_are_written_with_prefixes(value: float, unit: str, text: str) -> None:

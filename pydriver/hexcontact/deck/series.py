@@ -18,17 +18,10 @@ from pydantic_core import PydanticCustomError
 from ..errors import DeckError
 from ..files import require_ordinary, text_of
 from ..text import did_you_mean, listed, shown
+from ..variables import LOADS as LOADS  # the two keys that drive each rigid motion
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
 from .model import Table, extended, meaning
 from .units import ANGLE, FORCE, LENGTH, TORQUE
-
-LOADS = {
-    "z": ("normal_load", "approach"),
-    "x": ("tangential_load_x", "shift_x"),
-    "y": ("tangential_load_y", "shift_y"),
-    "twist": ("torque", "twist"),
-}
-"""The two keys that drive each rigid motion: by force, by displacement."""
 
 
 class Driven(NamedTuple):

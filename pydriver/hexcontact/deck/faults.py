@@ -89,6 +89,10 @@ class Source:
         return [(name, places(text)) for name, text in ((self.name, self.text), *self.included)]
 
 
+NOWHERE = Source()
+"""The source of what was made in Python."""
+
+
 def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:
     """Put all problems into one exception, a line for each."""
     faults = []

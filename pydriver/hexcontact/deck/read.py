@@ -15,7 +15,7 @@ from typing import Any
 from ..errors import DeckError
 from ..files import LARGEST_TEXT
 from ..text import listed, visible
-from .faults import MISSING, Mistake, Source
+from .faults import MISSING, NOWHERE, Mistake, Source
 from .series import Columns, read_series
 from .toml import read_toml, refuse_deep, with_overrides
 
@@ -56,9 +56,9 @@ class Assembled:
 
 def assemble(
     data: Mapping[str, Any],
-    text: str | None,
-    source: Source,
-    folder: Path,
+    text: str | None = None,
+    source: Source = NOWHERE,
+    folder: Path = Path(),
     overrides: Mapping[str, Any] | None = None,
 ) -> Assembled:
     """Merge what a deck includes, replace single keys, and read its series of loads.
@@ -67,8 +67,8 @@ def assemble(
     ----------
     data : mapping
         The deck as dictionaries.
-    text : str or None
-        The deck as text, if there is one.
+    text : str, optional
+        The deck as text.
     source : Source
         Where it came from.
     folder : Path

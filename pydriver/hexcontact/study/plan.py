@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,10 @@ from ..case import Case
 from ..deck.faults import Source
 from ..deck.kinds import Kind, Quantity, Whole, WordOr
 from ..deck.model import Table, kind_of
+from ..deck.read import assemble
 from ..deck.tables import Deck
 from ..deck.toml import with_overrides
-from ..deck.units import ANGLE
+from ..deck.units import NUMBER
 from ..deck.write import as_toml
 from ..errors import DeckError
 from ..text import shown
@@ -160,7 +161,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
         try:
             merged = with_overrides(base, values)
             if check:
-                Case._made(merged, None, about)
+                Case._made(assemble(merged, source=about))
             cases.append(PlannedCase(position, values, as_toml(merged)))
         except DeckError as error:
             sentences.append(_with_case(str(error), about, position + 1, values))
@@ -212,14 +213,13 @@ def _each_once(lines: Sequence[str]) -> list[str]:
 def _field(deck: Table, key: str) -> Any:
     """Find the field of a checked deck that a dotted key means; None for an entry of an array."""
     here: Any = deck
-    parts = key.split(".")
-    for part in parts[:-1]:
+    *parents, last = key.split(".")
+    for part in parents:
         if isinstance(here, list | tuple):
             here = here[int(part) - 1]
         else:
-            names = {info.alias or name: name for name, info in type(here).model_fields.items()}
-            here = getattr(here, names[part])
-    return type(here).known_keys()[parts[-1]] if isinstance(here, Table) else None
+            here = getattr(here, next(n for n, f in type(here).model_fields.items() if part in (n, f.alias)))
+    return type(here).known_keys()[last] if isinstance(here, Table) else None
 
 
 def _axis(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
@@ -228,25 +228,16 @@ def _axis(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
     values = entry.values or ()
     if isinstance(kind, WordOr) and isinstance(kind.kind, Quantity | Whole) and kind.word not in values:
         kind = kind.kind  # a number like any other
-    units = ""
-    if isinstance(kind, Quantity | Whole):
-        units = (kind.dimension.unit or "1") if isinstance(kind, Quantity) else "1"
-    axis = Axis(
-        entry.key,
-        entry.label,
-        units,
-        (info.description or "").partition(";")[0] if info else "",
-        kind,
-        values,
-    )
+    units = {Quantity: getattr(kind, "dimension", NUMBER).unit or "1", Whole: "1"}.get(type(kind), "")
+    long_name = (info.description or "").partition(";")[0] if info else ""
+    axis = Axis(entry.key, entry.label, units, long_name, kind, values)
     if entry.range is None:
         return axis
     bounds = _bounds(axis, entry, study)
     if combine == "lhs":
         return axis
-    count = entry.count or 0
-    spread = [_between(axis, bounds, entry.scale, part) for part in np.linspace(0.0, 1.0, count)]
-    return Axis(axis.key, axis.name, units, axis.long_name, kind, tuple(spread))
+    parts = np.linspace(0.0, 1.0, entry.count or 0)
+    return replace(axis, values=tuple(_between(axis, bounds, entry.scale, part) for part in parts))
 
 
 def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
@@ -279,11 +270,8 @@ def _between(axis: Axis, bounds: tuple[float, float], scale: str, part: float) -
         value = low * (high / low) ** float(part)
     else:
         value = low + (high - low) * float(part)
-    if isinstance(axis.kind, Whole):
-        return round(value)
-    if isinstance(axis.kind, Quantity) and axis.kind.dimension is ANGLE:
-        return f"{value!r} rad"
-    return value
+    assert axis.kind is not None
+    return round(value) if isinstance(axis.kind, Whole) else axis.kind.written(value)
 
 
 def _settings(file: StudyFile, axes: Sequence[Axis], study: str) -> list[dict[str, Any]]:

@@ -46,6 +46,10 @@ class Axis:
         How the deck reads a value.
     values : tuple
         The values as a deck would say them; empty for a range in a Latin hypercube.
+    bounds : (float, float) or None
+        The ends of a range in SI.
+    scale : str
+        How values lie in a range: linear or log.
     """
 
     key: str
@@ -54,6 +58,22 @@ class Axis:
     long_name: str
     kind: Kind | None
     values: tuple[Any, ...]
+    bounds: tuple[float, float] | None = None
+    scale: str = "linear"
+
+    def at(self, part: float) -> Any:
+        """Return the value at a fraction of the way, as a deck would say it."""
+        if self.bounds is None:
+            return self.values[int(part * len(self.values))]
+        low, high = self.bounds
+        if part in (0.0, 1.0):
+            value = self.bounds[int(part)]
+        elif self.scale == "log":
+            value = low * (high / low) ** part
+        else:
+            value = low + (high - low) * part
+        assert self.kind is not None
+        return round(value) if isinstance(self.kind, Whole) else self.kind.written(value)
 
     def coordinate(self, value: Any) -> float | str:
         """Return what the result says for a value: a number in SI, or the text of what is no number."""
@@ -233,11 +253,9 @@ def _axis(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
     axis = Axis(entry.key, entry.label, units, long_name, kind, values)
     if entry.range is None:
         return axis
-    bounds = _bounds(axis, entry, study)
-    if combine == "lhs":
-        return axis
-    parts = np.linspace(0.0, 1.0, entry.count or 0)
-    return replace(axis, values=tuple(_between(axis, bounds, entry.scale, part) for part in parts))
+    axis = replace(axis, bounds=_bounds(axis, entry, study), scale=entry.scale)
+    parts = np.linspace(0.0, 1.0, 0 if combine == "lhs" else entry.count or 0).tolist()
+    return replace(axis, values=tuple(map(axis.at, parts)))
 
 
 def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
@@ -261,24 +279,11 @@ def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
     return low, high
 
 
-def _between(axis: Axis, bounds: tuple[float, float], scale: str, part: float) -> Any:
-    """Return the value at a fraction of a range, as a deck would say it."""
-    low, high = bounds
-    if part in (0.0, 1.0):
-        value = bounds[int(part)]
-    elif scale == "log":
-        value = low * (high / low) ** float(part)
-    else:
-        value = low + (high - low) * float(part)
-    assert axis.kind is not None
-    return round(value) if isinstance(axis.kind, Whole) else axis.kind.written(value)
-
-
 def _settings(file: StudyFile, axes: Sequence[Axis], study: str) -> list[dict[str, Any]]:
     """Return the parameters of each case."""
     keys = [axis.key for axis in axes]
     if file.combine == "lhs":
-        return _latin_hypercube(file, axes, study)
+        return _latin_hypercube(file, axes)
     count = math.prod(len(axis.values) for axis in axes)
     if file.combine == "grid":
         if count > MOST_CASES:
@@ -287,21 +292,13 @@ def _settings(file: StudyFile, axes: Sequence[Axis], study: str) -> list[dict[st
     return [dict(zip(keys, row, strict=True)) for row in zip(*(a.values for a in axes), strict=True)]
 
 
-def _latin_hypercube(file: StudyFile, axes: Sequence[Axis], study: str) -> list[dict[str, Any]]:
+def _latin_hypercube(file: StudyFile, axes: Sequence[Axis]) -> list[dict[str, Any]]:
     from scipy.stats import qmc
 
     # `seed` is called `rng` in later versions of scipy, which still know it.
     sampler = qmc.LatinHypercube(len(axes), seed=np.random.default_rng(file.seed))
-    cases: list[dict[str, Any]] = []
-    for row in sampler.random(file.samples or 1):
-        values = {}
-        for axis, entry, part in zip(axes, file.parameter, row, strict=True):
-            if entry.range is None:
-                values[axis.key] = axis.values[int(part * len(axis.values))]
-            else:
-                values[axis.key] = _between(axis, _bounds(axis, entry, study), entry.scale, float(part))
-        cases.append(values)
-    return cases
+    rows = sampler.random(file.samples or 1).tolist()
+    return [{axis.key: axis.at(part) for axis, part in zip(axes, row, strict=True)} for row in rows]
 
 
 _TAKEN = ("case", "step", "status", "exit_code", "message", "case_number", "case_seconds")

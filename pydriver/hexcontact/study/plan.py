@@ -119,18 +119,6 @@ class Plan:
     cases: tuple[PlannedCase, ...]
 
 
-@dataclass(frozen=True)
-class _StudySource(Source):
-    """Points at the study for what it set, at the deck for the rest."""
-
-    study: str = ""
-
-    def locate(self, key: str) -> str:
-        """Return "study.toml: parameter " or the place in the deck."""
-        place = super().locate(key)
-        return f"{self.study}: parameter " if place == "override: " else place
-
-
 def hash_of(deck: str) -> str:
     """Return the name of a case: a hash of the text of its deck."""
     return hashlib.sha256(deck.encode()).hexdigest()[:20]
@@ -164,7 +152,8 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     """
     base = {key: value for key, value in base.items() if key != "output"} | _output(base)
     keys = frozenset(parameter.key for parameter in file.parameter)
-    about = _StudySource(source.name, source.text, keys, source.included, study)
+    mark = f"{study}: parameter "
+    about = replace(source, overrides=keys, of_override=mark)
     for key in keys:
         if key == "output" or key.startswith("output.file"):
             raise DeckError(f"{study}: parameter {key}: a study names the files of its cases itself")
@@ -172,7 +161,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     try:
         deck = Deck.parse(with_overrides(base, first), about)
     except DeckError as error:
-        raise DeckError(_with_case(str(error), about, 1, first), error.faults) from None
+        raise DeckError(_with_case(str(error), mark, 1, first), error.faults) from None
     axes = tuple(_axis(entry, deck, file.combine, study) for entry in file.parameter)
     _refuse_namesakes(axes, study)
     settings = _settings(file, axes, study)
@@ -184,7 +173,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
                 Case._made(assemble(merged, source=about))
             cases.append(PlannedCase(position, values, as_toml(merged)))
         except DeckError as error:
-            sentences.append(_with_case(str(error), about, position + 1, values))
+            sentences.append(_with_case(str(error), mark, position + 1, values))
     if sentences:
         lines = _each_once("\n".join(sentences).splitlines())
         if (more := len(lines) - _MOST_TOLD) > 0:
@@ -203,9 +192,8 @@ def _output(base: Mapping[str, Any]) -> dict[str, Any]:
     return {"output": kept} if kept else {}
 
 
-def _with_case(error: str, source: _StudySource, number: int, settings: Mapping[str, Any]) -> str:
+def _with_case(error: str, mark: str, number: int, settings: Mapping[str, Any]) -> str:
     """Say with which parameters a deck is wrong where the key itself is none of them."""
-    mark = f"{source.study}: parameter "
     named = f" (in case {number}: {described(settings)})"
     keys = tuple(settings)
     lines = []

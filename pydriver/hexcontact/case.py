@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .core.lattice import Lattice
-from .deck.faults import Source
 from .deck.read import assemble
+from .deck.tables import Grid, Solver
 from .deck.toml import refuse_deep
 from .deck.write import plain
 from .errors import DeckError
@@ -132,35 +132,20 @@ class Case(Problem):
             loads = {"normal_load": normal_load, "approach": approach, "steps": steps}
         elif normal_load is not None or approach is not None or steps is not None:
             raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
+        arguments = locals()
         data = {
             "title": title or None,
             "body": {"1": body_1, "2": body_2},
             "friction": {"coefficient": friction_coefficient},
-            "grid": {
-                "spacing": spacing,
-                "nodes_across": nodes_across,
-                "nodes_in_radius": nodes_in_radius,
-                "extent": extent,
-                "window": window,
-                "center": center,
-                "origin": origin,
-            },
-            "solver": {
-                "algorithm": algorithm,
-                "method": method,
-                "tolerance": tolerance,
-                "coupling": coupling,
-                "entry": entry,
-                "step_tolerance": step_tolerance,
-            },
+            "grid": {key: arguments[key] for key in Grid.model_fields},
+            "solver": {key: arguments[key] for key in Solver.model_fields},
             "accuracy": {"target": accuracy} if isinstance(accuracy, int | float) else accuracy,
             "load": [loads] if isinstance(loads, Mapping) else loads,
             "output": {"fields": fields, "every": every},
         }
         refuse_deep(data, "")
         data = {key: value for key, value in plain(data).items() if value or key not in _LEFT_OUT}
-        data["load"] = with_radians(data["load"])
-        self._set_up(assemble(data, None, Source(), Path()), own_gap, lattice)
+        self._set_up(assemble({**data, "load": with_radians(data["load"])}), own_gap, lattice)
 
     def run(
         self,

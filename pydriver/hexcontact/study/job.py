@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .._version import __version__
 from ..errors import HexcontactError, ResourceError
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ class Outcome:
         Wall time of this attempt.
     lasting : bool
         Whether a failure is of the case itself, not of the circumstances.
+    hexcontact_version : str
+        The version of the program that has run it.
     """
 
     hash: str
@@ -55,6 +58,7 @@ class Outcome:
     message: str = ""
     seconds: float = 0.0
     lasting: bool = True
+    hexcontact_version: str = __version__
 
 
 def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:

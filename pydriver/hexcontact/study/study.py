@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from .._version import __version__
 from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
 from ..deck.toml import read_toml
@@ -302,7 +303,6 @@ class Study:
         DeckError, ResourceError
             If it cannot be written.
         """
-        from .._version import __version__
         from . import collect as study_collect
 
         self.folder.enter(self.plan)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import reals
-from ..core import contact as native
+from ..core.contact import shaped
 from ..core.lattice import Lattice
 from ..deck.surfaces import Separation
 from ..deck.units import LENGTH, UnitError, to_si
@@ -53,7 +53,7 @@ def given_gap(gap: Any, lattice: Lattice | None) -> GivenGap | None:
             "gap: an array needs lattice=..., at whose nodes it is given; heights on a rectangular grid "
             "are given as an xarray.DataArray with the coordinates x and y (m)"
         )
-    return native.shaped(gap, lattice, "gap").copy()
+    return shaped(gap, lattice, "gap").copy()
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ from typing import Literal, NamedTuple
 
 from ..deck.faults import MISSING, Mistake
 from ..deck.kinds import SMALLEST
-from ..deck.series import LOADS, MOST_STEPS
+from ..deck.series import MOST_STEPS
 from ..deck.tables import Load, Segment
+from ..variables import LOADS
 
 Control = Literal["force", "displacement"]
 Motion = Literal["z", "x", "y", "twist"]

@@ -12,9 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import contact as native
-from ..core import friction as native_friction
-from ..core import memory
+from ..core import contact, friction, memory
 from ..core.contact import ElasticPair, Method
 from ..core.lattice import Lattice
 from ..deck import toml
@@ -258,13 +256,13 @@ class Problem:
         """Return the memory (bytes) that solving on a window takes, with a contact as large as estimated."""
         method, shape = self.method_for(lattice), lattice.shape
         disc = math.pi * self._contact_radius**2 / lattice.cell_area
-        contact = math.ceil(min(disc, lattice.size))
+        nodes = math.ceil(min(disc, lattice.size))
         if not self.frictional:
-            return native.memory_needed(method, *shape, contact=contact, threads=memory.threads())
-        return native_friction.memory_needed(
+            return contact.memory_needed(method, *shape, contact=nodes, threads=memory.threads())
+        return friction.memory_needed(
             method,
             *shape,
-            contact=contact,
+            contact=nodes,
             loads=max(sum(t.control == "force" for t in step.targets) for step in self.load_steps),
             coupled=self.coupled,
             threads=memory.threads(),

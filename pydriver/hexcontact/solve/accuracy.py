@@ -21,9 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deck.series import LOADS
 from ..result.trials import Solution
-from ..variables import ESTIMATED
+from ..variables import ESTIMATED, LOADS
 
 if TYPE_CHECKING:
     from ..problem.loads import LoadStep

@@ -18,12 +18,11 @@ from ..core import contact, memory
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
 from ..core.edges import ContactEdges
 from ..core.estimators import area_radius, pressure_center
-from ..deck.series import LOADS
 from ..errors import DeckError
 from ..problem.loads import MOTIONS
 from ..result.step import Step
 from ..text import listed
-from ..variables import FIELDS
+from ..variables import FIELDS, LOADS
 from .events import Listener
 
 if TYPE_CHECKING:

@@ -80,7 +80,7 @@ class Gap:
 
     @property
     def first_touch(self) -> tuple[float, float] | None:
-        """Point (m) where the bodies touch first; None if nothing tells."""
+        """Point (m) where the bodies touch first; None if it is not known."""
         known = isinstance(self.source, Separation | HeightMap)
         return self.source.first_touch[:2] if known else None  # type: ignore[union-attr]
 
@@ -113,7 +113,7 @@ class Gap:
         return isinstance(self.source, HeightMap) and self.source.ends_within(distance, x, y)
 
     def __eq__(self, other: object) -> bool:
-        """Whether two gaps are the same wherever that can be told."""
+        """Whether two gaps are the same; two functions are if they are one object."""
         if not isinstance(other, Gap):
             return NotImplemented
         if self.at_nodes and other.at_nodes:

@@ -31,7 +31,7 @@ from .window import Estimate, NoContactFound
 
 Array = NDArray[np.float64]
 
-# Windows of up to so many nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
+# Windows of up to this number of nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
 MOST_DIRECT_NODES = 200
 _SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
 
@@ -56,7 +56,7 @@ class Problem:
     load_steps : tuple of LoadStep
         The history; a segment in adaptive steps is one of them.
     output : Output
-        What is kept.
+        What is written, and where.
     deck : Deck
         The deck, checked and in SI.
     deck_file : Path or None
@@ -297,7 +297,7 @@ class Problem:
         return case
 
     def __eq__(self, other: object) -> bool:
-        """Whether two cases are the same problem, solved and kept in the same way."""
+        """Whether two cases are the same problem, with the same solver and output."""
         if not isinstance(other, Problem):
             return NotImplemented
         mine, others = ((one._gap, one.deck, one.load_steps, one.lattice) for one in (self, other))
@@ -318,7 +318,7 @@ class Problem:
     # --- the window -----------------------------------------------------------------------------------------
 
     def _refinement_problems(self, wanted: Accuracy) -> list[Mistake]:
-        """Complain about what cannot be refined, or not far enough for errors to be told."""
+        """Return what prevents a refinement that is fine enough to estimate errors."""
         if self._gap.at_nodes:
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]

@@ -41,15 +41,15 @@ __all__ = ["Outcome", "PlannedCase", "Study", "StudyWatcher", "run_study"]
 
 
 class StudyWatcher:
-    """Is told how a study goes on; this one says nothing."""
+    """Follows a run of a study; this one does nothing."""
 
     @contextlib.contextmanager
     def watching(self, study: Study, missing: int) -> Iterator[None]:
-        """Be there for a study of which so many cases are missing."""
+        """Follow a run of `missing` cases, from its beginning to its end."""
         yield
 
     def finished(self, case: PlannedCase, outcome: Outcome) -> None:
-        """Hear of a case that was run."""
+        """Take note of a case that was run."""
 
 
 class Study:
@@ -196,7 +196,7 @@ class Study:
         retry : bool
             Run cases again that did not converge, or outgrew their window.
         watcher : StudyWatcher, optional
-            Who is told of each case.
+            Follows the run.
         cancel : threading.Event, optional
             Set by another thread, it ends the run; finished cases are kept.
 

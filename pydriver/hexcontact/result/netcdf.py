@@ -90,6 +90,7 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     """Create a file; in the end close it, add its checksum and flush it to disk."""
     import netCDF4
 
+    memory.give_back()
     memory.claim(memory.WRITING)  # it crashes without
     try:
         with _alone():

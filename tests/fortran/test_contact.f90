@@ -5,6 +5,7 @@ module test_contact
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control, normal
+  use hc_field_space, only: field_space_t
   use hc_contact_residuals, only: normal_residual, force_residual
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact

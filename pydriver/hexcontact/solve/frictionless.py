@@ -39,7 +39,7 @@ S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
 # Measured by tests/bench/memory.py.
-_WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
+_WRITING = 18 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
 _LOADED = 3 * 2**20  # bytes of modules that a run imports on its way
 _LEFT = 0.5  # share of what solving takes that operators and states have when the output is written
 _PART = {
@@ -84,7 +84,7 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:
-    """Return the memory (bytes) of operators on parts of the window around a growing contact, and of kept spectra.
+    """Return the bytes of operators on parts of the window around a growing contact, and of kept spectra.
 
     Of n steps in which it grows, about log2(n) need a part that is larger by much.
     """

@@ -14,7 +14,6 @@ import os
 import re
 import shutil
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,35 +21,11 @@ from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import require_ordinary, text_of
 from ..result.lock import Lock
 from ..result.netcdf import flush
+from .job import Outcome
 from .plan import Plan, PlannedCase, hash_of
 
 _INDEX = "index.json"
 _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fails in the same way again
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a case has ended.
-
-    Attributes
-    ----------
-    hash : str
-        Name of the case.
-    exit_code : int
-        0 if it is done, else what ``hexcontact run`` would have exited with.
-    message : str
-        Why it failed.
-    seconds : float
-        Wall time of this attempt.
-    lasting : bool
-        Whether a failure is of the case itself, not of the circumstances.
-    """
-
-    hash: str
-    exit_code: int = 0
-    message: str = ""
-    seconds: float = 0.0
-    lasting: bool = True
 
 
 class StudyFolder:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from ..errors import AccuracyWarning, DeckError
-from ..result.history import step_rows
-from ..result.remarks import remarks
+from ..result.history import remarks, step_rows
 from ..result.store import open_result
 from ..solve import log
 from ..solve import run as solve

@@ -18,9 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ConvergenceError, DeckError, ResourceError
-from ..files import require_ordinary, text_of
-from ..result.lock import Lock
-from ..result.netcdf import flush
+from ..files import replacing, require_ordinary, text_of
+from ..lock import Lock
 from .job import Outcome
 from .plan import Plan, PlannedCase, hash_of
 
@@ -94,17 +93,11 @@ class StudyFolder:
         self._write(_INDEX, {"index_version": 1, "cases": self._entries})
 
     def _write(self, name: str, content: Any) -> None:
-        temporary = self.folder / f"{name}.{os.getpid()}.tmp"
+        text = json.dumps(content, indent=1, ensure_ascii=False, default=str)
         try:
-            with temporary.open("w", encoding="utf-8") as file:
-                json.dump(content, file, indent=1, ensure_ascii=False, default=str)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, self.folder / name)
-            flush(self.folder)
+            with replacing(self.folder / name) as path:
+                path.write_text(text, encoding="utf-8")
         except OSError as error:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
             raise ResourceError(f"cannot write {self.folder / name}: {error.strerror or error}") from error
 
     def number(self, case: PlannedCase) -> int:

@@ -165,14 +165,6 @@ def test_equations_that_pages_and_sources_cite_are_there() -> None:
             assert set(re.findall(r"\((\w+)\)", cited)) <= set(numbers[page]), path
 
 
-def test_procedures_that_a_load_passes_are_there() -> None:
-    page = (DOCS / "developer.md").read_text(encoding="utf-8")
-    way = re.findall(r"^\| `(\w+/[\w/.]+)` \| `(\w+)` \|", page, re.MULTILINE)
-    assert len(way) > 20
-    for file, name in way:
-        assert re.search(rf"\b(?:def|class|subroutine) {name}\b", (ROOT / file).read_text()), (file, name)
-
-
 def test_every_public_name_is_in_the_python_reference() -> None:
     page = (DOCS / "api.md").read_text(encoding="utf-8")
     documented = set(re.findall(r"^\.\. auto\w+:: hexcontact\.([\w.]+)$", page, re.MULTILINE))

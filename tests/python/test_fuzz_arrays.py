@@ -358,8 +358,8 @@ def odd_gap(seed: int) -> tuple[Lattice, NDArray[Any], NDArray[Any], dict[str, f
     candidate = rng.random(lattice.shape) < rng.choice([0.8, 1.0])
     candidate[half, half] = True
     if rng.random() < 0.5:
-        return lattice, gap, candidate, {"normal_load": 10 ** rng.uniform(-8, 4)}
-    return lattice, gap, candidate, {"approach": gap[candidate].min() + 10 ** rng.uniform(-8, 3)}
+        return lattice, gap, candidate, {"normal_load": 10 ** rng.uniform(-4, 4)}
+    return lattice, gap, candidate, {"approach": gap[candidate].min() + 10 ** rng.uniform(-4, 3)}
 
 
 @pytest.mark.parametrize("block", range(4))

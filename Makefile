@@ -176,6 +176,7 @@ docs-links: install $(STAMPS)/extra-docs  ## the same, and check the addresses o
 
 pictures: install  ## draw the pictures of docs/images again, with the outputs shown in docs/tutorial.md and others
 	$(py) docs/images/make.py
+	$(py) docs/images/rooms.py
 	$(py) docs/site/played.py --write
 
 editable: $(STAMPS)/build-tools $(STAMPS)/extra-test $(STAMPS)/extra-lint  ## developers: import from pydriver/, rebuilt when imported

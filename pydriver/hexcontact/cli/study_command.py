@@ -124,7 +124,7 @@ def interrupted(study: Study) -> str:
     )
 
 
-def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard: tuple[int, int]) -> Outcome:
+def run_case(study: Study, number: int, retry: bool, listeners: Listeners, pipe: tuple[int, int]) -> Outcome:
     """Run one case for a job array; signals end the process unless it is done, and what is finished stays."""
     from ..solve.progress import reporter
 
@@ -133,7 +133,7 @@ def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard
     try:
         in_background(
             lambda: outcomes.append(study.run_case(number, retry, shown)),
-            heard,
+            pipe,
             lambda _: not (outcomes or study.has(number)),
         )
     except Interrupted as signaled:

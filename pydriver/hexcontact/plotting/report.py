@@ -21,9 +21,9 @@ from .._version import __version__
 from ..cli import tables as summary
 from ..errors import DeckError
 from ..files import replacing
+from ..problem.overview import case_rows
 from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, remarks, step_rows, worth_showing
 from ..result.view import scaled
-from ..solve.overview import case_rows
 from ..text import escaped, quantity
 from ..variables import VARIABLES, label_of
 from .report_fields import kept_steps, maps_of, rounded

@@ -26,7 +26,8 @@ module hexcontact
                               out_of_range
   use hc_coulomb, only: coulomb_t
   use hc_contact_residuals, only: normal_residual, tangential_residual, force_residual
-  use hc_contact_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: contact_solver_t, friction_solver_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory

@@ -5,8 +5,7 @@
 !>
 !>     g = h + w - approach,   s = (u1 - u2) - shift - twist x r,   ds = s - s^n,
 !>
-!> where w, u1 - u2 are the flexibility operator's. `friction_solver_t` is what
-!> both methods, on LAPACK and on FFTs, look like from outside.
+!> where w, u1 - u2 are the flexibility operator's.
 module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
@@ -20,13 +19,12 @@ module hc_contact_problem
     loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
     tangential_residual, force_residual, least_traction
-  use hc_coulomb, only: coulomb_t
-  use hc_friction_rows, only: zone_row
+  use hc_coulomb, only: coulomb_t, zone_row
   use hc_transfer, only: restrict_field, restrict_mask
   implicit none
   private
 
-  public :: friction_problem_t, new_friction_problem, friction_solver_t
+  public :: friction_problem_t, new_friction_problem
   public :: classification_scale
 
   !> Scale kappa of the classification parameter: r = kappa/(2 pi lambda_1 (1 + gamma) a).
@@ -77,53 +75,6 @@ module hc_contact_problem
     !> Residuals of its loads alone
     procedure :: judge_loads
   end type friction_problem_t
-
-  !> A method of solving it.
-  type, abstract :: friction_solver_t
-    type(friction_problem_t) :: problem
-  contains
-    !> One load step
-    procedure(solve_step), deferred :: solve_step
-    !> Relative displacements (w, u_x, u_y) of given tractions
-    procedure(solver_displacements), deferred :: displacements
-  end type friction_solver_t
-
-  abstract interface
-    !> Tractions and motions at the end of a load step.
-    !>
-    !> `state%converged` tells whether all residuals are within the tolerance. The
-    !> accumulated quantities (slip path, dissipated energy) are left alone.
-    subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
-      import :: friction_solver_t, contact_state_t, load_target_t, wp, error_t
-      class(friction_solver_t), intent(inout), target :: self
-      !> State to start the iteration from; without pressure anywhere: none
-      type(contact_state_t), intent(in) :: start
-      !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
-      real(wp), intent(in) :: reference(:, :, :)
-      !> Loads or motions to be reached
-      type(load_target_t), intent(in) :: target
-      !> Bound of all residuals
-      real(wp), intent(in) :: tolerance
-      !> Active sets that may be tried
-      integer, intent(in) :: max_sweeps
-      !> State at the end of the step, converged or not
-      type(contact_state_t), intent(out) :: state
-      !> Allocated on failure: memory, an operator that is not positive definite
-      type(error_t), allocatable, intent(out) :: error
-    end subroutine solve_step
-
-    !> Relative displacements (w, u_x, u_y) of given tractions.
-    subroutine solver_displacements(self, pressure, traction, displacement, error)
-      import :: friction_solver_t, wp, error_t
-      class(friction_solver_t), intent(inout) :: self
-      !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
-      real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
-      !> w, u_x, u_y (n_col, n_row, 3) [m]
-      real(wp), intent(out), contiguous :: displacement(:, :, :)
-      !> Allocated on failure
-      type(error_t), allocatable, intent(out) :: error
-    end subroutine solver_displacements
-  end interface
 
 contains
 

@@ -9,8 +9,7 @@ module hc_contact_residuals
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, touches_rim, force_control, normal, separated, slip, within_tolerance, &
     not_finite
-  use hc_coulomb, only: coulomb_t
-  use hc_friction_rows, only: residual_row
+  use hc_coulomb, only: coulomb_t, residual_row
   implicit none
   private
 

@@ -13,16 +13,21 @@
 !>
 !> where D tends to |ds|/(mu p). The direction of slip is thus that of -ds, and
 !> it converges quadratically.
+!>
+!> Passes over one row of nodes are written so that the compiler takes several nodes at a time: lengths of vectors are
+!> roots of sums of squares there, and pressures have to come in a unit of their own size.
 module hc_coulomb
   use hc_precision, only: wp
-  use hc_contact_state, only: stick, slip
+  use hc_contact_state, only: separated, stick, slip
   implicit none
   private
 
-  public :: coulomb_t, linearize, on_cone, normal_to, magnitude
+  public :: coulomb_t, linearize, on_cone, normal_to, magnitude, residual_row, zone_row, cone_row
 
   !> Slope of the bound without slip, where pressures are in units of the largest
   real(wp), parameter :: unbounded = 1.0e100_wp
+  !> Squares below this count as nothing
+  real(wp), parameter :: nothing = 1.0e-200_wp
   !> Smallest bound of the traction that counts in D, relative to the largest
   real(wp), parameter :: smallest_bound = 1.0e-12_wp
 
@@ -133,5 +138,76 @@ contains
     real(wp) :: t(2)
     t = [-direction(2), direction(1)]
   end function normal_to
+
+  !> What the tractions of a row lack of Coulomb's law, |q - P(q - ds/d_t)|, squared.
+  pure subroutine residual_row(n, unit, slope, stiffness, p, qx, qy, dsx, dsy, largest, worst)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of pressure; slope of Coulomb's law; inverse of d_t [Pa/m]
+    real(wp), intent(in) :: unit, slope, stiffness
+    !> Pressure, traction and slip of the step
+    real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
+    !> Squares of the largest traction and of what is lacking most, in the unit of pressure: those of the rows before,
+    !> and now of this one too
+    real(wp), intent(inout) :: largest, worst
+    real(wp) :: x, y, trial_x, trial_y, length, share
+    integer :: i
+
+    !$omp simd reduction(max: largest, worst) private(x, y, trial_x, trial_y, length, share)
+    do i = 1, n
+      x = unit*qx(i)
+      y = unit*qy(i)
+      trial_x = x - unit*stiffness*dsx(i)
+      trial_y = y - unit*stiffness*dsy(i)
+      length = sqrt(max(trial_x**2 + trial_y**2, nothing))
+      share = min(slope*max(unit*p(i), 0.0_wp)/length, 1.0_wp)
+      largest = max(largest, merge(x**2 + y**2, 0.0_wp, p(i) > 0.0_wp))
+      worst = max(worst, merge((x - share*trial_x)**2 + (y - share*trial_y)**2, 0.0_wp, p(i) > 0.0_wp))
+    end do
+  end subroutine residual_row
+
+  !> Zones of a row: |q - r ds| tells.
+  pure subroutine zone_row(n, unit, slope, r, p, qx, qy, dsx, dsy, zone)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of pressure; slope of Coulomb's law; classification parameter [Pa/m]
+    real(wp), intent(in) :: unit, slope, r
+    !> Pressure, traction and slip of the step
+    real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
+    !> separated, stick or slip
+    integer, intent(out) :: zone(n)
+    real(wp) :: x, y
+    integer :: i
+
+    !$omp simd private(x, y)
+    do i = 1, n
+      x = unit*(qx(i) - r*dsx(i))
+      y = unit*(qy(i) - r*dsy(i))
+      zone(i) = merge(stick, slip, x**2 + y**2 <= (slope*unit*p(i))**2)
+      zone(i) = merge(zone(i), separated, p(i) > 0.0_wp)
+    end do
+  end subroutine zone_row
+
+  !> Tractions of a row cut to the cone; none where there is no pressure.
+  pure subroutine cone_row(n, unit, slope, p, qx, qy, cut_x, cut_y)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of pressure; slope of Coulomb's law
+    real(wp), intent(in) :: unit, slope
+    !> Pressure and traction
+    real(wp), intent(in) :: p(n), qx(n), qy(n)
+    !> What is left of the traction
+    real(wp), intent(out) :: cut_x(n), cut_y(n)
+    real(wp) :: length, share
+    integer :: i
+
+    !$omp simd private(length, share)
+    do i = 1, n
+      length = sqrt(max((unit*qx(i))**2 + (unit*qy(i))**2, nothing))
+      share = merge(min(slope*max(unit*p(i), 0.0_wp)/length, 1.0_wp), 0.0_wp, p(i) > 0.0_wp)
+      cut_x(i) = share*qx(i)
+      cut_y(i) = share*qy(i)
+    end do
+  end subroutine cone_row
 
 end module hc_coulomb

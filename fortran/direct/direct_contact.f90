@@ -13,9 +13,10 @@ module hc_direct_contact
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target, force_control, &
+  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, force_control, &
     sweeps_used_up, no_progress
   use hc_contact_residuals, only: normal_self_compliance, conclude
+  use hc_contact_solver, only: contact_solver_t
   implicit none
   private
 
@@ -25,7 +26,7 @@ module hc_direct_contact
   integer, parameter :: patience = 10
 
   !> A frictionless contact problem with its flexibility.
-  type :: direct_contact_t
+  type, extends(contact_solver_t) :: direct_contact_t
     private
     type(dense_flexibility_t) :: flexibility
     !> Initial gap (n_col, n_row) [m]
@@ -35,6 +36,7 @@ module hc_direct_contact
     !> Self-compliance of a node [m/Pa]
     real(wp) :: compliance = 0.0_wp
   contains
+    procedure :: solve_step
     !> Solve for a normal load or an approach
     procedure :: solve
   end type direct_contact_t
@@ -63,6 +65,29 @@ contains
     self%compliance = normal_self_compliance(lattice, pair)
     call new_dense_flexibility(self%flexibility, lattice, pair, error)
   end subroutine new_direct_contact
+
+  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(direct_contact_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+    logical :: again
+
+    again = allocated(start%pressure)
+    if (again) again = any(start%pressure > 0.0_wp)
+    associate (reference => reference)
+      if (again) then
+        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, &
+                        start%pressure > 0.0_wp)
+      else
+        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
+      end if
+    end associate
+  end subroutine solve_step
 
   !> Solve for a normal load or an approach.
   subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)

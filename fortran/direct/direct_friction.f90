@@ -14,7 +14,8 @@ module hc_direct_friction
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
     normal, along_x, force_control, displacement_control, loads_not_carried
   use hc_coulomb, only: linearize, on_cone
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_load_constraints, only: overloads
   use hc_direct_contact, only: first_guess, exchange, patience
   use hc_direct_system, only: iterate_t, infinite, unloaded, solve_area

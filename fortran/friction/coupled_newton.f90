@@ -13,7 +13,7 @@ module hc_coupled_newton
   use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t, rounding
   use hc_staggered_newton, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
-  use hc_friction_systems, only: coupled_system_t
+  use hc_coupled_system, only: coupled_system_t
   use hc_krylov, only: projected_gmres, fulfil
   implicit none
   private

@@ -9,11 +9,12 @@ module hc_friction_iterate
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
-  use hc_friction_rows, only: residual_row, cone_row
+  use hc_coulomb, only: residual_row, cone_row
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
   use hc_elastic_operators, only: operators_t
-  use hc_friction_systems, only: pressure_system_t, shear_system_t, new_shear_system
+  use hc_pressure_system, only: pressure_system_t
+  use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_krylov, only: solution_accurate
   use hc_field_space, only: field_space_t
   implicit none

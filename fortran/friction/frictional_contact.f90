@@ -10,7 +10,8 @@ module hc_frictional_contact
   use hc_field_space, only: space_over
   use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_elastic_operators, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_level
   use hc_fas_predictor, only: predict

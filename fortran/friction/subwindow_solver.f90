@@ -8,7 +8,8 @@ module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_window_part, only: frame, is_worth, part_of, worth

@@ -15,7 +15,8 @@ module hc_contact_entry
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, normal, force_control
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   implicit none
   private
 

@@ -10,7 +10,8 @@ module test_direct_friction
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
     stick, slip, normal, along_x, along_y, about_z
   use hc_coulomb, only: coulomb_t
-  use hc_contact_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact, exchange, patience
   use hc_block_cholesky, only: solve_blocks

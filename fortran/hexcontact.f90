@@ -24,6 +24,8 @@ module hexcontact
                               load_target_t, force_control, displacement_control, about_z, n_motion, touches_rim, &
                               not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, &
                               out_of_range
+  use hc_friction_law, only: friction_law_t
+  use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_coulomb, only: coulomb_t
   use hc_contact_residuals, only: normal_residual, tangential_residual, force_residual
   use hc_contact_problem, only: friction_problem_t, new_friction_problem

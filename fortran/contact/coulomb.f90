@@ -17,7 +17,11 @@
 !> Passes over one row of nodes are written so that the compiler takes several nodes at a time: lengths of vectors are
 !> roots of sums of squares there, and pressures have to come in a unit of their own size.
 module hc_coulomb
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_friction_law, only: friction_law_t
   use hc_contact_state, only: separated, stick, slip
   implicit none
   private
@@ -32,7 +36,7 @@ module hc_coulomb
   real(wp), parameter :: smallest_bound = 1.0e-12_wp
 
   !> Coulomb's law.
-  type :: coulomb_t
+  type, extends(friction_law_t) :: coulomb_t
     !> Coefficient of friction mu; not used without slip
     real(wp) :: coefficient = 0.0_wp
     !> An infinite coefficient: no node in contact slips
@@ -42,8 +46,8 @@ module hc_coulomb
     procedure :: bound
     !> The same over the pressure
     procedure :: slope
-    !> Is there any friction?
-    procedure :: resists
+    procedure :: resists, is_bounded, check, strength, find_bounds, find_slopes, find_zones, project, violation
+    procedure :: linearize => linearize_row
   end type coulomb_t
 
 contains
@@ -67,10 +71,118 @@ contains
   end function slope
 
   !> Is there any friction?
-  elemental logical function resists(self)
+  pure logical function resists(self)
     class(coulomb_t), intent(in) :: self
     resists = self%no_slip .or. self%coefficient > 0.0_wp
   end function resists
+
+  !> Does any node slip?
+  pure logical function is_bounded(self)
+    class(coulomb_t), intent(in) :: self
+    is_bounded = .not. self%no_slip
+  end function is_bounded
+
+  pure subroutine check(self, lattice, error)
+    class(coulomb_t), intent(in) :: self
+    type(lattice_t), intent(in) :: lattice
+    type(error_t), allocatable, intent(out) :: error
+    logical :: sound
+
+    sound = self%no_slip .or. ieee_is_finite(self%coefficient)
+    if (sound .and. .not. self%no_slip) sound = self%coefficient >= 0.0_wp
+    associate (same_everywhere => lattice)
+      if (sound) return
+      call raise(error, status%invalid_input, 'coefficient of friction: a finite number of at least 0 expected, or no_slip')
+    end associate
+  end subroutine check
+
+  pure real(wp) function strength(self)
+    class(coulomb_t), intent(in) :: self
+
+    strength = huge(1.0_wp)
+    if (.not. self%no_slip) strength = self%coefficient
+  end function strength
+
+  pure subroutine find_bounds(self, first, p, bound)
+    class(coulomb_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in), contiguous :: p(:)
+    real(wp), intent(out), contiguous :: bound(:)
+
+    associate (same_everywhere => first)
+      bound = self%bound(p)
+    end associate
+  end subroutine find_bounds
+
+  pure subroutine find_slopes(self, first, p, bound)
+    class(coulomb_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in), contiguous :: p(:)
+    real(wp), intent(out), contiguous :: bound(:)
+
+    associate (same_everywhere => first, linear_in => p)
+      bound = self%slope()
+    end associate
+  end subroutine find_slopes
+
+  pure subroutine find_zones(self, first, unit, r, p, qx, qy, dsx, dsy, zone)
+    class(coulomb_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: unit, r
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
+    integer, intent(out), contiguous :: zone(:)
+
+    associate (same_everywhere => first)
+      call zone_row(size(p), unit, self%slope(), r, p, qx, qy, dsx, dsy, zone)
+    end associate
+  end subroutine find_zones
+
+  pure subroutine project(self, first, unit, p, qx, qy, cut_x, cut_y)
+    class(coulomb_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: unit
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:)
+    real(wp), intent(out), contiguous :: cut_x(:), cut_y(:)
+
+    associate (same_everywhere => first)
+      call cone_row(size(p), unit, self%slope(), p, qx, qy, cut_x, cut_y)
+    end associate
+  end subroutine project
+
+  pure subroutine violation(self, first, unit, stiffness, p, qx, qy, dsx, dsy, largest, worst)
+    class(coulomb_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: unit, stiffness
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
+    real(wp), intent(inout) :: largest, worst
+
+    associate (same_everywhere => first)
+      call residual_row(size(p), unit, self%slope(), stiffness, p, qx, qy, dsx, dsy, largest, worst)
+    end associate
+  end subroutine violation
+
+  pure subroutine linearize_row(self, first, p_max, r, in_contact, p, qx, qy, dsx, dsy, zone, direction, compliance)
+    class(coulomb_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: p_max, r
+    logical, intent(in), contiguous :: in_contact(:)
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
+    integer, intent(out), contiguous :: zone(:)
+    real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
+    integer :: i
+
+    associate (same_everywhere => first, largest => self%bound(p_max))
+      do i = 1, size(p)
+        if (in_contact(i)) then
+          call linearize([qx(i), qy(i)], [dsx(i), dsy(i)], self%bound(p(i)), largest, r, zone(i), direction(:, i), compliance(i))
+        else
+          zone(i) = separated
+          direction(:, i) = [1.0_wp, 0.0_wp]
+          compliance(i) = 0.0_wp
+        end if
+      end do
+    end associate
+  end subroutine linearize_row
 
   !> Zone of a node in contact, and the linearised law if it slips.
   pure subroutine linearize(traction, slip_increment, bound, largest_bound, r, zone, direction, compliance)

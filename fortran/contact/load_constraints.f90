@@ -181,24 +181,27 @@ contains
     real(wp), intent(in) :: pressure(problem%lattice%extent(1), problem%lattice%extent(2)), residual_normal
     type(driven_motions_t) :: driven
     real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
-    real(wp) :: carried, error, factor, before
+    real(wp) :: carried, error, factor, before, bounds(size(pressure))
     integer :: k, try
 
     overloads = .false.
-    if (problem%friction%no_slip .or. .not. any(pressure > 0.0_wp)) return
+    if (.not. problem%friction%is_bounded() .or. .not. any(pressure > 0.0_wp)) return
     call new_driven_motions(driven, problem, target, pressure > 0.0_wp)
     associate (n => size(driven%motion), n_contact => count(pressure > 0.0_wp))
       load = [(driven%load(k, problem, target), k=1, n)]
       overloads = any(abs(load) > 0.0_wp) .and. .not. problem%friction%resists()
       if (overloads .or. n == 0) return
       allocate (u(n_contact, 2, n))
-      bound = problem%friction%bound(pack(pressure, pressure > 0.0_wp))
       error = residual_normal
+      carried = problem%lattice%cell_area()*sum(pressure, mask=pressure > 0.0_wp)
       if (target%control(normal) == force_control) then
-        carried = problem%friction%bound(target%value(normal))/problem%lattice%cell_area()
-        if (sum(bound) > 0.0_wp) bound = bound*(carried/sum(bound))
+        ! under the prescribed load
+        call problem%friction%find_bounds(1, target%value(normal)/carried*reshape(pressure, [size(pressure)]), bounds)
         if (.not. any(driven%motion == about_z)) error = 0.0_wp
+      else
+        call problem%friction%find_bounds(1, reshape(pressure, [size(pressure)]), bounds)
       end if
+      bound = pack(bounds, reshape(pressure > 0.0_wp, [size(pressure)]))
       if (error > trusted) return
       do k = 1, n
         field = driven%direction(k, problem)

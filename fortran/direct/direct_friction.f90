@@ -13,7 +13,6 @@ module hc_direct_friction
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
     normal, along_x, force_control, displacement_control, loads_not_carried
-  use hc_coulomb, only: linearize, on_cone
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_load_constraints, only: overloads
@@ -97,7 +96,7 @@ contains
     it%reference = reshape(reference, [n, 2])
     it%motion = merge(target%value, start%motion, target%control == displacement_control)
     allocate (it%p(n), it%compliance(n), source=0.0_wp)
-    allocate (it%q(n, 2), it%direction(n, 2), source=0.0_wp)
+    allocate (it%q(n, 2), it%direction(2, n), source=0.0_wp)
     allocate (it%zone(n), source=separated)
 
     if (any(start%pressure > 0.0_wp)) then
@@ -209,20 +208,16 @@ contains
     real(wp), intent(in) :: share
     !> Iterate
     type(iterate_t), intent(inout) :: it
-    real(wp) :: r, largest_bound
+    logical :: pressed(size(it%p))
+    real(wp) :: r
     integer :: i
 
     r = share*problem%classification_parameter(count(it%contact .and. it%p > 0.0_wp))
-    largest_bound = problem%friction%bound(maxval(it%p))
-    it%zone = separated
+    pressed = it%contact .and. it%p > 0.0_wp .and. problem%friction%resists() .and. problem%friction%is_bounded()
+    call problem%friction%linearize(1, maxval(it%p), r, pressed, it%p, it%q(:, 1), it%q(:, 2), it%ds(:, 1), it%ds(:, 2), &
+                                    it%zone, it%direction, it%compliance)
     do i = 1, size(it%p)
-      if (.not. it%contact(i)) cycle
-      if (it%p(i) > 0.0_wp .and. problem%friction%resists() .and. .not. problem%friction%no_slip) then
-        call linearize(it%q(i, :), it%ds(i, :), problem%friction%bound(it%p(i)), largest_bound, r, &
-                       it%zone(i), it%direction(i, :), it%compliance(i))
-      else
-        call enter(problem, it, i)
-      end if
+      if (it%contact(i) .and. .not. pressed(i)) call enter(problem, it, i)
     end do
   end subroutine classify
 
@@ -236,12 +231,12 @@ contains
     integer, intent(in) :: node
     real(wp) :: length
 
-    it%zone(node) = merge(stick, slip, problem%friction%no_slip)
-    it%compliance(node) = merge(0.0_wp, infinite, problem%friction%no_slip)
-    it%direction(node, :) = 0.0_wp
+    it%zone(node) = merge(slip, stick, problem%friction%is_bounded())
+    it%compliance(node) = merge(infinite, 0.0_wp, problem%friction%is_bounded())
+    it%direction(:, node) = 0.0_wp
     length = norm2(it%ds(node, :))
     if (length > negligible_slip*problem%tangential_compliance*maxval(it%p)) then
-      it%direction(node, :) = -it%ds(node, :)/length
+      it%direction(:, node) = -it%ds(node, :)/length
     end if
   end subroutine enter
 
@@ -254,7 +249,7 @@ contains
 
     is_adrift = .not. it%carried
     if (is_adrift .or. any(it%zone == stick)) return
-    is_adrift = sqrt(maxval(sum(it%q**2, dim=2)))/beyond_reason > problem%friction%bound(maxval(it%p))
+    is_adrift = sqrt(maxval(sum(it%q**2, dim=2)))/beyond_reason > problem%friction%largest_bound(maxval(it%p))
   end function is_adrift
 
   !> Let the nodes stick that are the closest to it: those whose compliance is below the (harmonic) mean.
@@ -337,16 +332,14 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: displacement(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3)
-    integer :: col, row
+    real(wp) :: p(size(it%p)), q(size(it%p), 2), unit
 
-    state%pressure = reshape(max(it%p, 0.0_wp), shape(state%pressure))
-    state%traction = reshape(it%q, shape(state%traction))
-    do row = 1, size(state%pressure, 2)
-      do col = 1, size(state%pressure, 1)
-        state%traction(col, row, :) = on_cone(state%traction(col, row, :), &
-                                              self%problem%friction%bound(state%pressure(col, row)))
-      end do
-    end do
+    call self%problem%normal_law%project(1, it%p, p)
+    unit = maxval(p)
+    if (unit > 0.0_wp) unit = 1.0_wp/unit
+    call self%problem%friction%project(1, unit, p, it%q(:, 1), it%q(:, 2), q(:, 1), q(:, 2))
+    state%pressure = reshape(p, shape(state%pressure))
+    state%traction = reshape(q, shape(state%traction))
     state%motion = it%motion
     call self%displacements(state%pressure, state%traction, displacement, error)
     if (allocated(error)) return

@@ -37,7 +37,7 @@ module hc_direct_system
     real(wp), allocatable :: gap(:), ds(:, :)
     !> Approach, shifts [m] and twist [rad]
     real(wp) :: motion(n_motion) = 0.0_wp
-    !> Frozen state of the nodes in contact: stick or slip, its direction (n, 2) and
+    !> Frozen state of the nodes in contact: stick or slip, its direction (2, n) and
     !> compliance across it; a node with an infinite one has no traction across
     integer, allocatable :: zone(:)
     real(wp), allocatable :: direction(:, :), compliance(:)
@@ -85,7 +85,7 @@ contains
     real(real32), allocatable :: first(:, :)
     logical :: solved
     integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), place(:)
-    real(wp) :: load(n_motion)
+    real(wp) :: load(n_motion), slope(size(it%p))
     integer :: i, k, n, n_p, n_free, stat
 
     contact = pack([(i, i=1, size(it%p))], it%contact)
@@ -109,12 +109,13 @@ contains
     weight(along_x, n_p + 1:n_p + size(stuck)) = 1.0_wp
     weight(along_y, n_p + size(stuck) + 1:n_p + 2*size(stuck)) = 1.0_wp
     do k = n_p + 2*size(stuck) + 1, n
-      weight(along_x:, k) = normal_to(it%direction(node(k), :))
+      weight(along_x:, k) = normal_to(it%direction(:, node(k)))
     end do
     traction = weight
+    call problem%friction%find_slopes(1, it%p, slope)
     do k = 1, n_p
-      if (it%zone(node(k)) == stick .or. problem%friction%no_slip) cycle
-      traction(along_x:, k) = problem%friction%coefficient*it%direction(node(k), :)
+      if (it%zone(node(k)) == stick .or. .not. problem%friction%is_bounded()) cycle
+      traction(along_x:, k) = slope(node(k))*it%direction(:, node(k))
     end do
 
     rigid = unloaded(problem, it)

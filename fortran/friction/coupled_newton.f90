@@ -60,8 +60,9 @@ contains
     active(:n) = now%contact
     active(n + 1:) = shear_active
     allocate (system%slope(n), source=0.0_wp)
-    if (.not. now%problem%friction%no_slip) then
-      where (now%contact .and. .not. shear_active(n + 1:)) system%slope = now%problem%friction%coefficient
+    if (now%problem%friction%is_bounded()) then
+      call now%problem%friction%find_slopes(1, now%p, system%slope)
+      where (.not. now%contact .or. shear_active(n + 1:)) system%slope = 0.0_wp
     end if
     x(:n) = now%p
     call now%shear%to_frame(now%q, x(n + 1:))

@@ -121,7 +121,7 @@ contains
     !> Fine state: tractions and motions change
     type(contact_state_t), intent(inout) :: state
     real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
-    real(wp) :: bound, length
+    real(wp) :: bound(size(state%pressure, 1)), length
     integer :: col, row
 
     allocate (change, mold=state%pressure)
@@ -137,6 +137,9 @@ contains
       do col = 1, size(slipping, 1)
         state%pressure(col, row) = merge(max(state%pressure(col, row) + change(col, row), 0.0_wp), 0.0_wp, &
                                          problem%candidate(col, row))
+      end do
+      call problem%friction%find_bounds((row - 1)*size(bound) + 1, state%pressure(:, row), bound)
+      do col = 1, size(slipping, 1)
         if (state%pressure(col, row) <= 0.0_wp) then
           state%traction(col, row, :) = 0.0_wp
           cycle
@@ -144,9 +147,10 @@ contains
         state%traction(col, row, :) = state%traction(col, row, :) + change_of_traction(col, row, :)
         ! what is interpolated between tractions on the cone lies inside, and would stick
         if (slipping(col, row) < 1.0_wp) cycle
-        bound = problem%friction%bound(state%pressure(col, row))
         length = magnitude(state%traction(col, row, :))
-        if (length > 0.0_wp .and. length < bound) state%traction(col, row, :) = state%traction(col, row, :)*(bound/length)
+        if (length > 0.0_wp .and. length < bound(col)) then
+          state%traction(col, row, :) = state%traction(col, row, :)*(bound(col)/length)
+        end if
       end do
     end do
     !$omp end parallel do

@@ -9,7 +9,6 @@ module hc_friction_iterate
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
-  use hc_coulomb, only: residual_row, cone_row
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
   use hc_elastic_operators, only: operators_t
@@ -255,7 +254,9 @@ contains
     n = size(self%p)
     largest = 0.0_wp
     traction_scale = self%operators%space%max(self%p)
-    if (self%problem%friction%no_slip) largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
+    if (.not. self%problem%friction%is_bounded()) then
+      largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
+    end if
     traction_scale = tangential_scale(self%problem%friction, largest)*traction_scale
   end function traction_scale
 
@@ -264,20 +265,19 @@ contains
     class(iterate_t), intent(in) :: self
     !> The traction, components along x and y (2 n) [Pa]
     real(wp), allocatable, intent(out) :: q(:)
-    real(wp) :: unit, slope
+    real(wp) :: unit
     integer :: n, n_col, row, from, to
 
     n = size(self%p)
     n_col = self%problem%lattice%extent(1)
     allocate (q(2*n))
     unit = pressure_unit(self)
-    slope = self%problem%friction%slope()
     !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(from, to)
     do row = 1, n/n_col
       from = (row - 1)*n_col + 1
       to = row*n_col
-      call cone_row(n_col, unit, slope, self%p(from:to), self%q(from:to), self%q(n + from:n + to), q(from:to), &
-                    q(n + from:n + to))
+      call self%problem%friction%project(from, unit, self%p(from:to), self%q(from:to), self%q(n + from:n + to), q(from:to), &
+                                         q(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine cut_to_cone
@@ -303,13 +303,12 @@ contains
   !> R_t alone.
   subroutine find_tangential_residual(self)
     class(iterate_t), intent(inout) :: self
-    real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, slope, largest, worst
+    real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, largest, worst
     integer :: n, row, from, to
 
     n = size(self%p)
     self%residual_tangential = 0.0_wp
     unit = pressure_unit(self)
-    slope = self%problem%friction%slope()
     if (.not. (unit > 0.0_wp .and. self%problem%friction%resists())) return
     largest = 0.0_wp
     worst = 0.0_wp
@@ -319,8 +318,8 @@ contains
       from = (row - 1)*size(ds, 1) + 1
       to = row*size(ds, 1)
       call self%slip_row(row, ds(:, 1), ds(:, 2))
-      call residual_row(size(ds, 1), unit, slope, 1.0_wp/self%problem%tangential_compliance, self%p(from:to), &
-                        self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
+      call self%problem%friction%violation(from, unit, 1.0_wp/self%problem%tangential_compliance, self%p(from:to), &
+                                           self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
     end do
     !$omp end parallel do
     self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, largest)
@@ -397,7 +396,8 @@ contains
       p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate
-    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%space)
+    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%space, &
+                                   self%problem%normal_law)
   end function gap_residual
 
 end module hc_friction_iterate

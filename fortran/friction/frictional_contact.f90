@@ -62,9 +62,9 @@ contains
     allocate (self%operators(n_level), self%coarse(2:n_level))
     do l = 1, n_level
       if (l == 2) then
-        self%coarse(l) = problem%coarsened()
+        call problem%coarsen(self%coarse(l))
       else if (l > 2) then
-        self%coarse(l) = self%coarse(l - 1)%coarsened()
+        call self%coarse(l - 1)%coarsen(self%coarse(l))
       end if
       if (l == 1) then
         self%problem%space = space_over(problem%lattice%extent, n_threads)

@@ -122,7 +122,7 @@ contains
     do row = 1, size(state%pressure, 2)
       to = row*size(state%pressure, 1)
       from = to - size(state%pressure, 1) + 1
-      state%pressure(:, row) = max(now%p(from:to), 0.0_wp)
+      call now%problem%normal_law%project(from, now%p(from:to), state%pressure(:, row))
       state%traction(:, row, 1) = q(from:to)
       state%traction(:, row, 2) = q(n + from:n + to)
     end do

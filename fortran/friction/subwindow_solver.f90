@@ -12,7 +12,7 @@ module hc_subwindow_solver
   use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_window_part, only: frame, is_worth, part_of, worth
+  use hc_window_part, only: frame, is_worth, worth
   implicit none
   private
 
@@ -137,14 +137,7 @@ contains
     end if
     self%low = low
     self%high = high
-    problem = self%problem
-    associate (c => [low(1), high(1)], r => [low(2), high(2)])
-      problem%lattice = part_of(self%problem%lattice, low, high)
-      problem%initial_gap = self%problem%initial_gap(c(1):c(2), r(1):r(2))
-      problem%candidate = self%problem%candidate(c(1):c(2), r(1):r(2))
-      problem%x = self%problem%x(c(1):c(2), r(1):r(2))
-      problem%y = self%problem%y(c(1):c(2), r(1):r(2))
-    end associate
+    call self%problem%take_part(low, high, problem)
     allocate (self%part)
     call new_frictional_contact(self%part, problem, error, self%n_threads, self%cache)
   end subroutine take_part

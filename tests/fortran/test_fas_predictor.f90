@@ -47,7 +47,7 @@ contains
 
     call new_sphere(contact, n, 0.4_wp, -0.2_wp, coulomb_t(mu), error, n_threads=1)
     if (allocated(error)) return
-    coarse(1) = contact%problem%coarsened()
+    call contact%problem%coarsen(coarse(1))
     call new_operators(operators(1), coarse(1)%lattice, coarse(1)%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)

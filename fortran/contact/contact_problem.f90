@@ -10,6 +10,7 @@ module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
+  use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -27,13 +28,6 @@ module hc_contact_problem
   private
 
   public :: friction_problem_t, new_friction_problem
-  public :: classification_scale
-
-  !> Scale kappa of the classification parameter: r = kappa/(2 pi lambda_1 (1 + gamma) a).
-  real(wp), parameter :: classification_scale = 10.0_wp
-
-  !> |beta| min(mu, 1) from which pressure and shear traction are better found together.
-  real(wp), parameter :: strong_coupling = 0.03_wp
 
   !> What is given.
   type :: friction_problem_t
@@ -55,6 +49,8 @@ module hc_contact_problem
     real(wp), allocatable :: x(:, :), y(:, :)
     !> Self-compliances d_n and d_t of a node [m/Pa]
     real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
+    !> Tolerances, caps and tuning numbers of whoever solves it
+    type(options_t) :: options
     !> Threads that share the passes over its nodes
     type(field_space_t) :: space
   contains
@@ -74,8 +70,8 @@ module hc_contact_problem
     procedure :: rigid_displacement
     !> Resultants of given tractions
     procedure :: resultants
-    !> Classification parameter r of the tangential conditions
-    procedure :: classification_parameter
+    !> Classification parameters r of the tangential conditions and r' of those along the normal
+    procedure :: classification_parameter, normal_classification_parameter
     !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known
     procedure :: conclude
     !> Residuals of its loads alone
@@ -137,6 +133,7 @@ contains
     call self%friction%on_lattice(self%lattice, coarse%lattice, coarse%friction)
     allocate (coarse%normal_law, source=self%normal_law)
     coarse%goodman = self%goodman
+    coarse%options = self%options
     coarse%space = self%space
     allocate (coarse%initial_gap, source=restrict_field(self%lattice, self%initial_gap, coarse%lattice))
     allocate (coarse%candidate, source=restrict_mask(self%lattice, self%candidate, coarse%lattice))
@@ -159,6 +156,7 @@ contains
     call self%friction%on_lattice(self%lattice, part%lattice, part%friction)
     allocate (part%normal_law, source=self%normal_law)
     part%goodman = self%goodman
+    part%options = self%options
     part%space = self%space
     part%initial_gap = self%initial_gap(low(1):high(1), low(2):high(2))
     part%candidate = self%candidate(low(1):high(1), low(2):high(2))
@@ -185,7 +183,8 @@ contains
   pure logical function couples_strongly(self)
     class(friction_problem_t), intent(in) :: self
 
-    couples_strongly = abs(self%pair%beta())*min(self%friction%strength(), 1.0_wp) > strong_coupling .and. .not. self%goodman
+    couples_strongly = abs(self%pair%beta())*min(self%friction%strength(), 1.0_wp) > &
+                       self%options%contact%strong_coupling .and. .not. self%goodman
   end function couples_strongly
 
   !> State of bodies that do not touch; motions that are driven by their load stay where they are.
@@ -269,15 +268,25 @@ contains
     load = self%lattice%cell_area()*sum(part, dim=2)
   end function resultants
 
-  !> r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius [Pa/m].
+  !> r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius, (F8) [Pa/m].
   pure real(wp) function classification_parameter(self, n_contact) result(r)
     class(friction_problem_t), intent(in) :: self
     !> Nodes in contact
     integer, intent(in) :: n_contact
 
-    r = classification_scale/(2.0_wp*pi*(self%pair%lambda_1 + self%pair%lambda_5) &
-                              *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+    r = self%options%contact%classification_scale/(2.0_wp*pi*(self%pair%lambda_1 + self%pair%lambda_5) &
+                                                   *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
   end function classification_parameter
+
+  !> r' = kappa/(2 pi lambda_1 a) [Pa/m].
+  pure real(wp) function normal_classification_parameter(self, n_contact) result(r)
+    class(friction_problem_t), intent(in) :: self
+    !> Nodes in contact
+    integer, intent(in) :: n_contact
+
+    r = self%options%contact%classification_scale/(2.0_wp*pi*self%pair%lambda_1 &
+                                                   *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+  end function normal_classification_parameter
 
   !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known.
   subroutine conclude(self, target, tolerance, reference, displacement, state)

@@ -18,9 +18,6 @@ module hc_subwindow_solver
 
   public :: windowed_friction_t, new_windowed_friction, windowed_friction_memory
 
-  !> The part has to leave something for the product over the window, which sees other roundings.
-  real(wp), parameter :: part_tolerance = 0.9_wp
-
   !> A contact problem with friction, on its window and on a part of it.
   type, extends(friction_solver_t) :: windowed_friction_t
     private
@@ -170,8 +167,8 @@ contains
       before%motion = start%motion
       before%load = start%load
       if (.not. self%part%problem%is_pressed(target)) return
-      call self%part%solve_step(before, reference(c(1):c(2), r(1):r(2), :), target, part_tolerance*tolerance, max_sweeps, &
-                                after, error)
+      call self%part%solve_step(before, reference(c(1):c(2), r(1):r(2), :), target, &
+                                self%problem%options%multilevel%part_tolerance*tolerance, max_sweeps, after, error)
       if (allocated(error)) return
       work = after%operator_applications*lattice%size()/self%problem%lattice%size()
       if (.not. after%converged .or. reaches_rim(self, after%pressure > 0.0_wp)) return

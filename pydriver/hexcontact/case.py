@@ -10,23 +10,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .core.lattice import Lattice
-from .deck.faults import Source
 from .deck.read import assemble
+from .deck.tables import Grid, Solver
+from .deck.toml import refuse_deep
+from .deck.write import plain
 from .errors import DeckError
-from .problem.arguments import body_keys, gap_given, given, middle_of, segments
+from .problem.arguments import Body, middle_of, with_radians
+from .problem.gap import given_gap
 from .problem.loads import LoadStep, Target
 from .problem.problem import Problem
-from .problem.settings import Body, OutputSettings, SolverSettings
 
 if TYPE_CHECKING:
     from .result.result import Result
     from .result.step import Step
-    from .solve.progress import Reporter
+    from .solve.events import Listener
     from .solve.session import Session
 
-__all__ = ["Body", "Case", "LoadStep", "OutputSettings", "SolverSettings", "Target"]
+__all__ = ["Body", "Case", "LoadStep", "Target"]
 
 Array = NDArray[np.float64]
+_LEFT_OUT = ("friction", "solver", "output")  # tables of which nothing is said
 
 
 class Case(Problem):
@@ -117,52 +120,39 @@ class Case(Problem):
         every: int | None = None,
         title: str = "",
     ) -> None:
-        given_gap = gap_given(gap, lattice)
+        own_gap = given_gap(gap, lattice)
         if lattice is not None:
             for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
                 if value is not None:
                     raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
-            if not callable(given_gap):  # so that the deck of the case finds the same window again
+            if not callable(own_gap):  # so that the deck of the case finds the same window again
                 center = middle_of(lattice)
         if loads is None:
-            loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
+            loads = {"normal_load": normal_load, "approach": approach, "steps": steps}
         elif normal_load is not None or approach is not None or steps is not None:
             raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
-        data = given(
-            title=title or None,
-            body={"1": body_keys(body_1), "2": body_keys(body_2)},
-            friction=given(coefficient=friction_coefficient) or None,
-            grid=given(
-                spacing=spacing,
-                nodes_across=nodes_across,
-                nodes_in_radius=nodes_in_radius,
-                extent=extent,
-                window=window,
-                center=center,
-                origin=origin,
-            ),
-            solver=given(
-                algorithm=algorithm,
-                method=method,
-                tolerance=tolerance,
-                coupling=coupling,
-                entry=entry,
-                step_tolerance=step_tolerance,
-            )
-            or None,
-            accuracy=given(target=accuracy) if isinstance(accuracy, int | float) else accuracy,
-            load=segments(loads),
-            output=given(fields=fields, every=every) or None,
-        )
-        self._set_up(assemble(data, None, Source(), Path()), given_gap, lattice)
+        arguments = locals()
+        data = {
+            "title": title or None,
+            "body": {"1": body_1, "2": body_2},
+            "friction": {"coefficient": friction_coefficient},
+            "grid": {key: arguments[key] for key in Grid.model_fields},
+            "solver": {key: arguments[key] for key in Solver.model_fields},
+            "accuracy": {"target": accuracy} if isinstance(accuracy, int | float) else accuracy,
+            "load": [loads] if isinstance(loads, Mapping) else loads,
+            "output": {"fields": fields, "every": every},
+        }
+        refuse_deep(data, "")
+        data = {key: value for key, value in plain(data).items() if value or key not in _LEFT_OUT}
+        self._set_up(assemble({**data, "load": with_radians(data["load"])}), own_gap, lattice)
 
     def run(
         self,
         output: str | Path | None = None,
         overwrite: bool = False,
         on_step: Callable[[Step], object] | None = None,
-        progress: Reporter | bool | None = None,
+        progress: Listener | bool | None = None,
     ) -> Result:
         """Solve the case.
 
@@ -176,7 +166,7 @@ class Case(Problem):
         on_step : callable, optional
             Called with each finished `Step`. If it returns something true, or raises `hexcontact.StopRun`,
             the run ends there.
-        progress : Reporter or bool, optional
+        progress : Listener or bool, optional
             True: a bar on a terminal, lines otherwise.
 
         Returns
@@ -213,7 +203,8 @@ class Case(Problem):
         return Session(self, output, overwrite)
 
     def _repr_html_(self) -> str:
-        from .solve.overview import case_rows
+        from .problem.overview import case_rows
+        from .solve.frictionless import peak_memory
         from .text import html_table
 
-        return html_table(self.title or "Case", ("", ""), case_rows(self))
+        return html_table(self.title or "Case", ("", ""), case_rows(self, peak_memory))

@@ -86,7 +86,8 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     value : float
         The number, in SI.
     unit : str
-        A unit that takes a prefix; without one, or where no prefix fits, the number is written plainly.
+        A unit that takes a prefix, an area (m2) the square of one; without a unit, or where no prefix fits,
+        the number is written plainly.
     digits : int
         Significant digits.
     """
@@ -95,11 +96,36 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     if value == 0 or math.isinf(value):
         return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
     rounded = float(f"{value:.{digits - 1}e}")
-    power = 3 * math.floor(math.log10(abs(rounded)) / 3)
+    area, size = unit == "m2", math.log10(abs(rounded))
+    power = 3 * math.floor((size + 1) / 6 if area else size / 3)  # areas from 0.1 of a unit on
     if not unit or power not in PREFIXES:
         return f"{rounded:.{digits}g} {unit}".rstrip()
-    scaled = f"{rounded / 10.0**power:#.{digits}g}".rstrip(".")
-    return f"{scaled} {PREFIXES[power]}{unit}"
+    number = f"{rounded / 10.0 ** (2 * power if area else power):#.{digits}g}".rstrip(".")
+    return f"{number} {PREFIXES[power]}{'m²' if area else unit}"
+
+
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Return factor and unit that bring a quantity into 1 ... 1000: ``(1e-6, "MPa")`` for 8.5e8 Pa.
+
+    Parameters
+    ----------
+    largest : float
+        Largest magnitude, SI.
+    unit : str
+        SI unit; "1" or empty for a pure number, which is left alone. An area takes the square of a prefix.
+    """
+    if unit in ("", "1") or not math.isfinite(largest) or largest == 0.0:
+        return 1.0, unit.replace("1", "")
+    power = 2 if unit == "m2" else 1
+    exponent = 3 * math.floor(math.log10(abs(largest) * 1.0000001) / (3 * power))
+    exponent = min(max(exponent, -12), 9)
+    return 10.0 ** (-exponent * power), PREFIXES[exponent] + unit.replace("m2", "m²")
+
+
+def worded(value: float, unit: str) -> str:
+    """Write a quantity with four digits and a prefix: "747.6 µm", "1 kN"."""
+    factor, scaled_unit = scaled(value, unit)
+    return f"{value * factor:.4g} {scaled_unit}"
 
 
 def percent(share: float) -> str:

@@ -9,14 +9,15 @@ from typing import Any, get_args
 
 import pytest
 
-from hexcontact.deck import tables as decks
+from hexcontact.deck import tables
 from hexcontact.deck.faults import Source
-from hexcontact.deck.kinds import Table, kind_of
 from hexcontact.deck.location import places
+from hexcontact.deck.model import Table, kind_of
 from hexcontact.deck.surfaces import SHAPES, Flat, Sphere, Surface
-from hexcontact.deck.tables import Deck, Load, Segment, read_toml, with_overrides
+from hexcontact.deck.tables import Deck, Load, Segment
+from hexcontact.deck.toml import parse_toml, read_toml, with_overrides
 from hexcontact.errors import DeckError
-from hexcontact.problem.loads import LoadStep, Target, load_steps
+from hexcontact.problem.loads import History, LoadStep, Target, load_steps
 from hexcontact.text import shown
 
 ROOT = Path(__file__).parents[2]
@@ -338,7 +339,7 @@ def test_everything_wrong_is_reported_at_once() -> None:
 )
 def test_messages_point_at_the_line(old: str, new: str, start: str) -> None:
     with pytest.raises(DeckError) as error:
-        Deck.parse(decks.parse_toml(changed(old, new), "deck.toml"), Source("deck.toml", changed(old, new)))
+        Deck.parse(parse_toml(changed(old, new), "deck.toml"), Source("deck.toml", changed(old, new)))
     assert str(error.value).startswith(start)
 
 
@@ -617,6 +618,24 @@ def test_cycles() -> None:
     assert [step.label for step in steps] == ["", "down", "down", "cycle", "down", "down", "cycle", ""]
 
 
+def test_a_history_that_is_appended_to_is_the_whole_one() -> None:
+    loads = [
+        {"normal_load": 10.0, "steps": 3, "label": "press"},
+        {"repeat": 2, "path": [{"shift_x": 1e-6, "steps": "auto"}, {"tangential_load_x": 0.0, "steps": 2}]},
+        {"series": {"normal_load": [8.0, 4.0], "label": ["down", "down"]}},
+        {"approach": 1e-6},
+    ]
+    grown = History(0.3)
+    for count, load in enumerate(loads, start=1):
+        grown.append(Load(**load))
+        assert (tuple(grown.steps), grown.problems) == load_steps(
+            [Load(**load) for load in loads[:count]], 0.3
+        )
+    assert len(grown.steps) == 12
+    grown.append(Load(normal_load=1.0, ramp="cubic"))
+    assert [problem.key for problem in grown.problems] == [("load", 4, "ramp")]
+
+
 def test_a_history_of_too_many_steps_is_refused_before_it_is_unrolled() -> None:
     path = [{"normal_load": 1.0, "steps": 100_000}]
     assert complaints({"repeat": 100_000, "path": path}, mu=0.0) == {
@@ -704,18 +723,18 @@ def test_the_deck_reference_is_up_to_date(name: str) -> None:
 
 
 def test_the_deck_reference_has_every_key_of_every_table() -> None:
-    def tables(table: type[Table]) -> Iterator[type[Table]]:
+    def within(table: type[Table]) -> Iterator[type[Table]]:
         yield table
         for info in table.known_keys().values():
             for part in (info.annotation, *get_args(info.annotation)):
                 if isinstance(part, type) and issubclass(part, Table):
-                    yield from tables(part)
+                    yield from within(part)
 
     names = reference()
     page = "".join(path.read_text(encoding="utf-8") for path in names["PAGES"])
-    shown_tables = {*names["TABLES"].values(), decks.Bodies, Surface}
-    assert {table for table in tables(Deck) if not issubclass(table, Segment)} <= shown_tables
-    assert decks.Load in shown_tables  # which has all keys of a segment
+    shown_tables = {*names["TABLES"].values(), tables.Bodies, Surface}
+    assert {table for table in within(Deck) if not issubclass(table, Segment)} <= shown_tables
+    assert tables.Load in shown_tables  # which has all keys of a segment
     assert all(f"<!-- table: {name} -->" in page for name in (*names["TABLES"], "shapes"))
     for table in (*names["TABLES"].values(), *SHAPES.values()):
         for key, info in names["documented"](table).items():
@@ -743,6 +762,6 @@ def test_the_blocks_of_the_deck_reference_are_decks() -> None:
 
 
 def test_every_key_says_what_it_means() -> None:
-    for table in (decks.Body, decks.Friction, decks.Grid, decks.Solver, decks.Load, decks.Output):
+    for table in (tables.Body, tables.Friction, tables.Grid, tables.Solver, tables.Load, tables.Output):
         for key, info in table.known_keys().items():
             assert info.description, f"{table.__name__}.{key}"

@@ -22,7 +22,7 @@ HEIGHT = np.sqrt(0.75)
 
 
 def made(gap, pressures, loads, spacing=0.1, half=16, modulus=2.0, **attributes) -> xarray.Dataset:
-    """Lay a result out as `result.assemble` does; gap and pressures are functions of (x, y)."""
+    """Lay a result out as `layout.assemble` does; gap and pressures are functions of (x, y)."""
     index = np.arange(-half, half + 1)
     row, col = np.meshgrid(index, index, indexing="ij")
     x, y = spacing * (col + 0.5 * row), spacing * HEIGHT * row
@@ -188,6 +188,15 @@ def test_lines_and_areas_are_in_every_kind_of_file(name: str, kind: str) -> None
     with matplotlib.rc_context({"path.simplify": False}):
         figure = plotting.FIGURES[name](sphere())
         assert drawn.added_strokes(figure, kind) > 0.9 * drawn.vertices(figure) > 6
+
+
+@pytest.mark.parametrize(
+    ("beta", "coupling", "holds"), [(0.0, "full", True), (0.2, "goodman", True), (0.2, "full", False)]
+)
+def test_hertz_holds_where_shear_does_not_move_the_pressure(beta: float, coupling: str, holds: bool) -> None:
+    rough = {"algorithm": "incremental", "friction_coefficient": 0.3, "coupling": coupling}
+    assert StepView.of(sphere(dundurs_beta=beta, **rough), -1).hertz_holds is holds
+    assert StepView.of(sphere(dundurs_beta=beta, coupling=coupling), -1).hertz_holds
 
 
 def is_section(upper: Any, lower: Any, view: StepView, hertz: EllipticContact | None) -> None:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .._version import __version__
 from ..errors import ConvergenceError, DeckError, Fault, ResourceError
-from ..result.history import RESIDUALS
-from ..result.remarks import remarks
+from ..result.history import RESIDUALS, remarks
 from ..text import visible
 
 if TYPE_CHECKING:
@@ -91,9 +90,9 @@ def error(
 
 def of_case(case: Problem, output: Path) -> dict[str, Any]:
     """Return what would be run."""
-    from ..solve import estimates
+    from ..problem import estimates
+    from ..problem.overview import parameters_of
     from ..solve.frictionless import peak_memory
-    from ..solve.run import parameters_of
 
     lattice = case.lattice
     return {

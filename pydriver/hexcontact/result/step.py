@@ -1,4 +1,4 @@
-"""A finished load step: what a run has in hand between one step and the next."""
+"""A finished load step: the state of a run between one step and the next."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..text import did_you_mean
-from .profiles import Line, Point, chosen_fields, interpolate, profile, section_line
+from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line
 
 if TYPE_CHECKING:
     import xarray

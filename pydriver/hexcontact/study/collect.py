@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import DeckError, ResourceError
-from ..files import require_ordinary
-from ..result.netcdf import flush, reading
-from ..result.seal import check_seal
+from ..files import reading, replacing, require_ordinary
+from ..result.netcdf import check_seal
 from ..variables import CONVENTIONS, VARIABLES
 from .folder import StudyFolder
-from .plan import Axis, Plan
+from .plan import Axis, Plan, PlannedCase
 
 if TYPE_CHECKING:
     import xarray
@@ -75,31 +74,24 @@ def collect(
     columns: dict[str, Any] = {}
     for name in (name for name in VARIABLES if name in present):
         values = np.full((total, longest), np.nan)
+        last = np.full(total, np.nan)
         for row, history in enumerate(found):
             if name in history:
                 values[row, : len(history[name])] = history[name]
+                last[row] = history[name][-1]
         kept = {key: value for key, value in VARIABLES[name].attributes.items() if not key.startswith("flag")}
         if steps == "all":
             columns[name] = ((*dims, "step"), values.reshape(*shape, longest), kept)
         else:
-            last = [history[name][-1] if name in history else np.nan for history in found]
-            columns[name] = (dims, np.reshape(last, shape), kept)
-
-    failures = [
-        None if history else folder.failure(case) for case, history in zip(plan.cases, found, strict=True)
-    ]
-    status = [
-        DONE if history else FAILED if failure else MISSING
-        for history, failure in zip(found, failures, strict=True)
-    ]
-    flags = {"flag_values": np.array(list(_STATUS), "i1"), "flag_meanings": " ".join(_STATUS.values())}
-    codes = [failure.exit_code if failure else 0 for failure in failures]
-    messages = [failure.message if failure else "" for failure in failures]
-    numbers = [folder.number(case) for case in plan.cases]
+            columns[name] = (dims, last.reshape(shape), kept)
 
     def by_case(values: Any, dtype: Any, long_name: str, **more: Any) -> Any:
-        return dims, np.array(values, dtype=dtype).reshape(shape), {"long_name": long_name, **more}
+        return dims, np.array(list(values), dtype=dtype).reshape(shape), {"long_name": long_name, **more}
 
+    outcomes = [_outcome(folder, case, bool(h)) for case, h in zip(plan.cases, found, strict=True)]
+    status, codes, messages = zip(*outcomes, strict=True)
+    flags = {"flag_values": np.array(list(_STATUS), "i1"), "flag_meanings": " ".join(_STATUS.values())}
+    numbers = map(folder.number, plan.cases)
     columns["status"] = by_case(status, "i1", "what became of the case", **flags)
     columns["exit_code"] = by_case(codes, "i2", "exit code of the case, 0 if it has not failed", units="1")
     columns["message"] = by_case(messages, str, "why the case failed")
@@ -107,12 +99,8 @@ def collect(
 
     coordinates: dict[str, Any] = {}
     for axis in plan.axes:
-        if grid:
-            coordinates[axis.name] = _coordinate(axis, axis.name, list(axis.values))
-        else:
-            coordinates[axis.name] = _coordinate(
-                axis, "case", [case.settings[axis.key] for case in plan.cases]
-            )
+        said = axis.values if grid else [case.settings[axis.key] for case in plan.cases]
+        coordinates[axis.name] = _coordinate(axis, axis.name if grid else "case", said)
     if not grid:
         about = {"long_name": "number of the case in the study, the first is 1", "units": "1"}
         coordinates["case"] = ("case", np.arange(1, total + 1, dtype="i4"), about)
@@ -122,7 +110,15 @@ def collect(
     return xarray.Dataset(columns, coordinates, {"Conventions": CONVENTIONS, **attributes})
 
 
-def _coordinate(axis: Axis, dim: str, values: list[Any]) -> Any:
+def _outcome(folder: StudyFolder, case: PlannedCase, done: bool) -> tuple[int, int, str]:
+    """Return what became of a case: its status, exit code and message."""
+    if done:
+        return DONE, 0, ""
+    failure = folder.failure(case)
+    return (FAILED, failure.exit_code, failure.message) if failure else (MISSING, 0, "")
+
+
+def _coordinate(axis: Axis, dim: str, values: Sequence[Any]) -> Any:
     told = [axis.coordinate(value) for value in values]
     attributes = {"long_name": axis.long_name or axis.key, "deck_key": axis.key}
     if all(isinstance(value, float) for value in told):
@@ -159,14 +155,10 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         If it cannot be written.
     """
     refuse_foreign(path)
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
     texts = [name for name, variable in dataset.variables.items() if variable.dtype.kind in "UO"]
     try:
-        dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"dtype": "S1"} for name in texts})
-        flush(temporary)
-        os.replace(temporary, path)
-        flush(path.parent)
+        with replacing(path) as temporary:
+            dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"dtype": "S1"} for name in texts})
     except (OSError, RuntimeError) as error:
-        temporary.unlink(missing_ok=True)
         raise ResourceError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from error

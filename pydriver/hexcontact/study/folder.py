@@ -14,43 +14,18 @@ import os
 import re
 import shutil
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .._version import __version__
 from ..errors import ConvergenceError, DeckError, ResourceError
-from ..files import require_ordinary, text_of
-from ..result.lock import Lock
-from ..result.netcdf import flush
+from ..files import replacing, require_ordinary, text_of
+from ..lock import Lock
+from .job import Outcome
 from .plan import Plan, PlannedCase, hash_of
 
 _INDEX = "index.json"
 _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fails in the same way again
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a case has ended.
-
-    Attributes
-    ----------
-    hash : str
-        Name of the case.
-    exit_code : int
-        0 if it is done, else what ``hexcontact run`` would have exited with.
-    message : str
-        Why it failed.
-    seconds : float
-        Wall time of this attempt.
-    lasting : bool
-        Whether a failure is of the case itself, not of the circumstances.
-    """
-
-    hash: str
-    exit_code: int = 0
-    message: str = ""
-    seconds: float = 0.0
-    lasting: bool = True
 
 
 class StudyFolder:
@@ -119,17 +94,11 @@ class StudyFolder:
         self._write(_INDEX, {"index_version": 1, "cases": self._entries})
 
     def _write(self, name: str, content: Any) -> None:
-        temporary = self.folder / f"{name}.{os.getpid()}.tmp"
+        text = json.dumps(content, indent=1, ensure_ascii=False, default=str)
         try:
-            with temporary.open("w", encoding="utf-8") as file:
-                json.dump(content, file, indent=1, ensure_ascii=False, default=str)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, self.folder / name)
-            flush(self.folder)
+            with replacing(self.folder / name) as path:
+                path.write_text(text, encoding="utf-8")
         except OSError as error:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
             raise ResourceError(f"cannot write {self.folder / name}: {error.strerror or error}") from error
 
     def number(self, case: PlannedCase) -> int:
@@ -155,27 +124,20 @@ class StudyFolder:
 
     def failure(self, case: PlannedCase) -> Outcome | None:
         """Return the failure that is noted of a case."""
-        return self._noted(case)[0]
-
-    def _noted(self, case: PlannedCase) -> tuple[Outcome | None, str]:
-        """Return the failure that is noted of a case, and the version that has written it."""
         with contextlib.suppress(DeckError, ValueError, TypeError, AttributeError, RecursionError):
             note = json.loads(text_of(self.path(case).with_suffix(".json"), "a note"))
-            version = str(note.pop("hexcontact_version", ""))
-            outcome = Outcome(**note)
+            outcome = Outcome(**{"hexcontact_version": "", **note})
             whole = type(outcome.exit_code), type(outcome.message), type(outcome.lasting)
             if outcome.hash == case.hash and whole == (int, str, bool) and outcome.message.strip():
-                return outcome, version
-        return None, ""
+                return outcome
+        return None
 
     def _is_final(self, case: PlannedCase) -> bool:
         """Tell whether a case has failed for good: by itself, in this version of the program."""
-        from .._version import __version__
-
-        failure, version = self._noted(case)
-        if failure is None or not failure.lasting or failure.exit_code not in _FINAL:
+        failure = self.failure(case)
+        if failure is None or not failure.lasting:
             return False
-        return version == __version__
+        return failure.exit_code in _FINAL and failure.hexcontact_version == __version__
 
     def missing(self, cases: Iterable[PlannedCase], retry: bool = False) -> list[PlannedCase]:
         """Return the cases that are to be run; those that failed for good only to `retry`."""
@@ -186,13 +148,9 @@ class StudyFolder:
 
     def note(self, case: PlannedCase, outcome: Outcome) -> None:
         """Write down how a case has ended, and clear away what attempts have left."""
-        from .._version import __version__
-
         path = self.path(case)
         if outcome.exit_code:
-            self._write(
-                f"{path.stem}.json", dataclasses.asdict(outcome) | {"hexcontact_version": __version__}
-            )
+            self._write(f"{path.stem}.json", dataclasses.asdict(outcome))
             return
         path.with_suffix(".json").unlink(missing_ok=True)
         pattern = re.compile(re.escape(path.stem) + r"\.[0-9a-f]{8}\.nc(\.d)?")

@@ -12,7 +12,7 @@ module hc_subwindow_solver
   use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_window_part, only: frame, is_worth, worth
+  use hc_window_part, only: frame, is_worth
   implicit none
   private
 

@@ -7,6 +7,8 @@
 !>
 !> where w, u1 - u2 are the flexibility operator's. `friction_solver_t` is what
 !> both methods, on LAPACK and on FFTs, look like from outside.
+!>
+!> Equations: docs/theory/conditions.md, (C1) to (C4).
 module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi

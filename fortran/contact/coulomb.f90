@@ -13,6 +13,8 @@
 !>
 !> where D tends to |ds|/(mu p). The direction of slip is thus that of -ds, and
 !> it converges quadratically.
+!>
+!> Equations: docs/theory/friction.md, (F3), (F6).
 module hc_coulomb
   use hc_precision, only: wp
   use hc_contact_state, only: stick, slip

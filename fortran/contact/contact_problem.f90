@@ -5,14 +5,9 @@
 !>
 !>     g = h + w - approach,   s = (u1 - u2) - shift - twist x r,   ds = s - s^n,
 !>
-<<<<<<< HEAD
 !> where w, u1 - u2 are the flexibility operator's.
-=======
-!> where w, u1 - u2 are the flexibility operator's. `friction_solver_t` is what
-!> both methods, on LAPACK and on FFTs, look like from outside.
 !>
 !> Equations: docs/theory/conditions.md, (C1) to (C4).
->>>>>>> refs/heads/docs
 module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi

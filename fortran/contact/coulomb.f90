@@ -14,12 +14,10 @@
 !> where D tends to |ds|/(mu p). The direction of slip is thus that of -ds, and
 !> it converges quadratically.
 !>
-<<<<<<< HEAD
 !> Passes over one row of nodes are written so that the compiler takes several nodes at a time: lengths of vectors are
 !> roots of sums of squares there, and pressures have to come in a unit of their own size.
-=======
+!>
 !> Equations: docs/theory/friction.md, (F3), (F6).
->>>>>>> refs/heads/docs
 module hc_coulomb
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp

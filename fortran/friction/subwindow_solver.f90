@@ -3,6 +3,8 @@
 !> A contact that is small in its window (the first steps of one that grows, wide
 !> windows) is solved on the part around it. What the tractions do elsewhere follows from one
 !> product over the window, which also judges the state; hc_subwindow says what follows if it fails.
+!>
+!> Theory: docs/theory/multilevel.md.
 module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t

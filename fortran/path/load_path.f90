@@ -13,7 +13,8 @@ module hc_load_path
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached
   use hc_contact_residuals, only: tangential_residual
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_contact_entry, only: solve_with_entry
   implicit none
   private

@@ -6,6 +6,8 @@
 !>     g = h + w - approach,   s = (u1 - u2) - shift - twist x r,   ds = s - s^n,
 !>
 !> where w, u1 - u2 are the flexibility operator's.
+!>
+!> Equations: docs/theory/conditions.md, (C1) to (C4).
 module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi

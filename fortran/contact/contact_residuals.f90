@@ -1,4 +1,6 @@
 !> How well a state fulfils the contact conditions; dimensionless.
+!>
+!> Equations: docs/theory/residuals.md, (R1) to (R4).
 module hc_contact_residuals
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp

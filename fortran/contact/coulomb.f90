@@ -16,6 +16,8 @@
 !>
 !> Passes over one row of nodes are written so that the compiler takes several nodes at a time: lengths of vectors are
 !> roots of sums of squares there, and pressures have to come in a unit of their own size.
+!>
+!> Equations: docs/theory/friction.md, (F3), (F6).
 module hc_coulomb
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp

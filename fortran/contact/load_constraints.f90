@@ -4,6 +4,8 @@
 !> the unit motion does along x and y, summed over the traction, is the load. A torque is
 !> taken about the middle of the contact, as far as the tangential loads are
 !> known too: a contact far from the origin would not tell a twist from a shift.
+!>
+!> Equations: docs/theory/friction.md, (F4), (F12).
 module hc_load_constraints
   use hc_precision, only: wp, pi
   use hc_lapack, only: eliminate

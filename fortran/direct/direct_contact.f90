@@ -4,6 +4,8 @@
 !> in tension leave, and nodes that penetrate enter again. Should the number of wrong
 !> nodes not fall any more, one node at a time is exchanged (Murty's rule, with
 !> which the iteration ends for every positive definite matrix).
+!>
+!> Equations: docs/theory/normal_contact.md, (N1).
 module hc_direct_contact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise

@@ -7,6 +7,8 @@
 !> area of a step starts from the last one with a ring of nodes around it. Stick and
 !> slip follow from q - r ds, and slip is linearised as in hc_coulomb, so
 !> that the whole is a Newton method for pressure, traction and motions at once.
+!>
+!> Equations: docs/theory/friction.md, (F7).
 module hc_direct_friction
   use hc_precision, only: wp
   use hc_error, only: error_t

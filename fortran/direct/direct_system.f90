@@ -1,4 +1,6 @@
 !> The linear problem of the direct method: an area in contact, with stick and slip frozen.
+!>
+!> Equations: docs/theory/friction.md, (F7).
 module hc_direct_system
   use, intrinsic :: iso_fortran_env, only: real32
   use hc_precision, only: wp

@@ -1,4 +1,6 @@
 !> What the tractions of an iterate call for: contact area, stick and slip, and loads as constraints.
+!>
+!> Equations: docs/theory/friction.md, (F5), (F8).
 module hc_active_zones
   use hc_precision, only: wp
   use hc_contact_state, only: separated, stick, slip, along_x, along_y, about_z, n_motion, force_control

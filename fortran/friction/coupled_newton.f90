@@ -5,6 +5,8 @@
 !> edge of the contact. Here contact area, stick, slip and both tractions come from
 !> one linear problem with the rigid motions, solved by GMRES. It is not
 !> symmetric, because the pressure of a slipping node carries mu p e along.
+!>
+!> Equations: docs/theory/friction.md, (F7).
 module hc_coupled_newton
   use hc_precision, only: wp
   use hc_error, only: error_t

@@ -12,6 +12,8 @@
 !> tractions and motions is added to the fine ones. Nodes between coarse ones that slip are put
 !> onto the cone. The fronts of contact, stick and slip are where
 !> they should be then but for a node or two, and no history has to be kept for it.
+!>
+!> Equations: docs/theory/multilevel.md, (M1).
 module hc_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t

@@ -3,6 +3,8 @@
 !> It holds tractions and motions with what they cause, and says which residuals follow from
 !> them. Which zones they call for stands in active_zones; how to get to the next iterate is left to
 !> staggered_newton and coupled_newton.
+!>
+!> Equations: docs/theory/friction.md, (F1).
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp

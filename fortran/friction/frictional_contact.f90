@@ -3,6 +3,8 @@
 !> Sweeps of a semismooth Newton method (see lattice_solver) lead from the last
 !> state to the next, after coarser lattices have told what will change (see
 !> friction_predictor). Without an earlier state the first guess comes from them, too.
+!>
+!> Theory: docs/theory/multilevel.md.
 module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t

@@ -2,6 +2,8 @@
 !>
 !> Sweeps that find pressure and shear traction one after the other (staggered_newton),
 !> and where that is not enough both together (coupled_newton).
+!>
+!> Equations: docs/theory/friction.md, (F2) to (F4).
 module hc_lattice_solver
   use hc_precision, only: wp
   use hc_build_options, only: debug_checks

@@ -6,6 +6,8 @@
 !> iterate (see friction_law). Both linear problems are solved by projected
 !> conjugate gradients, no more accurately than the sets deserve; the rigid motions
 !> come out as multipliers of the prescribed loads.
+!>
+!> Equations: docs/theory/friction.md, (F9), (F10).
 module hc_staggered_newton
   use hc_precision, only: wp
   use hc_error, only: error_t

@@ -4,6 +4,8 @@
 !> windows) is solved on the part around it. What the tractions do elsewhere follows from one
 !> product over the window, which also judges the state. Should the contact reach
 !> the rim of the part, or the bodies overlap outside, the step is solved on the whole window.
+!>
+!> Theory: docs/theory/multilevel.md.
 module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t

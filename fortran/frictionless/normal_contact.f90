@@ -2,6 +2,8 @@
 !>
 !> The first guess comes from the solution on the lattice of every second node,
 !> and so on down to a few nodes.
+!>
+!> Theory: docs/theory/normal_contact.md.
 module hc_normal_contact
   use hc_precision, only: wp
   use hc_error, only: error_t

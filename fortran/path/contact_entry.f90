@@ -10,7 +10,7 @@
 !> s_e - s^n is a sum of a part that is linear in the distance d from it, as the edge slips, and one with
 !> d^(3/2), C, as it sticks. The gap at the beginning of the step measures both without any geometry: m_1 is its power
 !> 2/3, m_2 the gap itself; M_1, M_2 are what they lose during the step outside. How much there is of C shows in how D
-!> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory.md, section 11).
+!> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory/load_path.md, (L1), (L2)).
 module hc_contact_entry
   use hc_precision, only: wp
   use hc_error, only: error_t

@@ -8,6 +8,8 @@
 !> A static load is applied at once: parts only serve as starts, and the relative
 !> displacement counts from the undeformed bodies. So it is tried with a step that begins without contact, which no
 !> path precedes: it is the same problem as a static load.
+!>
+!> Theory: docs/theory/load_path.md.
 module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise

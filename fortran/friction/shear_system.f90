@@ -10,13 +10,7 @@
 !> over to 1/D where a node slips far (see spring_blend).
 !>
 !> A field with two components is one vector, first the one, then the other.
-<<<<<<< HEAD:fortran/friction/shear_system.f90
 module hc_shear_system
-=======
-!>
-!> Equations: docs/theory/friction.md, (F7), (F9), (F10).
-module hc_friction_systems
->>>>>>> refs/heads/docs:fortran/friction/friction_systems.f90
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y

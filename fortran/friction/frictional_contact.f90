@@ -104,7 +104,7 @@ contains
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
     !> Directions of GMRES: so many are enough as a rule
-    integer, parameter :: n_direction = 5
+    integer, parameter :: n_direction = 4
     integer(long) :: n, everywhere, inside
 
     n = int(extent(1), long)*extent(2)

@@ -59,7 +59,8 @@ contains
     self%problem%space = self%whole%problem%space
   end subroutine new_windowed_friction
 
-  !> Bytes that a problem takes while a step is solved on the window; on a part alone it is less.
+  !> Bytes that a problem takes while a step is solved on the window; parts, and spectra that are kept of them, take
+  !> more the more steps the contact grows in.
   pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_contact, n_force, coupled, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -72,17 +73,11 @@ contains
     !> Threads to use
     integer, intent(in) :: threads
     integer, parameter :: long = selected_int_kind(18)
-    real(wp) :: share
 
     ! what is given is there twice
     windowed_friction_memory = frictional_contact_memory(extent, threads) &
                                + friction_step_memory(extent, n_contact, n_force, coupled) &
                                + 28*int(extent(1), long)*extent(2)
-    if (.not. coupled) return
-    ! steps that move the edge of the contact are tried on a part first, about as large as the contact will be;
-    ! its operators stay meanwhile
-    share = min(worth, n_contact/(real(extent(1), wp)*extent(2)))
-    windowed_friction_memory = windowed_friction_memory + frictional_contact_memory(int(sqrt(share)*extent), threads)
   end function windowed_friction_memory
 
   subroutine displacements(self, pressure, traction, displacement, error)

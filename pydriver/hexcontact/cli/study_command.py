@@ -134,7 +134,7 @@ def run_case(study: Study, number: int, retry: bool, listeners: Listeners, pipe:
         in_background(
             lambda: outcomes.append(study.run_case(number, retry, shown)),
             pipe,
-            lambda _: not outcomes,
+            lambda _: not (outcomes or study.has(number)),
         )
     except Interrupted as signaled:
         listeners.leave(

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import contact, memory
+from ..core import contact, kernel_cache, memory
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
 from ..core.edges import ContactEdges
 from ..core.estimators import area_radius, pressure_center
@@ -41,9 +42,14 @@ ARRAYS = {False: 8, True: 34}
 S = TypeVar("S", NormalSolution, "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
-_WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
+# Measured by tests/bench/memory.py.
+_WRITING = 18 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
 _LOADED = 3 * 2**20  # bytes of modules that a run imports on its way
-_LEFT = 0.7  # share of what solving takes that the system does not have back by then, as measured
+_LEFT = 0.5  # share of what solving takes that operators and states have when the output is written
+_PART = {
+    False: 60,
+    True: 500,
+}  # bytes of a node in contact for parts of the window; with friction
 _COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
 _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
 
@@ -53,13 +59,14 @@ _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when 
 
 def peak_memory(case: Problem, lattice: Lattice) -> int:
     """Return the memory (bytes) that a run on a window takes at most, with interpreter and libraries."""
-    return memory.resident() + memory_needed(case, lattice)
+    return memory.resident() + memory_needed(case, lattice, _parts(case, lattice))
 
 
-def memory_needed(case: Problem, lattice: Lattice) -> int:
+def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     """Return the memory (bytes) that solving and writing load steps on a window takes.
 
     The contact is taken as large as estimated at the largest load; as the window where there is no estimate.
+    `kept` are further bytes, which could be done without.
     """
     from ..core import contact as native
 
@@ -73,11 +80,27 @@ def memory_needed(case: Problem, lattice: Lattice) -> int:
         arrays += _ENTRY_ARRAYS
     if case.adaptive:
         arrays += _COMPANION_ARRAYS
-    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size
+    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size + kept
     if bodies:
         # beside a solver with friction, whose vectors are gone by then, the set-up needs nothing more
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
     return _LOADED + max(needed, int(_LEFT * needed) + _WRITING)
+
+
+def _parts(case: Problem, lattice: Lattice) -> int:
+    """Return the bytes of operators on parts of the window around a growing contact, and of kept spectra.
+
+    Of n steps in which it grows, about log2(n) need a part that is larger by much.
+    """
+    if case.method_for(lattice) == "direct":
+        return 0
+    most, growing = 0.0, 0
+    for step in case.load_steps:
+        if step.z.value > most:
+            most, growing = step.z.value, growing + 1
+    doublings = min(math.log2(max(growing, 1)), 5.0) - case.frictional
+    kept = int(_PART[case.frictional] * max(doublings, 0.0) * case.contact_nodes(lattice))
+    return min(kept, kernel_cache.bound())
 
 
 def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:

@@ -295,6 +295,10 @@ class Study:
         self.folder.note(case, outcome)
         return outcome
 
+    def has(self, number: int) -> bool:
+        """Tell whether the result of a case is in place."""
+        return any(self.folder.number(case) == number and self.folder.done(case) for case in self.cases)
+
     def collect(self) -> xarray.Dataset:
         """Put together what is there, write it to `output`, and return it.
 

@@ -134,7 +134,9 @@ debug-check:  ## the tests of the solvers on that build (minutes)
 UNCOUNTED := memory_estimates operator_counts pages threads fuzz_decks fuzz_files first_step validation_friction \
     examples short_of_memory fortran_library
 UNCOUNTED_TESTS := test_store.py::test_a_full_disk_is_told_apart_from_wrong_input \
-    test_deck_sources.py::test_the_time_is_estimated_to_its_order_of_magnitude
+    test_deck_sources.py::test_the_time_is_estimated_to_its_order_of_magnitude \
+    test_resume.py::test_runs_killed_at_random_moments_go_on \
+    test_exit_codes.py::test_signals_at_random_moments_leave_what_the_code_says
 
 # In one thread: others would spoil the counts.
 coverage: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test $(STAMPS)/extra-coverage  ## tests on a build with counters: lists the lines that no test reaches

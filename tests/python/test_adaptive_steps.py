@@ -392,7 +392,7 @@ def test_loads_on_the_way_are_looked_at() -> None:
 
 
 def test_editors_know_the_word() -> None:
-    steps = deck_schema()["properties"]["load"]["items"]["properties"]["steps"]
+    steps = deck_schema()["$defs"]["Load"]["properties"]["steps"]
     assert {"const": "auto"} in steps["anyOf"]
 
 

@@ -159,10 +159,21 @@ def test_equations_that_pages_and_sources_cite_are_there() -> None:
         if cited not in everywhere
     } == set()
     sources = [path for top in ("fortran", "pydriver", "tests") for path in sorted((ROOT / top).rglob("*.*"))]
-    citation = re.compile(r"docs/theory/(\w+)\.md((?:,? (?:and |to )?\(\w+\))*)")
+    after = re.compile(r"docs/theory/(\w+)\.md((?:,? (?:and |to )?\(\w+\))*)")
+    before = re.compile(r"\(([A-Z]\d+)\) of\s+(?:!> )?docs/theory/(\w+)\.md")
+    heading = re.compile(r"docs/theory/(\w+)\.md((?:, \"[^\"]+\")+)")
     for path in (path for path in sources if path.suffix in (".f90", ".py")):
-        for page, cited in citation.findall(path.read_text()):
+        text = path.read_text()
+        for page, cited in after.findall(text):
             assert set(re.findall(r"\((\w+)\)", cited)) <= set(numbers[page]), path
+        assert {
+            (page, number) for number, page in before.findall(text) if number not in numbers[page]
+        } == set()
+        for page, titles in heading.findall(text):
+            found = (DOCS / f"theory/{page}.md").read_text()
+            assert [title for title in re.findall(r'"(.+?)"', titles) if f"# {title}\n" not in found] == [], (
+                path
+            )
 
 
 def test_every_public_name_is_in_the_python_reference() -> None:

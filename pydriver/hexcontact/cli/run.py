@@ -125,6 +125,7 @@ def study(
     log_level: Level = None,
 ) -> Content:
     """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    from ..study.progress import study_reporter
     from ..study.study import Study
     from . import json_output
     from . import study_command as command
@@ -157,7 +158,7 @@ def study(
                 "jobs": jobs,
                 "dask": dask,
                 "retry": retry,
-                "watcher": command.watcher(listeners.silent),
+                "listener": study_reporter(listeners.silent),
             }
             work, ends = command.run_in_background(planned, cancel, options)
             try:

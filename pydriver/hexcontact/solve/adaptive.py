@@ -23,7 +23,7 @@ from .step_error import STICK_SAFETY, Change, Memory, change, shear_free
 if TYPE_CHECKING:
     from ..core.friction import ContactState
     from ..problem.problem import Problem
-    from ..result.result import Step
+    from ..result.step import Step
     from .frictional import FrictionWindow
 
 _ATTEMPTS = 6  # at one load step

@@ -14,17 +14,15 @@ from ..core.estimators import area_radius
 from ..core.friction import ContactState, FrictionalContact
 from ..errors import DeckError
 from ..problem.loads import LoadStep
-from ..result.history import RESIDUALS
 from ..result.step import Step
-from .frictionless import STATE, Array, Window
+from ..variables import CORE, STATE
+from .frictionless import Array, Window
 
 if TYPE_CHECKING:
     from ..core.lattice import Lattice
 
-_SCALARS = (  # of a state, besides the residuals, that have the names of the history
-    *("normal_load", "tangential_load_x", "tangential_load_y", "torque"),
-    *("approach", "shift_x", "shift_y", "twist", "dissipated_energy", "operator_applications"),
-)
+# numbers of a state that have the names of the history
+_NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
 _PLACES: dict[str, tuple[Any, str]] = {  # of the stick zone
     "stick_center_x": (np.mean, "x"),
     "stick_center_y": (np.mean, "y"),
@@ -82,7 +80,7 @@ class FrictionWindow(Window[ContactState]):
         static = self.case.solver.algorithm == "static"  # nothing has gone before
         spent_before = 0.0 if before is None or static else before.dissipated_energy
         return {
-            **{name: getattr(solution, name) for name in (*_SCALARS, *RESIDUALS.values())},
+            **{name: getattr(solution, name) for name in _NUMBERS},
             **self._stick_measures(solution, edges),
             "max_traction": float(np.hypot(solution.traction_x, solution.traction_y).max()),
             "dissipated_energy_step": solution.dissipated_energy - spent_before,
@@ -150,13 +148,13 @@ def state_of(step: Step) -> ContactState:
     DeckError
         If a field or a value is missing, as in a frictionless run.
     """
-    needed = {*FrictionWindow.state, *_SCALARS, *RESIDUALS.values(), "sweeps", "cuts"}
+    needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(
             f"step {step.number} holds no state of a contact with friction: it lacks "
             f"{', '.join(sorted(missing))}"
         )
     state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
-    state |= {name: float(step.history[name]) for name in (*_SCALARS, *RESIDUALS.values())}
+    state |= {name: float(step.history[name]) for name in _NUMBERS}
     state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
     return ContactState(**state)  # a finished step has converged, and away from the rim

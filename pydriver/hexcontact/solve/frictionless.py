@@ -24,7 +24,7 @@ from ..errors import DeckError
 from ..problem.loads import MOTIONS
 from ..result.step import Step
 from ..text import listed
-from ..variables import FIELDS
+from ..variables import DISPLACEMENTS, STATE
 from .events import Listener
 
 if TYPE_CHECKING:
@@ -35,19 +35,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-STATE = {  # fields of every step, without and with friction; the next step needs no others
-    False: ("pressure", "gap", "zone"),
-    True: (
-        *("pressure", "traction_x", "traction_y", "gap", "zone"),
-        *("relative_displacement_x", "relative_displacement_y"),
-        *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
-    ),
-}
 # Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap,
 # zones, on their way through the core. With friction: the state before, itself and on its way through the
 # core both ways, gaps, coordinates.
 ARRAYS = {False: 8, True: 34}
-DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"))
 S = TypeVar("S", NormalSolution, "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float

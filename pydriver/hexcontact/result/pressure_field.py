@@ -6,47 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.edges import ContactEdges
+from ..core.interpolation import linear as linear
+from ..core.interpolation import pressure_between
 
 Array = NDArray[np.float64]
-
-
-def linear(values: Array, basis: Array, start: tuple[float, float], x: ArrayLike, y: ArrayLike) -> Array:
-    """Interpolate values at the nodes of a lattice linearly on its triangles; 0 outside the window.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_row, n_col)
-        Values at the nodes.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
-    x, y : array_like
-        Points, m.
-
-    Returns
-    -------
-    ndarray
-        Values at the points, in their shape.
-    """
-    points = np.stack([np.ravel(x), np.ravel(y)], axis=1) - start
-    col, row = np.linalg.solve(np.asarray(basis).T, points.T)
-    col, row = np.round(col, 9), np.round(row, 9)  # a node is a node
-    i, j = np.floor(col).astype(int), np.floor(row).astype(int)
-    u, v = col - i, row - j
-    padded = np.pad(values, 1)
-    n_row, n_col = padded.shape
-    lower = u + v <= 1
-    total = np.zeros(u.shape)
-    for dj, di, weight in (
-        (0, 0, np.maximum(1 - u - v, 0.0)),
-        (0, 1, np.where(lower, u, 1 - v)),
-        (1, 0, np.where(lower, v, 1 - u)),
-        (1, 1, np.maximum(u + v - 1, 0.0)),
-    ):
-        value = padded[np.clip(j + dj + 1, 0, n_row - 1), np.clip(i + di + 1, 0, n_col - 1)]
-        total += np.where(weight > 0.0, weight * value, 0.0)
-    return total.reshape(np.shape(x))
 
 
 class PressureField:
@@ -71,6 +34,4 @@ class PressureField:
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the pressure (Pa) at some points (m), in their shape; 0 outside the window."""
-        plain = linear(self._pressure, self._basis, self._start, x, y)
-        square = linear(self._squares, self._basis, self._start, x, y)
-        return np.where(np.isnan(square), plain, np.sqrt(np.maximum(square, 0.0)))
+        return pressure_between(self._pressure, self._squares, self._basis, self._start, x, y)

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.interpolation import linear, nearest
 from ..errors import DeckError
 from ..text import did_you_mean
 from ..variables import NOT_KEPT, VARIABLES
-from .pressure_field import linear
 
 if TYPE_CHECKING:
     import xarray
@@ -55,28 +55,8 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     start = float(lattice.x[0, 0]), float(lattice.y[0, 0])
     variable = VARIABLES[name]
-    if variable.flags:
-        return _nearest(lattice, values, start, x, y, variable.padding)
-    found = linear(np.asarray(values, dtype=float), lattice.basis, start, x, y)
-    if math.isnan(variable.padding):
-        inside = linear(np.ones(lattice.shape), lattice.basis, start, x, y)
-        found = np.where(inside > 1.0 - _SAME, found, np.nan)
-    return found
-
-
-def _nearest(
-    lattice: Lattice, values: NDArray[Any], start: Point, x: Array, y: Array, outside: float
-) -> Array:
-    """Return values at the nodes next to some points."""
-    away = np.stack([x - start[0], y - start[1]], axis=-1)
-    corner = np.floor(away @ np.linalg.inv(lattice.basis))
-    corners = corner + np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).reshape(4, *(1,) * x.ndim, 2)
-    distance = np.linalg.norm(corners @ lattice.basis - away, axis=-1)
-    chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0].astype(int)
-    col, row = chosen[..., 0], chosen[..., 1]
-    inside = (row >= 0) & (row < lattice.n_row) & (col >= 0) & (col < lattice.n_col)
-    at = values[np.clip(row, 0, lattice.n_row - 1), np.clip(col, 0, lattice.n_col - 1)]
-    return np.where(inside, at, outside).astype(float)
+    between = nearest if variable.flags else linear
+    return between(values, lattice.basis, start, x, y, variable.padding)
 
 
 # --- lines --------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..analytic.hertz_gap import SIMILAR, QuadraticGap
 from ..text import visible
 from ..variables import LARGEST, NOT_KEPT
-from .pressure_field import PressureField, linear
+from .pressure_field import PressureField
 from .result import Result
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ module hc_f2py_steps
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t
   use hc_coulomb, only: coulomb_t
-  use hc_step_error, only: step_change_t, compare_halves
+  use hc_step_error, only: step_change_t, compare_halves, shear_free
   use hc_step_control, only: step_control_t, step_attempt_t
   implicit none
   private
 
-  public :: change_by_halving, first_attempt, judge_attempt, accept_attempt
+  public :: change_by_halving, is_shear_free, first_attempt, judge_attempt, accept_attempt
 
   !> Fields of a state that are compared: pressure, gap, traction along x and along y.
   integer, parameter :: n_field = 4
@@ -65,6 +65,23 @@ contains
     end if
     call report(error, code, message)
   end subroutine change_by_halving
+
+  !> Does a state have no shear tractions?
+  subroutine is_shear_free(n_col, n_row, pressure, traction_x, traction_y, shearless)
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Pressure and shear tractions [Pa]
+    real(c_double), intent(in) :: pressure(n_col, n_row), traction_x(n_col, n_row), traction_y(n_col, n_row)
+    !> Not zero: none
+    integer(c_int), intent(out) :: shearless
+    type(contact_state_t) :: state
+
+    allocate (state%pressure, source=pressure)
+    allocate (state%traction(n_col, n_row, 2))
+    state%traction(:, :, 1) = traction_x
+    state%traction(:, :, 2) = traction_y
+    shearless = merge(1, 0, shear_free(state))
+  end subroutine is_shear_free
 
   !> The first attempt at a load step.
   subroutine first_attempt(control, fraction, largest, attempt)

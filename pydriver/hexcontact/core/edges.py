@@ -114,4 +114,5 @@ class ContactEdges:
             _api.count_cut_triangles(zone),
         )
         raise_for(code, message)
-        return Edge(*numbers.tolist(), segments.T[:count])
+        area, radius, length = numbers.tolist()
+        return Edge(area, radius, length, segments.T[:count])

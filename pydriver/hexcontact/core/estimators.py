@@ -1,4 +1,4 @@
-"""Size and shape of a contact or stick zone from its nodes, as the core finds them.
+"""Size and shape of a contact or stick zone from its nodes, and errors of lattices, as the core finds them.
 
 Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i+-1), (j+-1, i), (j+-1, i-+1).
 """
@@ -77,7 +77,8 @@ def boundary_circle(
     CircleFit
     """
     numbers, count = _api.circle_of_zone(x.T, y.T, zone.T, spacing, center)
-    return CircleFit(*numbers.tolist(), count)
+    radius, mean, standard = numbers.tolist()
+    return CircleFit(radius, mean, standard, count)
 
 
 def area_radius(zone: Mask, cell_area: float) -> float:
@@ -163,6 +164,28 @@ def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse
     numbers, code, message = _api.ellipse_of_pressure(x.T, y.T, pressure.T, spacing)
     raise_for(code, message)
     return _ellipse(numbers)
+
+
+def limits_of_error(spacings: Array, values: Array) -> Array:
+    """Estimate how far values on the first, finest lattice are from their limit for a vanishing spacing.
+
+    A trend c h^p with p from 1 to 2 and a scatter in proportion to h are fitted (theory, section 12).
+
+    Parameters
+    ----------
+    spacings : ndarray, (n,)
+        Spacings in units of the first.
+    values : ndarray, (n, m)
+        m quantities, on each of the lattices.
+
+    Returns
+    -------
+    ndarray, (m,)
+        What hardly any error exceeds; NaN where a value is.
+    """
+    errors, code, message = _api.errors_of_limits(spacings, values)
+    raise_for(code, message)
+    return np.asarray(errors)
 
 
 def _ellipse(numbers: Array) -> Ellipse:

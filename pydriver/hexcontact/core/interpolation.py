@@ -39,14 +39,14 @@ def linear(
     ndarray
         Values at the points, in their shape.
     """
-    return _at_points(_api.field_between_nodes, basis, start, (values.T, outside), x, y)
+    return _at_points(_api.field_between_nodes, basis, start, (np.asarray(values).T, outside), x, y)
 
 
 def nearest(
     values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
 ) -> Array:
     """Return the values at the nodes next to some points; parameters as of `linear`."""
-    return _at_points(_api.field_at_nearest_nodes, basis, start, (values.T, outside), x, y)
+    return _at_points(_api.field_at_nearest_nodes, basis, start, (np.asarray(values).T, outside), x, y)
 
 
 def pressure_between(

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.edges import ContactEdges
-from ..core.interpolation import linear as linear
 from ..core.interpolation import pressure_between
 
 Array = NDArray[np.float64]

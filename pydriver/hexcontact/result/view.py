@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analytic.hertz_gap import SIMILAR, QuadraticGap
+from ..core.interpolation import linear
 from ..text import visible
 from ..variables import LARGEST, NOT_KEPT
 from .pressure_field import PressureField

@@ -152,7 +152,7 @@ contains
     !> State
     type(contact_state_t), intent(in) :: state
     real(wp) :: shear(size(state%traction, 1), size(state%traction, 2))
-    shear = norm2(state%traction, dim=3)
+    shear = hypot(state%traction(:, :, 1), state%traction(:, :, 2))
   end function shear
 
 end module hc_step_error

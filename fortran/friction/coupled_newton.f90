@@ -11,7 +11,7 @@ module hc_coupled_newton
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
   use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
-  use hc_friction_iterate, only: iterate_t
+  use hc_friction_iterate, only: iterate_t, rounding
   use hc_staggered_newton, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
   use hc_friction_systems, only: coupled_system_t
   use hc_krylov, only: projected_gmres, fulfil
@@ -41,7 +41,7 @@ contains
     logical, allocatable :: active(:), shear_active(:), contact(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
-    real(wp) :: missing(4), multiplier(4), goal, residual
+    real(wp) :: missing(4), multiplier(4), goal, residual, drift
     integer :: n, m, k, n_shear, iterations
     logical :: independent
 
@@ -55,7 +55,7 @@ contains
     system%shear => now%shear
     call now%pressure%take(now%contact)
     system%edge = now%pressure%edge
-    system%n_threads = now%operators%n_threads
+    system%space = now%operators%space
     allocate (active(3*n), x(3*n), ax(3*n), rhs(3*n), weight(3*n), plane(2*n))
     active(:n) = now%contact
     active(n + 1:) = shear_active
@@ -98,19 +98,21 @@ contains
       if (allocated(error)) return
       mb(:n, m:) = part
     end if
-    call fulfil(rows, mb, missing(:m), x, independent, system%n_threads)
+    call fulfil(rows, mb, missing(:m), x, independent, system%space)
     if (independent) then
       call system%product(x, ax, error)
       if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
       call find_wanted(now, rhs(n + 1:))
-      weight(:n) = 1.0_wp/(now%problem%normal_compliance*maxval(now%p))
+      weight(:n) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
       weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
                  final_accuracy*now%tolerance)
-      goal = goal*real(count(active), wp)**0.25_wp
+      goal = goal*real(system%space%count(active), wp)**0.25_wp
       call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
-                           independent, residual, iterations, now%outcome, error)
+                           independent, residual, iterations, now%outcome, error, drift)
+      if (allocated(error)) return
+      if (drift > rounding) call system%product(x, ax, error)
       if (allocated(error)) return
     end if
     ! where all nodes slip, only their directions resist a load: not beyond reason

@@ -21,7 +21,7 @@ module hc_krylov
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: eliminate
   use hc_active_set, only: packing_t, new_packing
-  use hc_vectors, only: fill, dot, dots, add_columns, sum_block
+  use hc_field_space, only: field_space_t, sum_block
   implicit none
   private
 
@@ -35,8 +35,8 @@ module hc_krylov
   !> A symmetric positive definite operator with a preconditioner, on fields that
   !> are kept as vectors over all nodes.
   type, abstract :: linear_system_t
-    !> Threads that share the vector operations
-    integer :: n_threads = 1
+    !> Space of the vectors
+    type(field_space_t) :: space
   contains
     !> y = A x for an x that vanishes off the active nodes; y is wanted everywhere
     procedure(linear_map), deferred :: product
@@ -80,7 +80,7 @@ contains
     do m = 1, size(constraint, 2)
       call system%precondition(constraint(:, m), mb(:, m), error)
       if (allocated(error)) return
-      !$omp parallel do schedule(static) num_threads(system%n_threads)
+      !$omp parallel do schedule(static) num_threads(system%space%threads)
       do i = 1, size(active)
         if (.not. active(i)) mb(i, m) = 0.0_wp
       end do
@@ -91,7 +91,7 @@ contains
   !> x <- x + M B (C^T M B)^-1 missing: make C^T x what it should be; mostly C is B.
   !>
   !> M B is about the traction that a rigid motion of the active nodes causes.
-  subroutine fulfil(rows, mb, missing, x, independent, n_threads)
+  subroutine fulfil(rows, mb, missing, x, independent, space)
     !> C and M B
     real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> What C^T x lacks
@@ -100,25 +100,25 @@ contains
     real(wp), intent(inout), contiguous :: x(:)
     !> False where the constraints depend on each other: x is left alone
     logical, intent(out) :: independent
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp) :: inverse(size(missing), size(missing))
     integer :: m
 
-    call invert_gram(rows, mb, inverse, independent, n_threads)
-    if (independent) call add_columns(mb, [(dot_product(inverse(m, :), missing), m=1, size(missing))], x, n_threads)
+    call invert_gram(rows, mb, inverse, independent, space)
+    if (independent) call space%add_columns(mb, [(dot_product(inverse(m, :), missing), m=1, size(missing))], x)
   end subroutine fulfil
 
   !> (C^T M B)^-1, zero if the constraints depend on each other.
-  subroutine invert_gram(rows, mb, inverse, independent, n_threads)
+  subroutine invert_gram(rows, mb, inverse, independent, space)
     !> C and M B
     real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> The inverse
     real(wp), intent(out) :: inverse(:, :)
     !> The matrix can be inverted
     logical, intent(out) :: independent
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp) :: gram(size(mb, 2), size(mb, 2)), scale(size(mb, 2))
     integer :: m, k
 
@@ -127,7 +127,7 @@ contains
     if (size(mb, 2) == 0) return
     do m = 1, size(mb, 2)
       do k = 1, size(mb, 2)
-        gram(k, m) = dot(rows(:, k), mb(:, m), n_threads)
+        gram(k, m) = space%dot(rows(:, k), mb(:, m))
       end do
       scale(m) = gram(m, m)
     end do
@@ -146,7 +146,7 @@ contains
 
   !> Preconditioned conjugate gradients with projection on the constraints.
   subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, &
-                          multiplier, residual, iterations, outcome, error)
+                          multiplier, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
@@ -171,38 +171,43 @@ contains
     integer, intent(out) :: iterations, outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> What rounding errors of the largest residual on the way may have left in A x
+    !> (Greenbaum, SIAM J. Matrix Anal. Appl. 18, 1997, 535-551)
+    real(wp), intent(out), optional :: drift
 
     type(packing_t) :: nodes
     !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
     real(wp), allocatable :: from(:), onto(:)
     !> On the active nodes
     real(wp), allocatable :: r(:), z(:), d(:), ad(:), x_active(:), ax_active(:), rhs_active(:), b(:, :), m_b(:, :)
-    real(wp) :: rz, rz_old, curvature, step
+    real(wp) :: rz, rz_old, curvature, step, largest
     real(wp) :: inverse(size(constraint, 2), size(constraint, 2))
-    integer :: i, m, n_threads
+    integer :: i, m
+    type(field_space_t) :: space
     logical :: independent
 
-    n_threads = system%n_threads
-    call new_packing(nodes, active, n_threads)
+    space = system%space
+    call new_packing(nodes, active, space)
     associate (n => nodes%n_active)
       allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
     end associate
     allocate (onto(size(x)), from(size(x)))
-    call fill(from, 0.0_wp, n_threads)
+    call space%fill(from, 0.0_wp)
     call nodes%pack_columns(constraint, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack(x, x_active)
     call nodes%pack(ax, ax_active)
     call nodes%pack(rhs, rhs_active)
-    call invert_gram(b, m_b, inverse, independent, n_threads)
+    call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0
+    largest = 0.0_wp
     outcome = iterations_used_up
     rz_old = 0.0_wp
     multiplier = 0.0_wp
     if (size(multiplier) > 0) then
-      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       do m = 1, size(multiplier)
-        multiplier(m) = -dot(b(:, m), r, n_threads)/dot(b(:, m), b(:, m), n_threads)
+        multiplier(m) = -space%dot(b(:, m), r)/space%dot(b(:, m), b(:, m))
       end do
     end if
     do
@@ -210,23 +215,24 @@ contains
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
       ! What is left is normal to M B, which keeps the projected preconditioner
       ! symmetric even if the given M B is not quite what its name says.
-      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       if (size(multiplier) > 0) then
-        multiplier = multiplier - matmul(dots(m_b, r, n_threads), inverse)
-        call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
+        multiplier = multiplier - matmul(space%dots(m_b, r), inverse)
+        call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       end if
+      largest = max(largest, residual)
       if (residual <= tolerance .or. iterations >= max_iterations) exit
       call nodes%unpack(r, from)
       call system%precondition(from, onto, error)
       if (allocated(error)) return
       call nodes%pack(onto, z)
-      call add_columns(m_b, -matmul(inverse, dots(b, z, n_threads)), z, n_threads)
+      call space%add_columns(m_b, -matmul(inverse, space%dots(b, z)), z)
 
-      rz = dot(r, z, n_threads)
+      rz = space%dot(r, z)
       step = 0.0_wp
       if (iterations > 0) step = rz/rz_old
       rz_old = rz
-      !$omp parallel do schedule(static) num_threads(n_threads)
+      !$omp parallel do schedule(static) num_threads(space%threads)
       do i = 1, size(d)
         if (iterations > 0) then
           d(i) = z(i) + step*d(i)
@@ -239,14 +245,14 @@ contains
       call system%product(from, onto, error)
       if (allocated(error)) return
       call nodes%pack(onto, ad)
-      curvature = dot(d, ad, n_threads)
+      curvature = space%dot(d, ad)
       ! nothing is left to gain in working precision
       if (.not. curvature > 0.0_wp) then
         outcome = solution_broke_off
         exit
       end if
       step = rz/curvature
-      !$omp parallel num_threads(n_threads)
+      !$omp parallel num_threads(space%threads)
       !$omp do schedule(static)
       do i = 1, size(d)
         x_active(i) = x_active(i) + step*d(i)
@@ -263,13 +269,14 @@ contains
     end do
     if (residual <= tolerance) outcome = solution_accurate
     ! the largest of several numbers hides one that is not a number
-    if (.not. ieee_is_finite(dot(r, r, n_threads))) outcome = solution_broke_off
+    if (.not. ieee_is_finite(space%dot(r, r))) outcome = solution_broke_off
     call nodes%unpack(x_active, x)
+    if (present(drift)) drift = epsilon(1.0_wp)*largest
   end subroutine projected_cg
 
   !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
   subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
-                             multiplier, independent, residual, iterations, outcome, error)
+                             multiplier, independent, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
@@ -298,10 +305,13 @@ contains
     integer, intent(out) :: iterations, outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> What rounding errors of the first residual may have left in A x, in that norm
+    real(wp), intent(out), optional :: drift
 
     type :: direction_t
-      !> Weighted residual on the active nodes, and the product A z, over all nodes, that the next one comes from
-      real(wp), allocatable :: v(:), image(:)
+      !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
+      !> nodes; the product A z over all nodes
+      real(wp), allocatable :: v(:), z(:), image(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
@@ -309,34 +319,37 @@ contains
     !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
     real(wp), allocatable :: from(:), onto(:)
     !> On the active nodes
-    real(wp), allocatable :: z(:), combined(:), w(:), packed(:), b(:, :), m_b(:, :), c_rows(:, :)
+    real(wp), allocatable :: w(:), packed(:), b(:, :), m_b(:, :), c_rows(:, :)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
-    real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
+    real(wp) :: y(max_iterations), share(size(multiplier), max_iterations), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
-    integer :: i, k, n_threads, stat
+    integer :: i, k, stat
+    type(field_space_t) :: space
 
     iterations = 0
     residual = huge(1.0_wp)
+    if (present(drift)) drift = 0.0_wp
     outcome = solution_broke_off
-    n_threads = system%n_threads
-    call new_packing(nodes, active, n_threads)
+    space = system%space
+    call new_packing(nodes, active, space)
     call nodes%pack_columns(columns, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack_columns(rows, c_rows)
-    call invert_gram(c_rows, m_b, inverse, independent, n_threads)
+    call invert_gram(c_rows, m_b, inverse, independent, space)
     if (.not. independent) return
     associate (n => nodes%n_active)
-      allocate (basis(1)%v(n), z(n), w(n), packed(n))
+      allocate (basis(1)%v(n), w(n), packed(n))
     end associate
     allocate (onto(size(x)), from(size(x)), source=0.0_wp)
     call nodes%pack(weight, w)
     call nodes%pack(rhs, basis(1)%v)
     call nodes%pack(ax, packed)
     basis(1)%v = basis(1)%v - packed
-    call add_columns(b, multiplier, basis(1)%v, n_threads)
+    call space%add_columns(b, multiplier, basis(1)%v)
     basis(1)%v = w*basis(1)%v
-    length = sqrt(dot(basis(1)%v, basis(1)%v, n_threads))
+    length = sqrt(space%dot(basis(1)%v, basis(1)%v))
     residual = length
+    if (present(drift)) drift = epsilon(1.0_wp)*length
     if (length <= 0.0_wp) outcome = solution_accurate
     if (.not. length > 0.0_wp) return
     outcome = iterations_used_up
@@ -346,24 +359,29 @@ contains
     h = 0.0_wp
 
     do k = 1, max_iterations
-      call expand(basis(k)%v, error)
-      if (allocated(error)) return
-      allocate (basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
+      allocate (basis(k)%z(nodes%n_active), basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
       if (stat /= 0) then
         call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
         return
       end if
-      call nodes%unpack(z, from)
+      packed = basis(k)%v/w
+      call nodes%unpack(packed, from)
+      call system%precondition(from, onto, error)
+      if (allocated(error)) return
+      call nodes%pack(onto, basis(k)%z)
+      share(:, k) = -matmul(inverse, space%dots(c_rows, basis(k)%z))
+      call space%add_columns(m_b, share(:, k), basis(k)%z)
+      call nodes%unpack(basis(k)%z, from)
       call system%product(from, basis(k)%image, error)
       if (allocated(error)) return
       call nodes%pack(basis(k)%image, basis(k + 1)%v)
-      call add_columns(b, -share, basis(k + 1)%v, n_threads)
+      call space%add_columns(b, -share(:, k), basis(k + 1)%v)
       basis(k + 1)%v = w*basis(k + 1)%v
       do i = 1, k
-        h(i, k) = dot(basis(i)%v, basis(k + 1)%v, n_threads)
+        h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
         basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
       end do
-      h(k + 1, k) = sqrt(dot(basis(k + 1)%v, basis(k + 1)%v, n_threads))
+      h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
       if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
       do i = 1, k - 1
         rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
@@ -387,38 +405,19 @@ contains
     do i = iterations, 1, -1
       y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
     end do
-    allocate (combined(nodes%n_active), source=0.0_wp)
+    ! solution and product from the same directions: the preconditioner is of single precision, and where a node
+    ! slips far the matrix would make displacements of its rounding errors
+    call nodes%pack(x, packed)
     do i = 1, iterations
-      combined = combined + y(i)*basis(i)%v
+      packed = packed + y(i)*basis(i)%z
       ax = ax + y(i)*basis(i)%image
     end do
-    call expand(combined, error)
-    if (allocated(error)) return
-    call nodes%pack(x, packed)
-    packed = packed + z
+    multiplier = multiplier + matmul(share(:, :iterations), y(:iterations))
     call nodes%unpack(packed, x)
-    multiplier = multiplier + share
-
-  contains
-
-    !> z = M (r + B share) with C^T z = 0, r the unweighted residual of a basis vector.
-    subroutine expand(vector, error)
-      real(wp), intent(in) :: vector(:)
-      type(error_t), allocatable, intent(out) :: error
-
-      packed = vector/w
-      call nodes%unpack(packed, from)
-      call system%precondition(from, onto, error)
-      if (allocated(error)) return
-      call nodes%pack(onto, z)
-      share = -matmul(inverse, dots(c_rows, z, n_threads))
-      call add_columns(m_b, share, z, n_threads)
-    end subroutine expand
-
   end subroutine projected_gmres
 
   !> r = rhs - A x + B m and its largest element.
-  subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, n_threads)
+  subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, space)
     !> Constraint vectors and multipliers
     real(wp), intent(in), contiguous :: b(:, :)
     real(wp), intent(in) :: multiplier(:)
@@ -428,12 +427,12 @@ contains
     real(wp), intent(inout), contiguous :: r(:)
     !> Its largest element
     real(wp), intent(out) :: largest
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     integer :: i, m, from, to
 
     largest = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(n_threads) private(i, m, to) reduction(max: largest)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, to) reduction(max: largest)
     do from = 1, size(r), sum_block
       to = min(from + sum_block - 1, size(r))
       do i = from, to

@@ -441,7 +441,8 @@ def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[
         a = np.sqrt(2.0 * value * d / (3.0 * k * small))
     load = np.pi * effective_modulus * small * a**3 / d
     delta = 1.5 * load * k / (np.pi * effective_modulus * a)
-    angle = np.arctan2(axes[1, 0], axes[0, 0]) if m1 < 1.0 else 0.0
+    # Axes that differ by rounding alone have no direction.
+    angle = np.arctan2(axes[1, 0], axes[0, 0]) if m1 < 1.0 - 1e-9 else 0.0
     angle = np.pi / 2 - (np.pi / 2 - angle) % np.pi  # an axis has no sense: (-pi/2, pi/2]
     b = a * np.sqrt(m1)
     return EllipticContact(

@@ -368,7 +368,9 @@ def _family(views: Sequence[StepView], exact: Sequence[PartialSlip | None], cut:
     limit = views[-1].friction * views[-1].at(*cut.points) if bounded else np.zeros(place.size)
     for axes, k in zip(panels[1:], shown, strict=True):
         axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=1)
-        signs = {float(np.sign(pair[k][np.argmax(np.abs(pair[k]))])) for pair in parts} - {0.0}
+        signs = [
+            sign for sign in (1.0, -1.0) if max((sign * pair[k]).max() for pair in parts) > 0.05 * largest
+        ]
         for pair, solution, color in zip(parts, exact, shades(len(views)), strict=True):
             joined = {"ls": "-", "lw": 0.6} if solution is None else {}
             axes.plot(place, pair[k] * to_stress, color=color, zorder=3, **{**cut.look(), **joined})

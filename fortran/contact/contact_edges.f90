@@ -353,7 +353,7 @@ contains
     !> What is found
     type(one_sided_t), intent(out) :: seen
     logical :: whole(band%n), known(band%n)
-    real(wp) :: slope(band%n), smooth(band%n), flat(band%n), steepness, bend, weight(6), to(2, 6)
+    real(wp) :: slope(band%n), smooth(band%n), flat(band%n), steepness, bend, to(2, 6)
     integer :: k
 
     to = to_neighbors()
@@ -371,26 +371,25 @@ contains
 
     seen%direction = band%gradient(smooth, whole)
     flat = 0.0_wp
-    known = .false.
-    seen%has_slope = known
+    seen%has_slope = whole
+    seen%has_direction = whole
+    known = whole
     do k = 1, band%n
       steepness = norm2(seen%direction(:, k))
       if (.not. whole(k)) cycle
-      ! second derivative along n from those along the three lines of nodes at angles t to n, with weights 1 + 2 cos 2t
-      ! (where the gradient is but rounding, as in the middle of few nodes, there is no n, and the mean of all counts)
-      weight = 1.0_wp
-      known(k) = steepness > no_slope*smooth(k)
-      if (known(k)) then
+      if (steepness > no_slope*smooth(k)) then
         seen%direction(:, k) = seen%direction(:, k)/steepness
-        weight = 4.0_wp*matmul(seen%direction(:, k), to)**2 - 1.0_wp
+      else
+        ! but a rounding error, as in the middle of few nodes: one direction is as good as another
+        seen%direction(:, k) = [1.0_wp, 0.0_wp]
       end if
-      bend = sum(weight*(smooth(band%beside(:, k)) - smooth(k)))/3.0_wp
+      ! second derivative along n from those along the three lines of nodes at angles t to n, with weights 1 + 2 cos 2t
+      bend = sum((4.0_wp*matmul(seen%direction(:, k), to)**2 - 1.0_wp)*(smooth(band%beside(:, k)) - smooth(k)))/3.0_wp
       slope(k) = steepness**2 - 2.0_wp*smooth(k)*bend
       if (slope(k) < least_slope*steepness**2) flat(k) = 1.0_wp
       slope(k) = sqrt(max(slope(k), least_slope*steepness**2))
       seen%has_slope(k) = slope(k) > 0.0_wp
     end do
-    seen%has_direction = known
     call band%extend(flat, whole)
     call band%extend(slope, seen%has_slope)
     call band%extend(seen%direction(1, :), known)

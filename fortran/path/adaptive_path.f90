@@ -181,7 +181,7 @@ contains
     if (.not. halves%converged) return
     where (spread(halves%zone /= separated, 3, 2))
       halves%slip_increment = half%slip_increment + halves%slip_increment
-    elsewhere
+    else where
       halves%slip_increment = 0.0_wp
     end where
     halves%cuts = half%cuts + halves%cuts

@@ -12,10 +12,10 @@ program press_and_shear
   type(load_target_t) :: target
   type(adaptive_path_t) :: path
   type(contact_edges_t) :: edges
-  type(zone_edge_t) :: area
+  type(zone_edge_t) :: contact_area, stick_area
   type(error_t), allocatable :: error
   real(wp) :: x(61, 61), y(61, 61)
-  integer :: segment
+  integer :: segment, steps
 
   call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(70.0e9_wp, 0.33_wp), error)  ! steel, aluminum
   if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(7.0e-6_wp), [-30, -30], shape(x), error)
@@ -27,21 +27,23 @@ program press_and_shear
   if (allocated(error)) error stop error%message
   call new_friction_state(state, lattice)
   call path%begin(state, pi*(0.13e-3_wp)**2)            ! the contact will be about that large
-  print '(a)', 'segment  part  normal load  shear load     stick area  its error by load steps'
   do segment = 1, 2
     target%value(normal) = 15.0_wp                      ! first up to 15 N,
     if (segment == 2) target%value(along_x) = 3.0_wp    ! then up to 3 N along x
+    steps = 0
     do
       call path%advance(contact, target, step_tolerance=0.05_wp, tolerance=1.0e-8_wp, max_sweeps=40, max_cuts=6, error=error)
       if (allocated(error)) error stop error%message
       if (.not. path%state%converged) error stop 'no convergence'
-      state = path%state
-      call new_contact_edges(edges, lattice, state%pressure, state%gap, state%zone > 0, x < 1)
-      area = edges%stick_edge(state%zone == stick, 0.3_wp*state%pressure - norm2(state%traction, dim=3))
-      print '(i7, f6.2, 2(f11.3, a), f12.0, a, f12.0, a)', segment, path%fraction, state%load(normal), ' N', &
-        state%load(along_x), ' N', area%area/1.0e-12_wp, ' um2', path%stick_area_error/1.0e-12_wp, ' um2'
-      if (path%fraction >= 1) exit
+      steps = steps + 1
+      if (path%fraction >= 1) exit                      ! the end of the segment
     end do
+    state = path%state
+    call new_contact_edges(edges, lattice, state%pressure, state%gap, state%zone > 0, x < 1)
+    contact_area = edges%contact_edge()
+    stick_area = edges%stick_edge(state%zone == stick, 0.3_wp*state%pressure - norm2(state%traction, dim=3))
+    print '(i0, a, 2(f5.1, a))', steps, ' steps: stick ', 100*stick_area%area/contact_area%area, &
+      ' % of the contact area, within', 100*path%stick_area_error/contact_area%area, ' %'
   end do
   print '(a, f6.4, a)', 'shift  ', state%motion(along_x)/1.0e-6_wp, ' um'
   print '(a, f6.2, a)', 'energy ', state%dissipated_energy/1.0e-9_wp, ' nJ taken by friction'

@@ -9,7 +9,7 @@ module hc_interpolation
   implicit none
   private
 
-  public :: interpolate, interpolate_pressure, nearest_value
+  public :: interpolate, interpolate_pressure, nearest_node
 
   !> Positions along a spacing that differ: a point that is closer to a node is that node.
   real(wp), parameter :: places = 1.0e9_wp
@@ -66,27 +66,29 @@ contains
     end if
   end function interpolate_pressure
 
-  !> Value at the node next to a point.
-  pure real(wp) function nearest_value(lattice, values, point, outside) result(value)
+  !> The node next to a point, and whether the window has it; without it the one at the rim.
+  pure subroutine nearest_node(lattice, point, node, inside)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Values at the nodes (n_col, n_row)
-    real(wp), intent(in) :: values(:, :)
     !> x and y [m]
     real(wp), intent(in) :: point(2)
-    !> Value where that node is outside the window
-    real(wp), intent(in) :: outside
+    !> Column and row, counted from 0 at the first node of the window
+    integer, intent(out) :: node(2)
+    !> It is the next one
+    logical, intent(out) :: inside
     real(wp) :: at(2), distance(4)
     integer :: k
 
-    value = outside
-    at = coordinates_of(lattice, point)
-    if (.not. all(at > -1.0_wp .and. at < lattice%extent)) return
+    ! beyond the rim all nodes are outside, and far ones have no index
+    at = min(max(coordinates_of(lattice, point), -2.0_wp), lattice%extent + 1.0_wp)
     do k = 1, size(distance)
       distance(k) = norm2(matmul(lattice%basis, floor(at) + cell(:, k) - at))
     end do
-    value = value_at(values, floor(at) + cell(:, minloc(distance, dim=1)), outside)
-  end function nearest_value
+    associate (next => floor(at) + cell(:, minloc(distance, dim=1)))
+      node = min(max(next, 0), lattice%extent - 1)
+      inside = all(node == next)
+    end associate
+  end subroutine nearest_node
 
   !> Column and row of a point, counted from 0 at the first node of the window.
   pure function coordinates_of(lattice, point) result(at)

@@ -7,7 +7,7 @@ module hc_f2py_measures
   use hc_error, only: error_t, status, raise
   use hc_f2py_handles, only: report
   use hc_lattice, only: lattice_t, new_lattice
-  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_value
+  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   use hc_zone_estimators, only: boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, &
     edge_ellipse, circle_fit_t, ellipse_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t, cut_triangles
@@ -17,7 +17,7 @@ module hc_f2py_measures
 
   public :: zone_boundary, circle_of_zone, radius_of_area, radius_of_pressure, center_of_pressure, ellipse_of_zone
   public :: ellipse_of_pressure, count_cut_triangles, edge_of_zone, pressure_squares
-  public :: field_between_nodes, pressure_between_nodes, field_at_nearest_nodes, errors_of_limits
+  public :: field_between_nodes, pressure_between_nodes, nodes_next_to, errors_of_limits
 
 contains
 
@@ -273,33 +273,43 @@ contains
     call report(error, code, message)
   end subroutine pressure_between_nodes
 
-  !> A field at the nodes next to points.
-  subroutine field_at_nearest_nodes(n_col, n_row, basis, start, values, outside, n, x, y, found, code, message)
+  !> The nodes next to points.
+  subroutine nodes_next_to(basis, start, extent, n, x, y, col, row, inside, code, message)
     !f2py threadsafe
-    !> Number of columns and rows
-    integer(c_int), intent(in) :: n_col, n_row
     !> Basis vectors as columns, position of the first node [m]
     real(c_double), intent(in) :: basis(2, 2), start(2)
-    !> Values at the nodes, and outside the window
-    real(c_double), intent(in) :: values(n_col, n_row), outside
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: extent(2)
     !> Number of points
     integer(c_int), intent(in) :: n
     !> Points [m]
     real(c_double), intent(in) :: x(n), y(n)
-    !> Values there
-    real(c_double), intent(out) :: found(n)
+    !> Column and row of each, counted from 0; of one at the rim if the window does not have it
+    integer(c_int), intent(out) :: col(n), row(n)
+    !> Not zero: the window has it
+    integer(c_int), intent(out) :: inside(n)
     !> Status and its message
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
     type(error_t), allocatable :: error
     type(lattice_t) :: lattice
-    integer :: i
+    integer :: i, node(2)
+    logical :: found
 
-    found = 0.0_c_double
-    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
-    if (.not. allocated(error)) found = [(nearest_value(lattice, values, [x(i), y(i)], outside), i=1, n)]
+    col = 0
+    row = 0
+    inside = 0
+    call new_lattice(lattice, basis, [0, 0], extent, error, start)
+    if (.not. allocated(error)) then
+      do i = 1, n
+        call nearest_node(lattice, [x(i), y(i)], node, found)
+        col(i) = node(1)
+        row(i) = node(2)
+        inside(i) = merge(1, 0, found)
+      end do
+    end if
     call report(error, code, message)
-  end subroutine field_at_nearest_nodes
+  end subroutine nodes_next_to
 
   !> How far values on the finest lattice are from their limit.
   subroutine errors_of_limits(n_lattice, n_value, spacings, values, errors, code, message)

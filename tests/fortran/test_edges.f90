@@ -5,7 +5,7 @@ module test_edges
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_lapack, only: least_squares
-  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_value
+  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   use hc_zone_estimators, only: area_radius, boundary, boundary_circle, circle_fit_t, edge_ellipse, edge_radius, &
     ellipse_t, moment_ellipse, pressure_center
   use hc_contact_edges, only: contact_edges_t, cut_triangles, new_contact_edges, zone_edge_t
@@ -262,6 +262,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     real(wp), allocatable :: x(:, :), y(:, :), values(:, :)
+    integer :: node(2)
+    logical :: inside
     real(wp), parameter :: point(2) = [1.23_wp, -4.56_wp], away = -7.0_wp
 
     call new_window(lattice, x, y, error)
@@ -277,10 +279,15 @@ contains
                0.75_wp + 0.25_wp*away, 1.0e-8_wp, 'a quarter of the way to a node outside')
     if (allocated(error)) return
     associate (near => minloc(hypot(x - point(1), y - point(2))))
-      call check(error, nearest_value(lattice, values, point, away), values(near(1), near(2)), 0.0_wp, 'the nearest node')
+      call nearest_node(lattice, point, node, inside)
+      call check_true(error, inside .and. all(node == near - 1), 'the nearest node')
     end associate
     if (allocated(error)) return
-    call check(error, nearest_value(lattice, values, [x(1, 9) - 0.6_wp, y(1, 9)], away), away, 0.0_wp, 'the nearest is outside')
+    call nearest_node(lattice, [x(1, 9) - 0.6_wp, y(1, 9)], node, inside)
+    call check_true(error, .not. inside .and. all(node == [0, 8]), 'the nearest is outside')
+    if (allocated(error)) return
+    call nearest_node(lattice, [1.0e30_wp, y(1, 9)], node, inside)
+    call check_true(error, .not. inside, 'a point far away')
   end subroutine test_between
 
   !> Between the nodes at the edge the pressure of Hertz, of unit radius: three times closer than straight lines.

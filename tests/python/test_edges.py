@@ -8,10 +8,9 @@ from hexcontact import Case, analytic
 from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
 from hexcontact.core.edges import ContactEdges
 from hexcontact.core.friction import ContactState, FrictionalContact
-from hexcontact.core.interpolation import linear
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch
-from hexcontact.result.pressure_field import PressureField
+from hexcontact.pressure_field import PressureField, linear
 
 RIGID_PARTNER = ElasticPair.from_materials(1.0, 0.0, None, None)  # E* = 1
 RADIUS = 50.0  # of spheres

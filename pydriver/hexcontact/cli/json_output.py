@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .._version import __version__
 from ..errors import ConvergenceError, DeckError, Fault, ResourceError
-from ..result.history import RESIDUALS
-from ..result.remarks import remarks
+from ..result.history import RESIDUALS, remarks
 from ..text import visible
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from ..errors import AccuracyWarning, DeckError
-from ..result.history import step_rows
-from ..result.remarks import remarks
+from ..result.history import remarks, step_rows
 from ..result.store import open_result
 from ..solve import log
 from ..solve import run as solve
@@ -44,7 +43,7 @@ def case_of(deck: Path, settings: list[str] | None) -> Case:
 
 def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:
     """Return the file that a run writes: what the user, else the deck, else the deck's name says."""
-    target = output or case.output.file or Path(f"{deck.stem}.nc")
+    target = output or Path(case.output.file or f"{deck.stem}.nc")
     if target.suffix in _PICTURES:
         raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
     if not target.parent.is_dir():

@@ -35,8 +35,7 @@ class Arrows(enum.StrEnum):
 @guarded
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Say what a result holds: origin, history, residuals, the last load step against Hertz."""
-    from ..result import remarks
-    from ..result.history import step_rows
+    from ..result.history import remarks, step_rows
     from ..text import rich_table
     from . import json_output
     from . import tables as summary
@@ -53,7 +52,7 @@ def info(file: ResultFile, as_json: AsJson = False) -> Content:
         console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if rows := summary.trial_rows(result):
         console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, rows))
-    for remark in remarks.remarks(histories, result.dataset.attrs):
+    for remark in remarks(histories, result.dataset.attrs):
         console.print(f"note: {remark}", soft_wrap=True)
     return None
 

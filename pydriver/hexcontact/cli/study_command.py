@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import shlex
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background
+from ..study.backend import BACKENDS
 from ..study.study import Outcome, PlannedCase, Study, StudyWatcher
-from ..study.tables import batch_text
 from ..text import quantity, visible
 from .guard import complain, say
 
@@ -152,10 +149,8 @@ def run_in_background(
 ) -> tuple[Callable[[], None], Callable[[Interrupted], bool]]:
     """Return what to do in a second thread, and what cancels it, unless the study is complete by then."""
     over, complete = threading.Event(), threading.Event()
-    if (where := study.cluster(options.get("jobs"), options.get("dask"))) is not None:
-        from ..study.dask import load
-
-        load(where)
+    kind, settings = study.backend(options.get("jobs"), options.get("dask"))
+    kind.load(settings)
 
     def work() -> None:
         try:
@@ -173,52 +168,7 @@ def run_in_background(
 
 
 def slurm_script(study: Study, path: Path, retry: bool) -> str:
-    """Return a job array that runs the missing cases; empty if there are none.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    path : Path
-        Its file.
-    retry : bool
-        Also cases that failed by themselves.
-    """
+    """Return a job array that runs the missing cases; empty if there are none."""
     numbers = sorted(study.folder.number(case) for case in study.missing(retry))
-    if not numbers:
-        return ""
-    files = [str(path.resolve()), os.path.abspath(study.output)]
-    for name in files:
-        if batch_text(name) is None:
-            raise DeckError(f'{name}: a script needs a name on one line, without " and \\')
-    options: dict[str, Any] = {
-        "job-name": study.output.stem,
-        "output": str(study.folder.folder).replace("%", "%%") + "/slurm-%A_%a.log",
-        "signal": "B:USR1@60",  # a minute before a time limit, to the command that takes the shell's place
-    }
-    options |= {key.replace("_", "-"): value for key, value in study.file.slurm.items()}
-    words = ["hexcontact", "study", files[0], "--output", files[1], *(["--retry"] if retry else [])]
-    lines = [
-        "#!/bin/sh",
-        f"# {len(numbers)} of {len(study)} cases. Afterwards: {shlex.join(words)} --collect",
-        f"#SBATCH --array={_ranges(numbers)}",
-        *(
-            f"#SBATCH --{key}" + ("" if value is True else f"={batch_text(str(value))}")
-            for key, value in options.items()
-            if value is not False
-        ),
-        "export OMP_NUM_THREADS=${SLURM_CPUS_PER_TASK:-1}",
-        f"exec {shlex.join(words)} --case $SLURM_ARRAY_TASK_ID",
-    ]
-    return "\n".join(lines)
-
-
-def _ranges(numbers: Sequence[int]) -> str:
-    """Write numbers as Slurm does: 1-4,7."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1][1:] = [number]
-        else:
-            runs.append([number])
-    return ",".join("-".join(map(str, run)) for run in runs)
+    array = BACKENDS["slurm"](study.file.slurm, len(study))
+    return array.script(numbers, path, study.output, retry) if numbers else ""

@@ -1,4 +1,4 @@
-"""Size of adaptive load steps, as the core decides it: see fortran/path/step_control.f90 and step_error.f90."""
+"""Size of adaptive load steps, as the core decides it (fortran/path: step_control, step_error)."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .lattice import Lattice
 _api = _core.hc_f2py_steps
 
 REJECTED, ACCEPTED, LIMITED, FAILED = range(4)
-"""What becomes of an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones are
-of no use; it did not converge, and is the smallest there is."""
+"""What becomes of an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones
+are of no use; it did not converge, and is the smallest there is."""
 
 _FIELDS = ("pressure", "gap", "traction_x", "traction_y")
 
@@ -152,5 +152,5 @@ class StepControl:
         return int(_api.judge_attempt(self._numbers, attempt.numbers, known, change or Change(), tolerance))
 
     def accept(self, attempt: Attempt, change: Change, tolerance: float, verdict: int) -> float:
-        """Take an attempt over; return the bound on the error of the stick area, as a share of the largest contact."""
+        """Take an attempt over; return the bound on the error of the stick area, a share of the largest contact."""
         return float(_api.accept_attempt(self._numbers, attempt.numbers, change, tolerance, verdict))

@@ -21,12 +21,11 @@ import numpy as np
 from .._version import __version__
 from ..cli import tables as summary
 from ..errors import DeckError
-from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, step_rows, worth_showing
-from ..result.remarks import remarks
+from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, remarks, step_rows, worth_showing
 from ..result.view import scaled
 from ..solve.overview import case_rows
 from ..text import escaped, quantity
-from ..variables import VARIABLES
+from ..variables import VARIABLES, label_of
 from .report_fields import kept_steps, maps_of, rounded
 
 if TYPE_CHECKING:
@@ -242,7 +241,7 @@ def _loads(histories: Sequence[History]) -> str:
             (str(segment), str(history.get("label", "")), steps, *(load_or_motion(n, history) for n in names))
         )
         before = history["step"]
-    symbols = [LOADS_AND_MOTIONS[name][0] for name in names]
+    symbols = [label_of(name) for name in names]
     return _table("Load history: the end of each segment", ("segment", "label", "steps", *symbols), rows)
 
 

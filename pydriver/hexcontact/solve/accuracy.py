@@ -2,10 +2,10 @@
 
 The lattice is refined by the square root of two from solution to solution. The difference of a solution and
 the limit has two parts: a trend with the spacing, and a scatter, since the contact lies differently on every
-lattice. The scatter is often the larger part, so that a pair of lattices tells little; it is measured where it
-costs least, on shifted copies of a coarser lattice: of the same spacing, with the origin moved by fractions of
-it. The core fits both to the last solutions (fortran/path/discretization_error.f90), in the same way for every
-scalar of the history and every load step.
+lattice. The scatter is often the larger part, so that a pair of lattices tells little; it is measured where
+it costs least, on shifted copies of a coarser lattice: of the same spacing, with the origin moved by
+fractions of it. The core fits both to the last solutions (fortran/path/discretization_error.f90), in the same
+way for every scalar of the history and every load step.
 """
 
 from __future__ import annotations

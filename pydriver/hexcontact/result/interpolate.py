@@ -1,20 +1,22 @@
 """Fields between the nodes: at any point, and along lines.
 
 A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
-a polygon, whose corners lie where the line crosses the edges of triangles; nothing is smoothed.
+a polygon, whose corners lie where the line crosses the edges of triangles; nothing is smoothed. In
+`PressureField` alone the pressure ends at the edge of the contact, like a square root.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.interpolation import linear, nearest
+from ..core.edges import ContactEdges
+from ..core.interpolation import linear, nearest_nodes, pressure_between
 from ..errors import DeckError
 from ..text import did_you_mean
 from ..variables import NOT_KEPT, VARIABLES
@@ -30,6 +32,12 @@ Fields = Mapping[str, NDArray[Any]]
 
 _MARGIN = 0.15  # of a section on both sides, in widths of the contact
 _SAME = 1e-9  # spacings between corners that are one
+
+
+def first_node(lattice: Lattice) -> Point:
+    """Return the position (m) of the first node of a window."""
+    alone = replace(lattice, n_row=1, n_col=1)
+    return alone.x.item(), alone.y.item()
 
 
 def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike, y: ArrayLike) -> Array:
@@ -53,10 +61,37 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
         Values at the points. Outside the window tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-    start = float(lattice.x[0, 0]), float(lattice.y[0, 0])
+    start = first_node(lattice)
     variable = VARIABLES[name]
-    between = nearest if variable.flags else linear
-    return between(values, lattice.basis, start, x, y, variable.padding)
+    if variable.flags:
+        row, col, inside = nearest_nodes(lattice.shape, lattice.basis, start, x, y)
+        return np.where(inside, values[row, col], variable.padding).astype(float)
+    return linear(values, lattice.basis, start, x, y, variable.padding)
+
+
+class PressureField:
+    """The pressure of a solution at any point.
+
+    Near the edge of the contact its square is interpolated, which is linear in the distance; elsewhere, and
+    where the contact ends at nodes that can never touch, the pressure itself is.
+
+    Parameters
+    ----------
+    pressure, gap : ndarray, shape (n_row, n_col)
+        Contact pressure (Pa) and gap (m) at the nodes; the gap is NaN where nothing can touch.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as rows, m.
+    start : tuple of float
+        Position of node [0, 0], m.
+    """
+
+    def __init__(self, pressure: Array, gap: Array, basis: Array, start: tuple[float, float]) -> None:
+        self._pressure, self._basis, self._start = pressure, basis, start
+        self._squares = ContactEdges(pressure, gap, pressure > 0.0, np.isfinite(gap), basis, start).squares()
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the pressure (Pa) at some points (m), in their shape; 0 outside the window."""
+        return pressure_between(self._pressure, self._squares, self._basis, self._start, x, y)
 
 
 # --- lines --------------------------------------------------------------------------------------------------
@@ -179,7 +214,7 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
             hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
             raise DeckError(f"{name} {what}{hint}")
     found = {name: np.asarray(fields[name]) for name in names or fields}
-    kept = {name: values for name, values in found.items() if _is_kept(name, values)}
+    kept = {name: values for name, values in found.items() if is_kept(values)}
     for name in names:
         if name not in kept:
             raise DeckError(f"{name} of step {step} was not kept (output.every)")
@@ -188,8 +223,9 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
     return kept
 
 
-def _is_kept(name: str, values: NDArray[Any]) -> bool:
-    return bool((values != NOT_KEPT).any() if VARIABLES[name].flags else (~np.isnan(values)).any())
+def is_kept(values: NDArray[Any]) -> bool:
+    """Tell whether the output holds a field of a step, by its values."""
+    return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())
 
 
 def profile(
@@ -227,20 +263,19 @@ def profile(
         raise DeckError(f"points = {points!r}: expected a whole number of at least 2")
     distance = line.corners(lattice) if points is None else np.linspace(0.0, line.length, points)
     x, y = line.points(distance)
-    length = {"units": "m"}
+    places = {
+        "distance": (distance - line.zero, "distance along the line"),
+        "x": (x, "x coordinate"),
+        "y": (y, "y coordinate"),
+    }
     return xarray.Dataset(
         {
             name: ("distance", interpolate(lattice, name, values, x, y), VARIABLES[name].attributes)
             for name, values in fields.items()
         },
         coords={
-            "distance": (
-                "distance",
-                distance - line.zero,
-                {"long_name": "distance along the line", **length},
-            ),
-            "x": ("distance", x, {"long_name": "x coordinate", **length}),
-            "y": ("distance", y, {"long_name": "y coordinate", **length}),
+            name: ("distance", values, {"long_name": long_name, "units": "m"})
+            for name, (values, long_name) in places.items()
         },
         attrs=attributes,
     )

@@ -152,5 +152,5 @@ class StepControl:
         return int(_api.judge_attempt(self._numbers, attempt.numbers, known, change or Change(), tolerance))
 
     def accept(self, attempt: Attempt, change: Change, tolerance: float, verdict: int) -> float:
-        """Take an attempt over; return the bound on the error of the stick area, a share of the largest contact."""
+        """Take an attempt over; return the bound on the error of the stick area over the largest contact."""
         return float(_api.accept_attempt(self._numbers, attempt.numbers, change, tolerance, verdict))

@@ -5,12 +5,14 @@
 module hc_f2py_measures
   use iso_c_binding, only: c_double, c_int
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: report
+  use hc_f2py_handles, only: report, pair_of, friction_of
   use hc_lattice, only: lattice_t, new_lattice
   use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   use hc_zone_estimators, only: boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, &
     edge_ellipse, circle_fit_t, ellipse_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t, cut_triangles
+  use hc_contact_state, only: contact_state_t
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
   use hc_discretization_error, only: limits_of_error
   implicit none
   private
@@ -18,6 +20,7 @@ module hc_f2py_measures
   public :: zone_boundary, circle_of_zone, radius_of_area, radius_of_pressure, center_of_pressure, ellipse_of_zone
   public :: ellipse_of_pressure, count_cut_triangles, edge_of_zone, pressure_squares
   public :: field_between_nodes, pressure_between_nodes, nodes_next_to, errors_of_limits
+  public :: nodal_residuals, energy_of_state, extent_of_zone
 
 contains
 
@@ -329,6 +332,102 @@ contains
     call limits_of_error(spacings, values, errors, error)
     call report(error, code, message)
   end subroutine errors_of_limits
+
+  !> Residuals of the contact conditions at the nodes.
+  subroutine nodal_residuals(n_col, n_row, basis, lambda, coefficient, tangential, pressure, gap, vectors, residual, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns [m]; lambda_1, lambda_2, lambda_5 [1/Pa]
+    real(c_double), intent(in) :: basis(2, 2), lambda(3)
+    !> Coefficient of friction; infinite or huge: no slip
+    real(c_double), intent(in) :: coefficient
+    !> Not zero: of the friction conditions; else of those along the normal
+    integer(c_int), intent(in) :: tangential
+    !> Pressure [Pa] and gap [m]
+    real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row)
+    !> Traction along x and y [Pa], slip of the step along x and y [m]; not looked at for those along the normal
+    real(c_double), intent(in) :: vectors(n_col, n_row, 4)
+    !> Residuals
+    real(c_double), intent(out) :: residual(n_col, n_row)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+    type(contact_state_t) :: state
+
+    residual = 0.0_c_double
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
+    if (.not. allocated(error)) then
+      allocate (state%pressure, source=pressure)
+      if (tangential /= 0) then
+        allocate (state%traction, source=vectors(:, :, 1:2))
+        allocate (state%slip_increment, source=vectors(:, :, 3:4))
+        residual = nodal_tangential_residual(lattice, pair_of(lambda), friction_of(coefficient), state)
+      else
+        allocate (state%gap, source=gap)
+        residual = nodal_normal_residual(lattice, pair_of(lambda), state)
+      end if
+    end if
+    call report(error, code, message)
+  end subroutine nodal_residuals
+
+  !> Elastic energy of a state.
+  subroutine energy_of_state(n_col, n_row, basis, start, pressure, gap, initial_gap, zone, motion, frictional, vectors, &
+                             energy, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns, position of the first node [m]
+    real(c_double), intent(in) :: basis(2, 2), start(2)
+    !> Pressure [Pa], gap and gap before loading [m]
+    real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row), initial_gap(n_col, n_row)
+    !> Not zero in contact
+    integer(c_int), intent(in) :: zone(n_col, n_row)
+    !> Approach, shifts [m] and twist [rad]
+    real(c_double), intent(in) :: motion(4)
+    !> Not zero: with friction
+    integer(c_int), intent(in) :: frictional
+    !> Traction along x and y [Pa], relative displacement along x and y [m]; not looked at without friction
+    real(c_double), intent(in) :: vectors(n_col, n_row, 4)
+    !> Energy [J]
+    real(c_double), intent(out) :: energy
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+    type(contact_state_t) :: state
+
+    energy = 0.0_c_double
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
+    if (.not. allocated(error)) then
+      allocate (state%pressure, source=pressure)
+      allocate (state%gap, source=gap)
+      allocate (state%zone, source=zone)
+      state%motion = motion
+      if (frictional /= 0) then
+        allocate (state%traction, source=vectors(:, :, 1:2))
+        allocate (state%relative_displacement, source=vectors(:, :, 3:4))
+      end if
+      energy = elastic_energy(lattice, initial_gap, state)
+    end if
+    call report(error, code, message)
+  end subroutine energy_of_state
+
+  !> Center and bounds of a zone.
+  subroutine extent_of_zone(n_col, n_row, x, y, zone, center, lower, upper)
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Coordinates [m]
+    real(c_double), intent(in) :: x(n_col, n_row), y(n_col, n_row)
+    !> Zone
+    integer(c_int), intent(in) :: zone(n_col, n_row)
+    !> Center of area, smallest and largest x and y; NaN if there are no nodes [m]
+    real(c_double), intent(out) :: center(2), lower(2), upper(2)
+    call zone_extent(x, y, zone /= 0, center, lower, upper)
+  end subroutine extent_of_zone
 
   !> An ellipse as numbers.
   pure function numbers_of(ellipse) result(numbers)

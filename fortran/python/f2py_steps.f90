@@ -3,12 +3,10 @@
 !> A control is its six numbers, a change its five, an attempt its five, in the order of the types of the core.
 module hc_f2py_steps
   use iso_c_binding, only: c_double, c_int
-  use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_f2py_handles, only: report
+  use hc_f2py_handles, only: report, friction_of
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t
-  use hc_coulomb, only: coulomb_t
   use hc_step_error, only: step_change_t, compare_halves, shear_free
   use hc_step_control, only: step_control_t, step_attempt_t
   implicit none
@@ -44,14 +42,11 @@ contains
     character(len=512), intent(out) :: message
     type(error_t), allocatable :: error
     type(lattice_t) :: lattice
-    type(coulomb_t) :: friction
     type(contact_state_t) :: state(5)
     type(step_change_t) :: found
     integer :: k
 
     change = 0.0_c_double
-    friction%no_slip = coefficient > 0.5_wp*huge(1.0_wp)
-    if (.not. friction%no_slip) friction%coefficient = coefficient
     call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
     if (.not. allocated(error)) then
       do k = 1, size(state)
@@ -60,7 +55,8 @@ contains
         state(k)%traction = fields(:, :, 3:n_field, k)
         state(k)%zone = zones(:, :, k)
       end do
-      call compare_halves(lattice, candidate /= 0, friction, state(1), state(2), state(3), state(4), state(5), area, found)
+      call compare_halves(lattice, candidate /= 0, friction_of(coefficient), state(1), state(2), state(3), state(4), &
+                          state(5), area, found)
       change = [found%stick, found%traction, found%added, found%lattice, found%gain]
     end if
     call report(error, code, message)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.edges import ContactEdges, Edge
 from ..core.estimators import area_radius
+from ..core.measures import elastic_energy, zone_extent
 from ..errors import DeckError
 from ..problem.loads import LoadStep
 from ..result.history import RESIDUALS
@@ -90,7 +91,7 @@ class FrictionWindow(Window["ContactState"]):
             **self._stick_measures(solution, edges),
             "max_traction": float(np.hypot(solution.traction_x, solution.traction_y).max()),
             "dissipated_energy_step": solution.dissipated_energy - spent_before,
-            "elastic_energy": self._elastic_energy(solution),
+            "elastic_energy": elastic_energy(self.lattice, self.initial_gap, solution),
             "sweeps": solution.sweeps,
             "cuts": solution.cuts,
         }
@@ -123,33 +124,19 @@ class FrictionWindow(Window["ContactState"]):
         """Return size and place of the stick zone; NaN for its place where there is none."""
         stick = solution.zone == 1
         edge = self.stick_edge(solution, edges)
-        x, y = self.lattice.x[stick], self.lattice.y[stick]
-        some = x.size > 0
+        center, lower, upper = zone_extent(self.lattice, stick)
         return {
-            "stick_area": self.lattice.cell_area * x.size,
+            "stick_area": self.lattice.cell_area * int(stick.sum()),
             "stick_radius": area_radius(stick, self.lattice.cell_area),
             "stick_area_fit": edge.area,
             "stick_radius_fit": edge.radius,
-            "stick_center_x": float(x.mean()) if some else math.nan,
-            "stick_center_y": float(y.mean()) if some else math.nan,
-            "stick_min_x": float(x.min()) if some else math.nan,
-            "stick_max_x": float(x.max()) if some else math.nan,
-            "stick_min_y": float(y.min()) if some else math.nan,
-            "stick_max_y": float(y.max()) if some else math.nan,
+            "stick_center_x": float(center[0]),
+            "stick_center_y": float(center[1]),
+            "stick_min_x": float(lower[0]),
+            "stick_max_x": float(upper[0]),
+            "stick_min_y": float(lower[1]),
+            "stick_max_y": float(upper[1]),
         }
-
-    def _elastic_energy(self, solution: ContactState) -> float:
-        """U = sum A_p (p w + q . (u1 - u2))/2, with u1 - u2 = s + shift + twist x r."""
-        inside = solution.zone > 0
-        x, y = self.lattice.x[inside], self.lattice.y[inside]
-        moved_x = solution.relative_displacement_x[inside] + solution.shift_x - solution.twist * y
-        moved_y = solution.relative_displacement_y[inside] + solution.shift_y + solution.twist * x
-        work = (
-            solution.pressure[inside] @ self.closing(solution)[inside]
-            + solution.traction_x[inside] @ moved_x
-            + solution.traction_y[inside] @ moved_y
-        )
-        return 0.5 * self.lattice.cell_area * float(work)
 
 
 def state_of(step: Step) -> ContactState:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..core import memory
 from ..core.edges import ContactEdges
 from ..core.estimators import area_radius, pressure_center
+from ..core.measures import elastic_energy
 from ..deck.series import LOADS
 from ..errors import DeckError
 from ..problem.loads import MOTIONS
@@ -267,11 +268,6 @@ class Window(ABC, Generic[S]):
             solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
         )
 
-    def closing(self, solution: S) -> Array:
-        """Return u_1z + u_2z (m), by which the deformation opens the gap; NaN where nothing can touch."""
-        with np.errstate(invalid="ignore"):  # inf - NaN there
-            return np.asarray(solution.gap - self.initial_gap + solution.approach)
-
     def _contact_measures(self, solution: S, edges: ContactEdges) -> dict[str, float]:
         """Return load, approach and the size of the contact."""
         inside, edge = solution.zone > 0, edges.contact()
@@ -349,10 +345,8 @@ class NormalWindow(Window["NormalSolution"]):
     def _more_history(
         self, solution: NormalSolution, before: NormalSolution | None, edges: ContactEdges
     ) -> dict[str, float]:
-        inside = solution.zone > 0
-        work = float(solution.pressure[inside] @ self.closing(solution)[inside])
         return {
-            "elastic_energy": 0.5 * self.lattice.cell_area * work,
+            "elastic_energy": elastic_energy(self.lattice, self.initial_gap, solution),
             "sweeps": solution.sweeps,
             "operator_applications": solution.operator_applications,
             "residual_normal": solution.residual_normal,

@@ -40,6 +40,7 @@ module hexcontact
   use hc_zone_estimators, only: boundary, boundary_circle, circle_fit_t, area_radius, edge_radius, pressure_center, &
                                 moment_ellipse, edge_ellipse, ellipse_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
   use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   implicit none
   public

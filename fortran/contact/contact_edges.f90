@@ -8,6 +8,7 @@
 !> Distances are in spacings, positive inside. Fields have the shape (n_col, n_row).
 module hc_contact_edges
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: iso_fortran_env, only: int8
   use hc_precision, only: wp, pi
   use hc_lattice, only: lattice_t
   use hc_edge_band, only: edge_band_t, new_edge_band, to_neighbors
@@ -228,26 +229,45 @@ contains
   pure integer function cut_triangles(zone)
     !> Nodes of the zone (n_col, n_row)
     logical, intent(in) :: zone(:, :)
-    integer :: inside(0:size(zone, 1), 0:size(zone, 2), 2)
+    integer :: n_with(0:3)
 
-    inside = nodes_inside(zone)
-    cut_triangles = count(inside == 1 .or. inside == 2)
+    n_with = triangles(with_rim(zone))
+    cut_triangles = n_with(1) + n_with(2)
   end function cut_triangles
 
-  !> How many corners of each triangle are in a zone: lower and upper triangle of each cell, also at the rim.
-  pure function nodes_inside(zone) result(inside)
+  !> A zone with a rim of nodes outside it: 1 in the zone, else 0.
+  pure function with_rim(zone) result(padded)
     !> Nodes of the zone (n_col, n_row)
     logical, intent(in) :: zone(:, :)
-    integer :: inside(0:size(zone, 1), 0:size(zone, 2), 2)
-    integer :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
+    integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
 
-    associate (n_col => size(zone, 1), n_row => size(zone, 2))
-      padded = 0
-      padded(1:n_col, 1:n_row) = merge(1, 0, zone)
-      inside = spread(padded(1:, :n_row) + padded(:n_col, 1:), 3, 2)
-      inside(:, :, 1) = inside(:, :, 1) + padded(:n_col, :n_row)
-      inside(:, :, 2) = inside(:, :, 2) + padded(1:, 1:)
-    end associate
+    padded = 0_int8
+    padded(1:size(zone, 1), 1:size(zone, 2)) = merge(1_int8, 0_int8, zone)
+  end function with_rim
+
+  !> Number of triangles with no, one, two and three corners in a zone.
+  pure function triangles(padded) result(n_with)
+    !> Zone with a rim
+    integer(int8), intent(in) :: padded(0:, 0:)
+    integer :: n_with(0:3), col, row, half, inside(2)
+
+    n_with = 0
+    do row = 0, ubound(padded, 2) - 1
+      do col = 0, ubound(padded, 1) - 1
+        inside = nodes_inside(padded(col:col + 1, row:row + 1))
+        do half = 1, 2
+          n_with(inside(half)) = n_with(inside(half)) + 1
+        end do
+      end do
+    end do
+  end function triangles
+
+  !> How many corners of the lower and of the upper triangle of a cell are in a zone.
+  pure function nodes_inside(cell) result(inside)
+    !> Its nodes: 1 in the zone, else 0
+    integer(int8), intent(in) :: cell(2, 2)
+    integer :: inside(2)
+    inside = cell(2, 1) + cell(1, 2) + [cell(1, 1), cell(2, 2)]
   end function nodes_inside
 
   !> Cut the triangles at the edge of a zone where the distance, linear between the nodes, is zero.
@@ -259,21 +279,23 @@ contains
     type(edge_band_t), intent(in) :: band
     real(wp), intent(in) :: distance(:)
     type(zone_edge_t) :: edge
-    integer :: inside(0:size(zone, 1), 0:size(zone, 2), 2)
+    integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
     real(wp), allocatable :: segments(:, :, :)
     logical, allocatable :: can_touch(:)
     real(wp) :: covered
-    integer :: corners(2, 3), at(3), col, row, half, n
+    integer :: n_with(0:3), inside(2), corners(2, 3), at(3), col, row, half, n
 
-    inside = nodes_inside(zone)
+    padded = with_rim(zone)
+    n_with = triangles(padded)
     can_touch = band%part_of(self%candidate)
-    allocate (segments(2, 2, count(inside == 1 .or. inside == 2)))
+    allocate (segments(2, 2, n_with(1) + n_with(2)))
     n = 0
-    covered = count(inside == 3)
-    do half = 1, 2
-      do row = 0, size(zone, 2)
-        do col = 0, size(zone, 1)
-          if (mod(inside(col, row, half), 3) == 0) cycle
+    covered = n_with(3)
+    do row = 0, size(zone, 2)
+      do col = 0, size(zone, 1)
+        inside = nodes_inside(padded(col:col + 1, row:row + 1))
+        do half = 1, 2
+          if (mod(inside(half), 3) == 0) cycle
           corners = reshape([half - 1, half - 1, 1, 0, 0, 1], [2, 3]) + spread([col, row], 2, 3)
           at = [band%place(corners(1, 1), corners(2, 1)), band%place(corners(1, 2), corners(2, 2)), &
                 band%place(corners(1, 3), corners(2, 3))]
@@ -281,7 +303,7 @@ contains
             n = n + 1
             call cut(real(corners, wp), distance(at), segments(:, :, n), covered)
           else
-            covered = covered + inside(col, row, half)/3.0_wp
+            covered = covered + inside(half)/3.0_wp
           end if
         end do
       end do

@@ -4,7 +4,7 @@
 module hc_edge_band
   use hc_precision, only: wp
   use hc_lattice, only: equilateral_basis, neighbors
-  use hc_zone_estimators, only: boundary
+  use hc_zone_estimators, only: is_boundary
   implicit none
   private
 
@@ -63,37 +63,28 @@ contains
     type(edge_band_t), intent(out) :: band
     !> Nodes of the zone (n_col, n_row)
     logical, intent(in) :: zone(:, :)
-    logical, allocatable :: near(:, :), ring(:, :)
-    integer :: col, row, k, step, first(2), last(2)
+    integer :: col, row, k, step, last
 
-    first = 1 - margin
-    last = shape(zone) + margin
-    allocate (near(first(1):last(1), first(2):last(2)), source=.false.)
-    allocate (band%place(first(1):last(1), first(2):last(2)), source=0)
-    near(1:size(zone, 1), 1:size(zone, 2)) = boundary(zone)
+    allocate (band%place(1 - margin:size(zone, 1) + margin, 1 - margin:size(zone, 2) + margin), source=0)
+    allocate (band%node(2, 2*sum(shape(zone))))
+    do row = 1, size(zone, 2)
+      do col = 1, size(zone, 1)
+        if (zone(col, row)) then
+          if (is_boundary(zone, col, row)) call append(band, [col, row])
+        end if
+      end do
+    end do
+    last = 0
     do step = 1, far + 1
-      ring = near
-      do row = first(2) + 1, last(2) - 1
-        do col = first(1) + 1, last(1) - 1
-          if (near(col, row)) cycle
-          do k = 1, n_beside
-            if (near(col + neighbors(1, k), row + neighbors(2, k))) ring(col, row) = .true.
-          end do
+      associate (first => last + 1)
+        last = band%n
+        do k = first, last
+          call append_neighbors(band, k)
         end do
-      end do
-      near(:, :) = ring
+      end associate
     end do
-    band%n = count(near)
-    allocate (band%node(2, band%n), band%beside(n_beside, band%n))
-    k = 0
-    do row = first(2), last(2)
-      do col = first(1), last(1)
-        if (.not. near(col, row)) cycle
-        k = k + 1
-        band%node(:, k) = [col, row]
-        band%place(col, row) = k
-      end do
-    end do
+    band%node = band%node(:, :band%n)
+    allocate (band%beside(n_beside, band%n))
     do k = 1, band%n
       do step = 1, n_beside
         associate (there => band%node(:, k) + neighbors(:, step))
@@ -102,6 +93,38 @@ contains
       end do
     end do
   end subroutine new_edge_band
+
+  !> Add the neighbors of a node to a band that does not have them.
+  pure subroutine append_neighbors(band, k)
+    !> Band
+    type(edge_band_t), intent(inout) :: band
+    !> Number of the node
+    integer, intent(in) :: k
+    integer :: j, there(2)
+
+    do j = 1, n_beside
+      there = band%node(:, k) + neighbors(:, j)
+      if (band%place(there(1), there(2)) == 0) call append(band, there)
+    end do
+  end subroutine append_neighbors
+
+  !> Add a node to a band.
+  pure subroutine append(band, node)
+    !> Band
+    type(edge_band_t), intent(inout) :: band
+    !> Column and row
+    integer, intent(in) :: node(2)
+    integer, allocatable :: longer(:, :)
+
+    if (band%n == size(band%node, 2)) then
+      allocate (longer(2, 2*band%n))
+      longer(:, :band%n) = band%node
+      call move_alloc(longer, band%node)
+    end if
+    band%n = band%n + 1
+    band%node(:, band%n) = node
+    band%place(node(1), node(2)) = band%n
+  end subroutine append
 
   !> Values of a field at the nodes of a band; 0 outside the window.
   pure function values_of(self, field) result(values)

@@ -12,7 +12,7 @@ module hc_zone_estimators
   private
 
   public :: circle_fit_t, ellipse_t
-  public :: boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, edge_ellipse
+  public :: boundary, is_boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, edge_ellipse
 
   !> Distances from the edge, in spacings, between which the pressure is fitted: the outermost nodes carry most of the
   !> discretization error, and far inside the polynomial is no good approximation of other contacts.
@@ -49,21 +49,30 @@ contains
     !> Nodes of the zone
     logical, intent(in) :: zone(:, :)
     logical :: rim(size(zone, 1), size(zone, 2))
-    logical :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
+    integer :: col, row
+
+    do row = 1, size(zone, 2)
+      do col = 1, size(zone, 1)
+        rim(col, row) = zone(col, row)
+        if (zone(col, row)) rim(col, row) = is_boundary(zone, col, row)
+      end do
+    end do
+  end function boundary
+
+  !> Does a node of a zone have a neighbor outside it, or outside the window?
+  pure logical function is_boundary(zone, col, row)
+    !> Nodes of the zone
+    logical, intent(in) :: zone(:, :)
+    !> Column and row of the node
+    integer, intent(in) :: col, row
     integer :: k
 
-    associate (n_col => size(zone, 1), n_row => size(zone, 2))
-      padded = .false.
-      padded(1:n_col, 1:n_row) = zone
-      rim = .false.
-      do k = 1, size(neighbors, 2)
-        associate (col => neighbors(1, k), row => neighbors(2, k))
-          rim = rim .or. .not. padded(1 + col:n_col + col, 1 + row:n_row + row)
-        end associate
-      end do
-      rim = rim .and. zone
-    end associate
-  end function boundary
+    is_boundary = col == 1 .or. row == 1 .or. col == size(zone, 1) .or. row == size(zone, 2)
+    if (is_boundary) return
+    do k = 1, size(neighbors, 2)
+      is_boundary = is_boundary .or. .not. zone(col + neighbors(1, k), row + neighbors(2, k))
+    end do
+  end function is_boundary
 
   !> Circle through the boundary nodes of a zone, equations (9.1)-(9.4).
   pure type(circle_fit_t) function boundary_circle(x, y, zone, spacing, center) result(fit)

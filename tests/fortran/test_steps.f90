@@ -3,16 +3,18 @@ module test_steps
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, along_x, rim_reached, stick
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, along_x, about_z, &
+    displacement_control, rim_reached, stick
   use hc_coulomb, only: coulomb_t
   use hc_frictional_contact, only: frictional_contact_t
   use hc_load_path, only: advance
   use hc_step_error, only: compare_halves, shear_free, step_change_t
   use hc_step_control, only: accepted, failed, least_step, limited, rejected, step_attempt_t, step_control_t
   use hc_adaptive_path, only: adaptive_path_t
+  use hc_state_measures, only: elastic_energy, nodal_normal_residual, nodal_tangential_residual, zone_extent
   use hc_discretization_error, only: limits_of_error
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_raised, check_true
+  use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
   private
 
@@ -34,6 +36,8 @@ contains
       new_test('halving', test_halving), &
       new_test('path', test_path), &
       new_test('path_to_the_rim', test_rim), &
+      new_test('nodal_residuals', test_nodal_residuals), &
+      new_test('energy', test_energy), &
       new_test('limits_of_error', test_limits) &
     ]
   end subroutine collect_steps
@@ -262,6 +266,70 @@ contains
     if (allocated(error)) return
     call check_true(error, path%state%clipped .or. path%state%stopped == rim_reached, 'contact at the rim')
   end subroutine test_rim
+
+  !> The largest of them are the residuals of the state; away from the contact they are zero.
+  subroutine test_nodal_residuals(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, state
+    type(coulomb_t) :: friction
+    real(wp), allocatable :: along_normal(:, :), tangential(:, :)
+    integer :: k
+
+    do k = 1, 2
+      friction = merge(coulomb_t(mu), coulomb_t(no_slip=.true.), k == 1)
+      call new_sphere(contact, 10, 0.5_wp, 0.3_wp, friction, error)
+      if (allocated(error)) return
+      call new_friction_state(virgin, contact%problem%lattice)
+      call advance(contact, virgin, load_target_t(value=[load, 0.2_wp, 0.0_wp, 0.0_wp]), .true., 1.0e-5_wp, 60, 0, state, error)
+      if (allocated(error)) return
+      allocate (along_normal, source=nodal_normal_residual(contact%problem%lattice, contact%problem%pair, state))
+      allocate (tangential, source=nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, friction, state))
+      call check(error, [maxval(along_normal), maxval(tangential)], [state%residual_normal, state%residual_tangential], &
+                 1.0e-12_wp, 'largest residuals')
+      if (allocated(error)) return
+      call check_true(error, state%residual_normal > 0.0_wp .and. all(tangential <= 0.0_wp .or. state%zone > 0), 'in contact')
+      if (allocated(error)) return
+      deallocate (along_normal, tangential)
+    end do
+    call check(error, largest(nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, coulomb_t(), state)), &
+               0.0_wp, 0.0_wp, 'nothing to fulfil without friction')
+  end subroutine test_nodal_residuals
+
+  !> Pressed, U = 2/5 P delta of Hertz; a twist adds M beta/2 when all sticks, wherever the origin lies.
+  subroutine test_energy(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, pressed, twisted
+    type(load_target_t) :: target
+    real(wp) :: center(2), lower(2), upper(2), energy
+    real(wp), allocatable :: x(:, :), y(:, :)
+
+    call new_sphere(contact, 12, 0.0_wp, 0.0_wp, coulomb_t(no_slip=.true.), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, contact%problem%lattice)
+    call press(contact, virgin, load, pressed, error)
+    if (allocated(error)) return
+    energy = elastic_energy(contact%problem%lattice, contact%problem%initial_gap, pressed)
+    call check(error, energy, 0.4_wp*load*pressed%motion(normal), 0.004_wp, 'energy of Hertz')
+    if (allocated(error)) return
+    target%control(about_z) = displacement_control
+    target%value = [load, 0.0_wp, 0.0_wp, 0.01_wp]
+    call advance(contact, pressed, target, .false., 1.0e-9_wp, 60, 0, twisted, error)
+    if (allocated(error)) return
+    call check(error, elastic_energy(contact%problem%lattice, contact%problem%initial_gap, twisted) - energy, &
+               0.5_wp*twisted%load(about_z)*0.01_wp, 1.0e-8_wp, 'energy of the twist')
+    if (allocated(error)) return
+    allocate (x, y, mold=pressed%pressure)
+    call contact%problem%lattice%coordinates(x, y)
+    call zone_extent(x, y, pressed%zone == stick, center, lower, upper)
+    call check(error, [center, lower + upper], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 1.0e-13_wp, 'a zone about the origin')
+    if (allocated(error)) return
+    call check(error, upper, [1.0_wp, 1.0_wp], 0.09_wp, 'as large as the contact')
+    if (allocated(error)) return
+    call zone_extent(x, y, pressed%zone > 2, center, lower, upper)
+    call check_true(error, all(ieee_is_nan([center, lower, upper])), 'no nodes')
+  end subroutine test_energy
 
   !> q + c h^p: the extrapolation is exact, so that only the safety factor is left; scatter gives a floor.
   subroutine test_limits(error)

@@ -73,7 +73,8 @@ class ContactEdges:
         start: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self._basis, self._start = basis.T, start
-        self._fields = pressure.T, gap.T, contact.T, candidate.T
+        # converted once: the core takes zones as integers
+        self._fields = pressure.T, gap.T, contact.T.astype(np.int32), candidate.T.astype(np.int32)
 
     def contact(self) -> Edge:
         """Return the contact area."""
@@ -91,7 +92,7 @@ class ContactEdges:
             What friction could carry beyond the shear traction, mu p - |q| (Pa); only its values at
             these nodes matter.
         """
-        return self._edge(True, stick.T, reserve.T)
+        return self._edge(True, stick.T.astype(np.int32), reserve.T)
 
     def squares(self) -> Array:
         """Return squares of the pressure (Pa^2) that are good to interpolate linearly, shape (n_row, n_col).
@@ -103,7 +104,7 @@ class ContactEdges:
         raise_for(code, message)
         return np.asarray(squares.T)
 
-    def _edge(self, of_stick: bool, zone: Mask, reserve: Array) -> Edge:
+    def _edge(self, of_stick: bool, zone: NDArray[np.int32], reserve: Array) -> Edge:
         numbers, segments, count, code, message = _api.edge_of_zone(
             self._basis,
             self._start,

@@ -1,4 +1,4 @@
-!> Edges of contact and stick areas between the nodes, from how tractions vanish there (theory, section 12).
+!> Edges of contact and stick areas between the nodes, from how tractions vanish there.
 !>
 !> At the edge of a contact the pressure vanishes like the square root of the distance, and beyond it the gap opens like
 !> its power 3/2; at the edge of a stick area the reserve of friction, mu p - |q|, vanishes like the pressure. So p^2,
@@ -6,6 +6,8 @@
 !> sign: a polygon through the triangles of the lattice, for zones of any shape.
 !>
 !> Distances are in spacings, positive inside. Fields have the shape (n_col, n_row).
+!>
+!> Equations: docs/theory/edges.md, (B2) to (B4).
 module hc_contact_edges
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: int8

@@ -1,4 +1,6 @@
 !> What a state says besides its fields: residuals node by node, energy, extent of a zone.
+!>
+!> Equations: docs/theory/residuals.md, (R1) to (R3).
 module hc_state_measures
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
   use hc_precision, only: wp
@@ -6,7 +8,7 @@ module hc_state_measures
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, separated, normal, along_x, along_y, about_z
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, tangential_scale
-  use hc_coulomb, only: coulomb_t, magnitude, on_cone
+  use hc_friction_law, only: friction_law_t
   implicit none
   private
 
@@ -45,28 +47,28 @@ contains
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
     !> Law of friction
-    type(coulomb_t), intent(in) :: friction
+    class(friction_law_t), intent(in) :: friction
     !> State with pressure somewhere; its pressure, traction and slip increment count
     type(contact_state_t), intent(in) :: state
     real(wp) :: residual(size(state%pressure, 1), size(state%pressure, 2))
-    real(wp) :: compliance, largest, p_max
+    real(wp) :: unit, stiffness, largest
     integer :: col, row
 
-    compliance = tangential_self_compliance(lattice, pair)
-    p_max = maxval(state%pressure)
-    largest = 0.0_wp
     residual = 0.0_wp
     if (.not. friction%resists()) return
+    unit = 1.0_wp/maxval(state%pressure)
+    stiffness = 1.0_wp/tangential_self_compliance(lattice, pair)
+    largest = 0.0_wp
     do row = 1, size(residual, 2)
       do col = 1, size(residual, 1)
         if (state%pressure(col, row) <= 0.0_wp) cycle
-        associate (q => state%traction(col, row, :), ds => state%slip_increment(col, row, :))
-          largest = max(largest, sum((q/p_max)**2))
-          residual(col, row) = magnitude(q - on_cone(q - ds/compliance, friction%bound(state%pressure(col, row))))
+        associate (node => [state%pressure(col, row), state%traction(col, row, :), state%slip_increment(col, row, :)])
+          call friction%violation((row - 1)*size(residual, 1) + col, unit, stiffness, node(1:1), node(2:2), node(3:3), &
+                                  node(4:4), node(5:5), largest, residual(col, row))
         end associate
       end do
     end do
-    residual = residual/(p_max*tangential_scale(friction, largest))
+    residual = sqrt(residual)/tangential_scale(friction, largest)
   end function nodal_tangential_residual
 
   !> U = sum A_p (p w + q . (u_1 - u_2))/2 with w = g - g_0 + approach and u_1 - u_2 = s + shift + twist x r [J].

@@ -1,7 +1,9 @@
-!> Size and shape of a contact or stick zone from its nodes (theory, section 12).
+!> Size and shape of a contact or stick zone from its nodes.
 !>
 !> Fields have the shape (n_col, n_row). The area and the moments count nodes; circle and ellipse of the edge come from
 !> the pressure, whose square is a polynomial of second degree about the edge of a Hertzian contact.
+!>
+!> Equations: docs/theory/edges.md, (B1).
 module hc_zone_estimators
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi

@@ -4,21 +4,21 @@
 !> windows) is solved on the part around it. What the tractions do elsewhere follows from one
 !> product over the window, which also judges the state. Should the contact reach
 !> the rim of the part, or the bodies overlap outside, the step is solved on the whole window.
+!>
+!> Theory: docs/theory/multilevel.md.
 module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_window_part, only: frame, is_worth, part_of, worth
+  use hc_window_part, only: frame, is_worth
   implicit none
   private
 
   public :: windowed_friction_t, new_windowed_friction, windowed_friction_memory
-
-  !> The part has to leave something for the product over the window, which sees other roundings.
-  real(wp), parameter :: part_tolerance = 0.9_wp
 
   !> A contact problem with friction, on its window and on a part of it.
   type, extends(friction_solver_t) :: windowed_friction_t
@@ -59,7 +59,8 @@ contains
     self%problem%space = self%whole%problem%space
   end subroutine new_windowed_friction
 
-  !> Bytes that a problem takes while a step is solved on the window; on a part alone it is less.
+  !> Bytes that a problem takes while a step is solved on the window; parts, and spectra that are kept of them, take
+  !> more the more steps the contact grows in.
   pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_contact, n_force, coupled, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -72,17 +73,11 @@ contains
     !> Threads to use
     integer, intent(in) :: threads
     integer, parameter :: long = selected_int_kind(18)
-    real(wp) :: share
 
     ! what is given is there twice
     windowed_friction_memory = frictional_contact_memory(extent, threads) &
                                + friction_step_memory(extent, n_contact, n_force, coupled) &
                                + 28*int(extent(1), long)*extent(2)
-    if (.not. coupled) return
-    ! steps that move the edge of the contact are tried on a part first, about as large as the contact will be;
-    ! its operators stay meanwhile
-    share = min(worth, n_contact/(real(extent(1), wp)*extent(2)))
-    windowed_friction_memory = windowed_friction_memory + frictional_contact_memory(int(sqrt(share)*extent), threads)
   end function windowed_friction_memory
 
   subroutine displacements(self, pressure, traction, displacement, error)
@@ -136,14 +131,7 @@ contains
     end if
     self%low = low
     self%high = high
-    problem = self%problem
-    associate (c => [low(1), high(1)], r => [low(2), high(2)])
-      problem%lattice = part_of(self%problem%lattice, low, high)
-      problem%initial_gap = self%problem%initial_gap(c(1):c(2), r(1):r(2))
-      problem%candidate = self%problem%candidate(c(1):c(2), r(1):r(2))
-      problem%x = self%problem%x(c(1):c(2), r(1):r(2))
-      problem%y = self%problem%y(c(1):c(2), r(1):r(2))
-    end associate
+    call self%problem%take_part(low, high, problem)
     allocate (self%part)
     call new_frictional_contact(self%part, problem, error, self%n_threads, self%cache)
   end subroutine take_part
@@ -176,8 +164,8 @@ contains
       before%motion = start%motion
       before%load = start%load
       if (.not. self%part%problem%is_pressed(target)) return
-      call self%part%solve_step(before, reference(c(1):c(2), r(1):r(2), :), target, part_tolerance*tolerance, max_sweeps, &
-                                after, error)
+      call self%part%solve_step(before, reference(c(1):c(2), r(1):r(2), :), target, &
+                                self%problem%options%multilevel%part_tolerance*tolerance, max_sweeps, after, error)
       if (allocated(error)) return
       work = after%operator_applications*lattice%size()/self%problem%lattice%size()
       if (.not. after%converged .or. reaches_rim(self, after%pressure > 0.0_wp)) return

@@ -2,6 +2,8 @@
 !>
 !> The first guess comes from the solution on the lattice of every second node,
 !> and so on down to a few nodes.
+!>
+!> Theory: docs/theory/normal_contact.md.
 module hc_normal_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -13,7 +15,8 @@ module hc_normal_contact
   use hc_flexibility_fft, only: fft_memory
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target
+  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, normal
+  use hc_contact_solver, only: contact_solver_t
   use hc_symbol_preconditioner, only: preconditioner_memory
   use hc_normal_lattice, only: normal_level_t
   use hc_normal_iterate, only: iterate_t
@@ -37,7 +40,7 @@ module hc_normal_contact
   real(wp), parameter :: part_tolerance = 0.8_wp
 
   !> A frictionless contact problem on a hierarchy of lattices.
-  type :: normal_contact_t
+  type, extends(contact_solver_t) :: normal_contact_t
     private
     !> From the finest to the coarsest lattice
     type(normal_level_t), allocatable :: level(:)
@@ -54,6 +57,7 @@ module hc_normal_contact
     !> Threads that were asked for; 0: as many as OpenMP would take
     integer :: n_threads = 0
   contains
+    procedure :: solve_step
     !> Solve for a normal load or an approach
     procedure :: solve
   end type normal_contact_t
@@ -128,6 +132,22 @@ contains
     normal_contact_memory = each + each/3 + fft_memory(extent, .true., threads) &
                             + field*int(maxval(extent), long)**2 + n*(2*field + half + 2*field + 4*half)
   end function normal_contact_memory
+
+  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(normal_contact_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+
+    ! the first guess is that of the coarser lattices: a load gives the same bits whatever came before it
+    associate (start => start, reference => reference)
+      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
+    end associate
+  end subroutine solve_step
 
   !> Solve for a normal load or an approach.
   subroutine solve(self, control, target, tolerance, max_sweeps, state, error)

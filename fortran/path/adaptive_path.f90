@@ -14,7 +14,7 @@ module hc_adaptive_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_motion, rim_reached, separated
-  use hc_contact_problem, only: friction_solver_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
   use hc_load_path, only: advance
   use hc_step_control, only: step_attempt_t, step_control_t, failed, limited, rejected

@@ -1,10 +1,12 @@
-!> How far values on the finest of several lattices are from their limit for a vanishing spacing (theory, section 12).
+!> How far values on the finest of several lattices are from their limit for a vanishing spacing.
 !>
 !> The difference of a solution and the limit has two parts: a trend, c h^p with an order p from 1 (areas of whole cells)
 !> to 2 (approach, loads, energies), and a scatter, since the contact lies differently on every lattice. Both follow from
 !> a least-squares fit of q + c h^p, each value weighted by 1/h, as a scatter in proportion to h asks for. It follows Eca
 !> and Hoekstra, Journal of Computational Physics 262 (2014) 104-130; factors and numbers here are those with which errors
 !> known from closed solutions stay within the estimate.
+!>
+!> Equations: docs/theory/error_bars.md, (A1), (A2).
 module hc_discretization_error
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
   use hc_precision, only: wp

@@ -1,4 +1,4 @@
-!> Size of the load steps of a segment: what one may change is bounded (theory, section 11).
+!> Size of the load steps of a segment: what one may change is bounded.
 !>
 !> Each load step is solved as a whole and in two halves. What they change (hc_step_error) decides whether the step is
 !> accepted, and how large the next one is. Sizes are parts of a segment of the load history. With a `control`, the
@@ -11,6 +11,8 @@
 !>       if (verdict /= rejected) exit
 !>     end do
 !>     call control%accept(attempt, change, tolerance, verdict)
+!>
+!> Equations: docs/theory/step_control.md, (S2), (S3).
 module hc_step_control
   use hc_precision, only: wp
   use hc_step_error, only: step_change_t

@@ -1,13 +1,14 @@
 !> How much of a solution depends on the size of the load steps, measured on two that differ in it.
 !>
 !> One path goes through a load history in load steps, another beside it in steps of half the size; they never meet. Both
-!> are wrong by something of the first order in the size, so that what the halves change is what is still wrong with them
-!> (theory, section 11).
+!> are wrong by something of the first order in the size, so that what the halves change is what is still wrong with them.
+!>
+!> Equations: docs/theory/step_control.md, (S1).
 module hc_step_error
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
   use hc_contact_state, only: contact_state_t, separated, slip, stick
-  use hc_coulomb, only: coulomb_t
+  use hc_friction_law, only: friction_law_t
   use hc_contact_residuals, only: least_traction
   use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
   implicit none
@@ -49,7 +50,7 @@ contains
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
     !> Friction law
-    type(coulomb_t), intent(in) :: friction
+    class(friction_law_t), intent(in) :: friction
     !> End of the path in whole steps, middle and end of the one in halves
     type(contact_state_t), intent(in) :: whole, half, halves
     !> Both paths at the beginning of the step
@@ -75,10 +76,10 @@ contains
                          *min(1.0_wp, entering*entered*spacing/max(contact%length(), spacing))
       end if
 
-      if (friction%no_slip) then
-        carried = max(sum(shear(halves)), least_traction*sum(halves%pressure))
+      if (friction%is_bounded()) then
+        carried = sum(bounds(friction, halves))
       else
-        carried = friction%coefficient*sum(halves%pressure)
+        carried = max(sum(shear(halves)), least_traction*sum(halves%pressure))
       end if
       scale = 0.0_wp
       if (carried > 0.0_wp) scale = min(1.0_wp, contact%area/area)/carried
@@ -117,7 +118,7 @@ contains
     !> Edges of the contact
     type(contact_edges_t), intent(in) :: edges
     !> Friction law
-    type(coulomb_t), intent(in) :: friction
+    class(friction_law_t), intent(in) :: friction
     !> State
     type(contact_state_t), intent(in) :: state
     type(zone_edge_t) :: edge
@@ -125,7 +126,7 @@ contains
 
     ! without slip the reserve is not looked at
     allocate (reserve, source=0.0_wp*state%pressure)
-    if (.not. friction%no_slip) reserve = friction%coefficient*state%pressure - shear(state)
+    if (friction%is_bounded()) reserve = bounds(friction, state) - shear(state)
     edge = edges%stick_edge(state%zone == stick, reserve)
   end function stick_edge_of
 
@@ -136,7 +137,7 @@ contains
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
     !> Friction law
-    type(coulomb_t), intent(in) :: friction
+    class(friction_law_t), intent(in) :: friction
     !> State
     type(contact_state_t), intent(in) :: state
     type(contact_edges_t) :: edges
@@ -146,6 +147,20 @@ contains
     edge = stick_edge_of(edges, friction, state)
     stick_area = edge%area
   end function stick_area
+
+  !> Largest traction that friction allows at each node [Pa].
+  pure function bounds(friction, state) result(bound)
+    !> Friction law
+    class(friction_law_t), intent(in) :: friction
+    !> State
+    type(contact_state_t), intent(in) :: state
+    real(wp) :: bound(size(state%pressure, 1), size(state%pressure, 2))
+    integer :: row
+
+    do row = 1, size(bound, 2)
+      call friction%find_bounds((row - 1)*size(bound, 1) + 1, state%pressure(:, row), bound(:, row))
+    end do
+  end function bounds
 
   !> Magnitude of the shear tractions [Pa].
   pure function shear(state)

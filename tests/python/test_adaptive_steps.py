@@ -12,12 +12,12 @@ from rich.console import Console
 from hexcontact import Case, ConvergenceError, DeckError
 from hexcontact.cli import tables as summary
 from hexcontact.deck.schema import deck_schema
+from hexcontact.problem import estimates, overview
 from hexcontact.problem.loads import LEAST
 from hexcontact.result import history
 from hexcontact.result.history import describe
 from hexcontact.result.result import Result, Step
 from hexcontact.result.store import Journal, journal_of, open_result
-from hexcontact.solve import estimates, overview
 from hexcontact.solve.progress import Lines
 from hexcontact.solve.restart import resume
 
@@ -392,7 +392,7 @@ def test_loads_on_the_way_are_looked_at() -> None:
 
 
 def test_editors_know_the_word() -> None:
-    steps = deck_schema()["properties"]["load"]["items"]["properties"]["steps"]
+    steps = deck_schema()["$defs"]["Load"]["properties"]["steps"]
     assert {"const": "auto"} in steps["anyOf"]
 
 

@@ -17,16 +17,16 @@ from .options import AsJson, DeckFile, Settings
 @guarded
 def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Read a deck, report everything that is wrong with it, and say what would be run."""
-    from ..solve.frictionless import require_memory
-    from ..solve.lattices import least_and_most
-    from ..solve.overview import case_rows
+    from ..problem.overview import case_rows
+    from ..problem.refinement import least_and_most
+    from ..solve.frictionless import peak_memory, require_memory
     from . import json_output, run_command
     from . import tables as summary
 
     case = run_command.case_of(deck, settings)
     if not as_json:
         console = summary.console()
-        console.print(summary.pairs(case.title or deck.stem, case_rows(case)))
+        console.print(summary.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first that may be the result
     require_memory(first, first.lattice)
     target = run_command.target_of(case, deck)

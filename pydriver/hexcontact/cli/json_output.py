@@ -90,9 +90,9 @@ def error(
 
 def of_case(case: Problem, output: Path) -> dict[str, Any]:
     """Return what would be run."""
-    from ..solve import estimates
+    from ..problem import estimates
+    from ..problem.overview import parameters_of
     from ..solve.frictionless import peak_memory
-    from ..solve.run import parameters_of
 
     lattice = case.lattice
     return {

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import DeckError
-from ..solve.interruption import Interrupted, in_background, news
+from ..solve.interruption import Interrupted, in_background, signal_pipe
 from .guard import Content, Failure, complain, guarded
 from .options import AsJson, DeckFile, Level, LogFile, Plot, Quiet, Settings, setting
 
@@ -42,9 +42,11 @@ def run(
         case = command.case_of(deck, settings)
         target = command.target_of(case, deck, output)
         listeners.spare(target)
-        heard = context.with_resource(news())  # up to the end: what is complete stays so, whatever comes
+        pipe = context.with_resource(
+            signal_pipe()
+        )  # up to the end: what is complete stays so, whatever comes
         with Store(target, metadata_of(case), overwrite) as store:
-            histories = command.solved(case, store, heard, deck.stem, listeners)
+            histories = command.solved(case, store, pipe, deck.stem, listeners)
         picture = command.overview(store.path) if plot else None
     return listeners.tell(case, histories, target, picture)
 
@@ -76,12 +78,12 @@ def resume(
 
     listeners = command.Listeners("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))
-    heard = context.with_resource(news())
+    pipe = context.with_resource(signal_pipe())
     with listeners.logging(file), restart.reopened(file, overrides=overrides) as again:
         if again is not None:
             if again.warning:
                 complain(f"warning: {again.warning}")
-            histories = command.solved(again.case, again.store, heard, file.stem, listeners, again.before)
+            histories = command.solved(again.case, again.store, pipe, file.stem, listeners, again.before)
     if again is not None:
         path = again.store.path
         picture = command.overview(path) if plot else None
@@ -123,6 +125,7 @@ def study(
     log_level: Level = None,
 ) -> Content:
     """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    from ..study.progress import study_reporter
     from ..study.study import Study
     from . import json_output
     from . import study_command as command
@@ -139,7 +142,7 @@ def study(
         return None
     with listeners.logging(file, planned.output):
         if case is not None:
-            outcome = command.run_case(planned, case, retry, listeners, context.with_resource(news()))
+            outcome = command.run_case(planned, case, retry, listeners, context.with_resource(signal_pipe()))
             if outcome.exit_code:
                 raise Failure(outcome.message, outcome.exit_code)
             return {
@@ -155,11 +158,11 @@ def study(
                 "jobs": jobs,
                 "dask": dask,
                 "retry": retry,
-                "watcher": command.watcher(listeners.silent),
+                "listener": study_reporter(listeners.silent),
             }
             work, ends = command.run_in_background(planned, cancel, options)
             try:
-                in_background(work, context.with_resource(news()), ends)
+                in_background(work, context.with_resource(signal_pipe()), ends)
             except Interrupted as signaled:
                 message = f"interrupted; {command.interrupted(planned)}"
                 raise Failure(message, signaled.exit_code) from None

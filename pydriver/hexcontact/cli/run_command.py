@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from ..errors import AccuracyWarning, DeckError
+from ..problem.overview import parameters_of
 from ..result.history import remarks, step_rows
 from ..result.store import open_result
 from ..solve import log
@@ -121,7 +122,7 @@ class Listeners:
         if self.as_json:
             told = [
                 *warnings,
-                *remarks(histories, solve.parameters_of(case)),
+                *remarks(histories, parameters_of(case)),
                 *([shortfall] * bool(shortfall)),
             ]
             written: dict[str, Any] = {"output": target, "picture": picture, "warnings": told}
@@ -137,7 +138,7 @@ class Listeners:
 def solved(
     case: Problem,
     store: Store,
-    heard: tuple[int, int],
+    pipe: tuple[int, int],
     name: str,
     listeners: Listeners,
     before: Sequence[Step] = (),
@@ -153,15 +154,12 @@ def solved(
         store.close(f"interrupted ({signaled.name})")
         return not store.finished
 
-    shown, histories = reporter(listeners.silent), [step.history for step in before]
+    histories: list[Any] = [step.history for step in before]
+    listener = solve.listeners(case, reporter(listeners.silent), lambda step: histories.append(step.history))
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
-        with shown.watching(title, case.planned_steps):
-            in_background(
-                lambda: solve.record(case, store, shown, lambda step: histories.append(step.history), before),
-                heard,
-                ends,
-            )
+        with listener.following(title, case.planned_steps):
+            in_background(lambda: solve.run_into(case, store, listener, before), pipe, ends)
     except Interrupted as signaled:
         listeners.leave(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories
@@ -187,7 +185,7 @@ def summarize(
         console.print(rich_table("Against Hertz", summary.HERTZ_HEADERS, rows))
     if refined is not None:
         console.print(rich_table("Accuracy", summary.TRIAL_HEADERS, summary.trial_rows(refined)))
-    for remark in remarks(histories, solve.parameters_of(case)):
+    for remark in remarks(histories, parameters_of(case)):
         console.print(f"note: {remark}", soft_wrap=True)
     console.print(visible(f"written: {target}" + (f", {picture}" if picture else "")), soft_wrap=True)
 

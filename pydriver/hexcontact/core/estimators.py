@@ -169,7 +169,8 @@ def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse
 def limits_of_error(spacings: Array, values: Array) -> Array:
     """Estimate how far values on the first, finest lattice are from their limit for a vanishing spacing.
 
-    A trend c h^p with p from 1 to 2 and a scatter in proportion to h are fitted (theory, section 12).
+    A trend c h^p with p from 1 to 2 and a scatter in proportion to h are fitted: docs/theory/error_bars.md,
+    (A1), (A2).
 
     Parameters
     ----------

@@ -42,19 +42,15 @@ def linear(
     return _at_points(_api.field_between_nodes, basis, start, (np.asarray(values).T, outside), x, y)
 
 
-def nearest_nodes(
-    shape: tuple[int, int], basis: Array, start: Point, x: ArrayLike, y: ArrayLike
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
-    """Return row and column of the node next to each point, and whether the window of this shape has it.
-
-    Without such a node they are those of one at the rim. The other arguments are those of `linear`.
-    """
+def nearest(
+    values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
+) -> Array:
+    """Return the values at the nodes next to some points; parameters as of `linear`."""
     col, row, inside, code, message = _api.nodes_next_to(
-        basis.T, start, shape[::-1], np.ravel(x), np.ravel(y)
+        basis.T, start, values.shape[::-1], np.ravel(x), np.ravel(y)
     )
     raise_for(code, message)
-    row, col, inside = (found.reshape(np.shape(x)) for found in (row, col, inside))
-    return row.astype(np.intp), col.astype(np.intp), inside != 0
+    return np.where(inside, values[row, col], outside).astype(float).reshape(np.shape(x))
 
 
 def pressure_between(

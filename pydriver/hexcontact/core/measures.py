@@ -23,7 +23,7 @@ def nodal_residuals(
     *,
     tangential: bool,
 ) -> Array:
-    """Return the residuals at the nodes whose largest one is R_n or, tangential, R_t (theory, section 7)."""
+    """Return the residuals at the nodes, R_n or, tangential, R_t: docs/theory/residuals.md."""
     vectors = _vectors(solution, "traction", "slip_increment")
     residuals, code, message = _api.nodal_residuals(
         lattice.basis.T,

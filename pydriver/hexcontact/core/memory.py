@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import mmap
 import os
 import threading
@@ -67,13 +69,21 @@ def require(needed: int, what: str, advice: str) -> None:
     from . import kernel_cache
 
     there = available()
-    kernel_cache.leave(there - needed)  # what is kept for other cases must not be in the way of this one
+    kernel_cache.limit_growth(
+        there - needed
+    )  # what is kept for other cases must not be in the way of this one
     if needed > there:
         there = available()
     if needed > there:
         raise ResourceError(
             f"{what} needs {needed / GB:.3g} GB of memory and {there / GB:.3g} GB are available; {advice}"
         )
+
+
+def give_back() -> None:
+    """Let the system have the memory that solving has freed; the C library may keep most of it otherwise."""
+    with contextlib.suppress(AttributeError, OSError):  # glibc alone has this
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def claim(needed: int) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import datetime
 import hashlib
 import json
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
@@ -21,9 +20,10 @@ import numpy as np
 from .._version import __version__
 from ..cli import tables as summary
 from ..errors import DeckError
+from ..files import replacing
+from ..problem.overview import case_rows
 from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, remarks, step_rows, worth_showing
 from ..result.view import scaled
-from ..solve.overview import case_rows
 from ..text import escaped, quantity
 from ..variables import VARIABLES, label_of
 from .report_fields import kept_steps, maps_of, rounded
@@ -84,12 +84,8 @@ def write_report(result: Result, target: Path) -> Path:
     if target.suffix.lower() not in (".html", ".htm"):
         raise DeckError(f"--output {target}: expected a page, such as {target.with_suffix('.html')}")
     text = report(result)
-    temporary = target.with_name(f"{target.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(target) as path:
+        path.write_text(text, encoding="utf-8")
     return target
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.edges import ContactEdges
-from ..core.interpolation import linear, nearest_nodes, pressure_between
+from ..core.interpolation import linear, nearest, pressure_between
 from ..errors import DeckError
 from ..text import did_you_mean
 from ..variables import NOT_KEPT, VARIABLES
@@ -61,12 +61,9 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
         Values at the points. Outside the window tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-    start = first_node(lattice)
     variable = VARIABLES[name]
-    if variable.flags:
-        row, col, inside = nearest_nodes(lattice.shape, lattice.basis, start, x, y)
-        return np.where(inside, values[row, col], variable.padding).astype(float)
-    return linear(values, lattice.basis, start, x, y, variable.padding)
+    between = nearest if variable.flags else linear
+    return between(values, lattice.basis, first_node(lattice), x, y, variable.padding)
 
 
 class PressureField:
@@ -191,12 +188,12 @@ def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point
 
 
 def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
-    """Return those of the fields of a load step that were asked for; all that were kept if none was.
+    """Return the named fields of a load step; without names, all that the output has of it.
 
     Parameters
     ----------
     names : sequence of str
-        What was asked for.
+        Names of fields.
     fields : mapping of str to array_like
         The fields that there are.
     step : int

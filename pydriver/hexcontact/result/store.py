@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
-from ..files import flush, reading, replacing, require_utf8
+from ..files import flush, make_anew, reading, replacing, require_utf8
 from ..lock import Lock, names_a_run
 from .journal import STOPPED, SUFFIX, write_record
 from .journal import Journal as Journal
@@ -49,7 +49,7 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     Returns
     -------
     Result
-        Fields of a finished run are read from the file when they are asked for.
+        Fields of a finished run are read from the file when they are first used.
 
     Raises
     ------
@@ -283,7 +283,7 @@ class Store:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        """Close it; an error on its way out is written down, and told what is kept."""
+        """Close it; the reason of an error is kept, and the error names the finished steps."""
         known = isinstance(error, HexcontactError | KeyboardInterrupt)
         self.close((str(error) or "interrupted") if known else "")
         if isinstance(error, HexcontactError) and self.kept:
@@ -420,6 +420,7 @@ class Store:
             self._closed = True
             if reason and (self.heads or TrialFolder(self.folder)):
                 with contextlib.suppress(OSError):
+                    make_anew(self.folder / STOPPED)
                     (self.folder / STOPPED).write_text(reason, encoding="utf-8")
             self._lock.release()
             with contextlib.suppress(OSError):  # unless there are records in it

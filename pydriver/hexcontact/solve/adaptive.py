@@ -26,7 +26,7 @@ from ..core.steps import (
     is_shear_free,
 )
 from ..problem.loads import LoadStep
-from . import log, nonconvergence
+from . import nonconvergence
 
 if TYPE_CHECKING:
     from ..core.friction import ContactState
@@ -206,7 +206,6 @@ class AdaptivePath:
             except _Rim as rim:
                 smaller = self.window.lattice
                 self.window = self.window.grown(rim.solution, self.numbered(target))
-                log.grown(self._number + 1, smaller, self.window.lattice)
                 self._before = self.window.carried(self._before, smaller)
                 self._whole = self.window.carried(self._whole, smaller)
 

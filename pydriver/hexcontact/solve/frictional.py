@@ -6,19 +6,19 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core import contact
 from ..core.edges import ContactEdges, Edge
 from ..core.estimators import area_radius
+from ..core.friction import ContactState, FrictionalContact
 from ..core.measures import elastic_energy, zone_extent
 from ..errors import DeckError
 from ..problem.loads import LoadStep
 from ..result.history import RESIDUALS
-from ..result.result import Step
-from .frictionless import Array, Window
+from ..result.step import Step
+from .frictionless import STATE, Array, Window
 
 if TYPE_CHECKING:
-    from ..core.friction import ContactState, FrictionalContact
     from ..core.lattice import Lattice
 
 _SCALARS = (  # of a state, besides the residuals, that have the names of the history
@@ -28,20 +28,13 @@ _SCALARS = (  # of a state, besides the residuals, that have the names of the hi
 _ROUGHLY = 1e-4  # residual of a solution that only tells how large the contact becomes
 
 
-class FrictionWindow(Window["ContactState"]):
+class FrictionWindow(Window[ContactState]):
     """Contact with friction; a step starts from the state at the end of the step before."""
 
-    state = (
-        *("pressure", "traction_x", "traction_y", "gap", "zone"),
-        *("relative_displacement_x", "relative_displacement_y"),
-        *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
-    )
-    arrays = 34  # the state before, itself and on its way through the core both ways; gaps, coordinates
+    state = STATE[True]
 
-    def _set_up(self, gap: Array) -> None:
-        from ..core.friction import FrictionalContact
-
-        self._contact: FrictionalContact = FrictionalContact(
+    def _solver(self, gap: Array) -> FrictionalContact:
+        return FrictionalContact(
             self.lattice,
             self.case.pair,
             gap,
@@ -51,14 +44,11 @@ class FrictionWindow(Window["ContactState"]):
             method=self.case.method_for(self.lattice),
         )
 
-    def _let_go(self) -> None:
-        del self._contact
-
     def advance(
         self, state: ContactState | None, target: LoadStep, values: tuple[float, ...]
     ) -> ContactState:
         """Go on from a state to new loads and motions."""
-        return self._contact.advance(
+        solution: ContactState = self._contact.advance(
             self._contact.virgin() if state is None else state,
             [motion.control for motion in target.targets],
             values,
@@ -66,6 +56,7 @@ class FrictionWindow(Window["ContactState"]):
             entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
             tolerance=self.case.solver.tolerance,
         )
+        return solution
 
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
         """Return a state on this window; what the new nodes have been through follows from it."""
@@ -76,10 +67,6 @@ class FrictionWindow(Window["ContactState"]):
         return state_of(step)
 
     # --- what a step leaves -------------------------------------------------------------------------------
-
-    def _more_fields(self, solution: ContactState) -> dict[str, NDArray[Any]]:
-        known = ("pressure", "gap", "zone")
-        return {name: getattr(solution, name) for name in self.state if name not in known}
 
     def _more_history(
         self, solution: ContactState, before: ContactState | None, edges: ContactEdges
@@ -106,17 +93,14 @@ class FrictionWindow(Window["ContactState"]):
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        from ..core.contact import NormalContact
-
-        gap, candidate = self.case.initial_gap(self.lattice)
         method = self.case.method_for(self.lattice)
-        contact = NormalContact(self.lattice, self.case.pair, gap, candidate, method)
+        solver = contact.NormalContact(self.lattice, self.case.pair, self.initial_gap, self.candidate, method)
         areas = []
         for control, name in (("force", "normal_load"), ("displacement", "approach")):
             values = [step.z.value for step in self.case.load_steps if step.z.control == control]
             if (value := max(values, default=0.0)) > 0:
                 driven: dict[str, Any] = {name: value}
-                solution = contact.solve(**driven, tolerance=_ROUGHLY)
+                solution = solver.solve(**driven, tolerance=_ROUGHLY)
                 areas.append(self.lattice.cell_area * int((solution.zone > 0).sum()))
         return max([self.lattice.cell_area, *areas])
 
@@ -152,8 +136,6 @@ def state_of(step: Step) -> ContactState:
     DeckError
         If a field or a value is missing, as in a frictionless run.
     """
-    from ..core.friction import ContactState
-
     needed = {*FrictionWindow.state, *_SCALARS, *RESIDUALS.values(), "sweeps", "cuts"}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(

@@ -1,6 +1,6 @@
 """Says of a load step that did not converge which condition failed most, where, by how much, what to try.
 
-The residuals are those of docs/theory.md, section 7, node by node.
+The residuals are those of docs/theory/residuals.md, node by node.
 """
 
 from __future__ import annotations

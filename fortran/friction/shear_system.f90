@@ -10,8 +10,6 @@
 !> over to 1/D where a node slips far (see spring_blend).
 !>
 !> A field with two components is one vector, first the one, then the other.
-!>
-!> Equations: docs/theory/friction.md, (F7), (F9), (F10).
 module hc_shear_system
   use hc_precision, only: wp, sp
   use hc_error, only: error_t

@@ -18,8 +18,8 @@ from validation.error_bars import PROBLEMS, estimates_over_errors
 import hexcontact
 from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError
 from hexcontact.cli.app import app
+from hexcontact.cli.report import report
 from hexcontact.deck.surfaces import Sphere
-from hexcontact.plotting.report import report
 from hexcontact.result.trials import TrialFolder
 from hexcontact.solve import accuracy
 from hexcontact.solve import lattices as refinement

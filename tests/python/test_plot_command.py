@@ -13,7 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from hexcontact import Case, open_result, plotting
-from hexcontact.cli import plot_choices, plot_command
+from hexcontact.cli import plot as plot_command
+from hexcontact.cli import plot_choices
 from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
 from hexcontact.plotting import influence as plotting_influence

@@ -1,7 +1,7 @@
 """Pictures of results with friction: what they show is what the result says.
 
-The results here are laid out by `hexcontact.result.result.assemble` from closed solutions: spheres with E* = 2,
-gamma = 0.4, mu = 0.3, pressed by P = 0.8 and sheared or twisted.
+The results here are laid out by `hexcontact.result.result.assemble` from closed solutions: spheres with
+E* = 2, gamma = 0.4, mu = 0.3, pressed by P = 0.8 and sheared or twisted.
 """
 
 from collections.abc import Callable, Sequence

@@ -25,8 +25,8 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, analytic, open_result
 from hexcontact.cli.app import app
-from hexcontact.plotting.report import report, write_report
-from hexcontact.plotting.report_fields import MOST_STEPS, Plane, kept_steps
+from hexcontact.cli.report import report, write_report
+from hexcontact.plotting.report_data import MOST_STEPS, Plane, kept_steps
 from hexcontact.result.result import Result, Step
 from hexcontact.result.view import StepView
 from hexcontact.text import quantity

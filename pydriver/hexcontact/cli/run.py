@@ -125,7 +125,7 @@ def study(
     """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
     from ..study.study import Study
     from . import json_output
-    from . import study_command as command
+    from . import study as command
     from .run_command import Listeners
 
     if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:

@@ -170,7 +170,7 @@ def solved(
 
 def overview(path: Path) -> Path:
     """Draw a result beside its file."""
-    from .plot_command import picture_of
+    from .plot import picture_of
 
     return picture_of([open_result(path)], "overview", path.with_suffix(".png"), {})
 

@@ -111,7 +111,7 @@ def plot(
     ] = None,
 ) -> None:
     """Draw a result, or what belongs to none; its help is made of the choices there are."""
-    from . import plot_command as command
+    from . import plot as command
 
     command.refuse_unknown(what, bool(files))
     given = {
@@ -148,7 +148,7 @@ def report(
     ] = None,
 ) -> None:
     """Write one HTML page that shows a result: inputs, history, maps of every load step, residuals."""
-    from ..plotting.report import write_report
+    from .report import write_report
 
     say(f"written: {write_report(_open(file), output or file.with_suffix('.html'))}")
 
@@ -175,7 +175,7 @@ def export(
     if not (vtk or ugrid or csv):
         raise DeckError("expected --vtk, --ugrid or --csv")
     from ..result import export as write
-    from .plot_command import steps_of
+    from .plot import steps_of
 
     result, folder = _open(file), output or file.with_name(f"{file.stem}_export")
     steps, stem = None if step is None else steps_of(step), file.stem

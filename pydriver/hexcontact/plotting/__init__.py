@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 
 from ..analytic.shear import ClosedForms
 from ..result.view import StepView, dataset_of, scaled
-from .compliance_curve import compliance
-from .histories import draw_history, fitted, history, loop, torsion
+from .compliance import compliance
+from .history import draw_history, fitted, history, loop, torsion
 from .maps import draw_field, field_map, outline, set_plane, widened
 from .sections import Cut, draw_section, draw_shear, section, tractions
 from .style import EXACT, STYLE, legend_below, new_figure, set_title
-from .zone_maps import contact_boundary, draw_zones, outlines, zone_legend, zones
+from .zones import contact_boundary, draw_zones, outlines, zone_legend, zones
 
 if TYPE_CHECKING:
     import xarray

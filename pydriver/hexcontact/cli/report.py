@@ -1,6 +1,6 @@
 """A page that shows a result: one HTML file that needs nothing else, neither a network nor this program.
 
-What the page holds is gathered here and in `hexcontact.plotting.report_fields`; how it looks and moves is in
+What the page holds is gathered here and in `hexcontact.plotting.report_data`; how it looks and moves is in
 data/report.html, which draws from numbers and small pictures in the file itself.
 """
 
@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._version import __version__
-from ..cli import tables as summary
 from ..errors import DeckError
+from ..plotting.report_data import kept_steps, maps_of, rounded
 from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, step_rows, worth_showing
 from ..result.remarks import remarks
 from ..result.view import scaled
 from ..solve.overview import case_rows
 from ..text import escaped, quantity
 from ..variables import VARIABLES
-from .report_fields import kept_steps, maps_of, rounded
+from . import tables as summary
 
 if TYPE_CHECKING:
     from ..result.result import Result

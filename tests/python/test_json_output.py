@@ -293,7 +293,7 @@ def test_a_mistake_of_the_program_is_told_and_shown(folder: Path, monkeypatch: p
     def broken(*arguments: Any) -> Any:
         raise ZeroDivisionError("a mistake")
 
-    monkeypatch.setattr(json_output, "of_case", broken)
+    monkeypatch.setattr(cli_deck, "case_content", broken)
     with pytest.raises(ZeroDivisionError):
         cli_deck.check(deck=Path("deck.toml"), as_json=True)
     result = CliRunner().invoke(app, ["check", "deck.toml", "--json"])

@@ -16,6 +16,7 @@ from hexcontact import analytic, plotting
 from hexcontact.analytic import EllipticContact
 from hexcontact.core import estimators
 from hexcontact.plotting import maps as plotting_maps
+from hexcontact.plotting.registry import entries
 from hexcontact.result.view import StepView, scaled, worded
 
 HEIGHT = np.sqrt(0.75)
@@ -170,7 +171,7 @@ RESULTS = {
     "cone": cone,
     "fine": lambda: sphere(half=90, spacing=0.012),
 }
-FRICTIONLESS = ("overview", "pressure", "section", "boundary", "history")  # the others need friction
+FRICTIONLESS = [name for name, entry in entries().items() if entry.of_a_result and not entry.needs]
 results = pytest.mark.parametrize("make", RESULTS)
 
 

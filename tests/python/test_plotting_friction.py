@@ -27,10 +27,11 @@ from hexcontact.analytic import shear as closed_forms
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
 from hexcontact.analytic.shear import ClosedForms
 from hexcontact.core.lattice import Lattice
-from hexcontact.plotting import zone_maps
-from hexcontact.plotting.compliance_curve import initial_compliance
-from hexcontact.plotting.histories import panels_of
+from hexcontact.plotting.compliance import initial_compliance
+from hexcontact.plotting.history import panels_of
+from hexcontact.plotting.registry import entries
 from hexcontact.plotting.style import SLIP, STICK
+from hexcontact.plotting.zones import cell_outline
 from hexcontact.result.result import Metadata, Step, assemble
 from hexcontact.result.view import StepView
 
@@ -489,7 +490,7 @@ BASIS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
 @settings(max_examples=60, deadline=None)
 @given(arrays.arrays(bool, arrays.array_shapes(min_dims=2, max_dims=2, max_side=9)))
 def test_outline_encloses_the_cells_of_the_zone(zone: np.ndarray) -> None:
-    polygons = zone_maps.cell_outline(zone, BASIS, (3.0, -2.0))
+    polygons = cell_outline(zone, BASIS, (3.0, -2.0))
     assert area(polygons) == pytest.approx(zone.sum() * np.sqrt(0.75), abs=1e-9)
     for polygon in polygons:
         assert polygon[0] == pytest.approx(polygon[-1])
@@ -847,8 +848,9 @@ def test_overview_shows_maps_zones_section_and_history() -> None:
 
 
 SUITABLE = {
-    **dict.fromkeys(plotting.FIGURES, dissimilar),
-    "torsion": torsion,
+    name: torsion if entry.needs == "torque" else dissimilar
+    for name, entry in entries().items()
+    if entry.of_a_result
 }
 
 
@@ -871,6 +873,7 @@ NEEDS_FRICTION = {
     "tractions": "a contact without friction has no traction",
     "traction": "a contact without friction has no traction",
     "traction_x": "a contact without friction has no traction x",
+    "traction_y": "a contact without friction has no traction y",
     "slip_increment": "a contact without friction has no slip increment",
     "accumulated_slip": "a contact without friction has no accumulated slip",
     "zones": "a contact without friction has no stick and slip zones",
@@ -881,7 +884,7 @@ NEEDS_FRICTION = {
 }
 
 
-@pytest.mark.parametrize("name", NEEDS_FRICTION)
+@pytest.mark.parametrize("name", [name for name, entry in entries().items() if entry.needs])
 def test_what_needs_friction_says_so(name: str) -> None:
     without = frictionless()
     if name == "accumulated_slip":

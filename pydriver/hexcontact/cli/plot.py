@@ -1,41 +1,168 @@
-"""Pictures into files: what ``hexcontact plot`` does with its options."""
+"""The command that draws: ``hexcontact plot``; the figures stand in `hexcontact.plotting`."""
 
 from __future__ import annotations
 
-import inspect
+import enum
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand
 
 from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError
 from ..text import did_you_mean, listed
+from .guard import command, say
+from .options import steps_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ..plotting.registry import Entry
     from ..result.result import Result
 
-_SEVERAL_RUNS = ("compliance",)  # pictures that say little about one run
+_DRAWS = "Draw a result, or what the influence functions and load shapes look like."
+_ALL = "all"
 
 
-def steps_of(text: str) -> list[int]:
-    """Read numbers of load steps: "20" or "10,20,30"."""
-    try:
-        return [int(part) for part in text.split(",")]
-    except ValueError:
-        raise DeckError(f"--step {text}: expected a number of a load step, or several as 10,20,30") from None
+class Kind(enum.StrEnum):
+    """Kinds of pictures."""
+
+    png = "png"
+    pdf = "pdf"
+    svg = "svg"
+
+
+class Arrows(enum.StrEnum):
+    """Arrows that a zone map may have."""
+
+    none = "none"
+    traction = "traction"
+    slip = "slip"
+
+
+class _Plot(TyperCommand):
+    """The command; its help names the figures, for which the packages that draw are imported."""
+
+    @property
+    def help(self) -> str:
+        """What it does, and a line for each figure."""
+        return _help()
+
+    @help.setter
+    def help(self, text: str) -> None:
+        pass
+
+
+def _help() -> str:
+    from ..plotting.registry import entries
+
+    choices = [(entry.of_a_result, name, entry.help) for name, entry in entries().items()]
+    choices.append((True, _ALL, "each that there is, in a file of its own"))
+    width = 2 + max(len(name) for _, name, _ in choices)
+    of_a_result, of_none = (
+        "\n".join(f"{name:<{width}}{words}" for of_one, name, words in choices if of_one == kind)
+        for kind in (True, False)
+    )
+    return (
+        f"{_DRAWS}\n\n"
+        "Closed solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn beside where they "
+        f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n\b\nWithout FILE:\n{of_none}"
+    )
+
+
+@command(
+    "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
+    cls=_Plot,
+    short_help=_DRAWS,
+)
+def plot(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE",
+            help="The result, a netCDF file; several for zones, outlines and compliance.",
+            show_default=False,
+        ),
+    ] = None,
+    what: Annotated[str, typer.Option("--what", "-w", help="Which picture; see above.")] = "overview",
+    step: Annotated[
+        str | None,
+        typer.Option(
+            "--step",
+            "-s",
+            metavar="N,...",
+            help="Load step, the first is 1; -1, the default: the last. Some "
+            "pictures show several: 10,20,30.",
+        ),
+    ] = None,
+    angle: Annotated[
+        str | None,
+        typer.Option(metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."),
+    ] = None,
+    through: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."),
+    ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="What the history is drawn over, as tangential_load_x."),
+    ] = None,
+    arrows: Annotated[
+        Arrows | None, typer.Option(help="Arrows on zone maps: shear traction, or slip in the step.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
+        ),
+    ] = None,
+    kind: Annotated[
+        Kind | None, typer.Option("--format", "-f", help="Kind of picture where --output names none.")
+    ] = None,
+) -> None:
+    """Draw a result, or what belongs to none; the help is made of the figures that there are."""
+    from ..plotting.registry import entries
+    from ..result.store import open_result
+
+    files = files or []
+    figures = entries()
+    if what not in (known := [*figures, _ALL]):
+        raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
+    if bool(files) != (what == _ALL or figures[what].of_a_result):
+        expected = "expected no FILE" if files else "expected the FILE of a result"
+        raise DeckError(f"--what {what}: {expected}")
+    given = {
+        "step": None if step is None else steps_of(step),
+        "angle": None if angle is None else angle_of(angle),
+        "through": None if through is None else point_of(through),
+        "over": over,
+        "arrows": None if arrows is None else arrows.value,
+    }
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if output and kind:
+        raise DeckError(f"--format {kind}: the name of --output {output} says what kind of picture it is")
+    suffix = f".{kind or 'png'}"
+    if what == _ALL:
+        if len(files) > 1:
+            raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
+        first = output or files[0].with_suffix(suffix)
+        say("\n".join(all_pictures(open_result(files[0]), first, chosen)))
+        return
+    default = files[0].with_name(f"{files[0].stem}_{what}{suffix}") if files else Path(f"{what}{suffix}")
+    say(f"written: {picture_of([open_result(file) for file in files], what, output or default, chosen)}")
+
+
+# --- options ----------------------------------------------------------------------------------------
 
 
 def angle_of(text: str) -> float:
     """Read an angle to rad: a bare number is in degrees."""
     try:
-        return math.radians(float(text))
-    except ValueError:
-        pass
-    try:
-        return to_si(text, ANGLE)
+        number = _number_or_text(text)
+        return to_si(number, ANGLE) if isinstance(number, str) else math.radians(number)
     except UnitError as error:
         raise DeckError(f"--angle {text}: expected an angle such as 30 or 0.5rad{_because(error)}") from None
 
@@ -45,8 +172,7 @@ def point_of(text: str) -> tuple[float, float]:
     try:
         x, y = (to_si(_number_or_text(part), LENGTH) for part in text.split(","))
     except (UnitError, ValueError) as error:
-        reason = _because(error) if isinstance(error, UnitError) else ""
-        raise DeckError(f"--through {text}: expected two lengths such as 10um,0um{reason}") from None
+        raise DeckError(f"--through {text}: expected two lengths such as 10um,0um{_because(error)}") from None
     return x, y
 
 
@@ -57,42 +183,42 @@ def _number_or_text(text: str) -> float | str:
         return text
 
 
-def _because(error: UnitError) -> str:
-    return f"; {error}" if str(error) else ""
+def _because(error: ValueError) -> str:
+    return f"; {error}" if isinstance(error, UnitError) and str(error) else ""
 
 
-def refuse_unknown(what: str, has_file: bool) -> None:
-    """Complain about a picture that there is not, or not of a result, or not without one.
+def _arguments(entry: Entry, files: int, chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn the options that were given into the arguments of a figure."""
+    if files > 1 and not entry.of_several:
+        raise DeckError(f"--what {entry.name} shows one result; expected one FILE, not {files}")
+    arguments: dict[str, Any] = {}
+    for option, value in chosen.items():
+        if option == "step" and "steps" in entry.options:
+            arguments["steps"] = value
+        elif option not in entry.options:
+            raise DeckError(f"--{option}: not an option of --what {entry.name}")
+        elif option == "step":
+            if len(value) > 1:
+                count = f"expected one number, not {len(value)}"
+                raise DeckError(f"--step: {entry.name} shows one load step; {count}")
+            arguments["step"] = value[0]
+        else:
+            arguments[option] = value
+    return arguments
 
-    Raises
-    ------
-    DeckError
-    """
-    from .plot_choices import OF_A_RESULT, OF_NO_RESULT
 
-    if what not in (known := [*OF_A_RESULT, "all", *OF_NO_RESULT]):
-        raise DeckError(f"--what {what}: expected {listed(known, 'or')}{did_you_mean(what, known)}")
-    if has_file == (what in OF_NO_RESULT):
-        expected = "expected no FILE" if has_file else "expected the FILE of a result"
-        raise DeckError(f"--what {what}: {expected}")
-
-
-def general_picture(what: str, picture: Path) -> Path:
-    """Draw one of the pictures that belong to no result."""
-    from ..plotting.influence import FIGURES
-
-    return _save(FIGURES[what], what, picture)
+# --- drawing ----------------------------------------------------------------------------------------
 
 
 def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapping[str, Any]) -> Path:
-    """Draw one picture of a result, or of several.
+    """Draw one picture of a result, of several, or of none.
 
     Parameters
     ----------
     results : sequence of Result
         The results.
     what : str
-        Name of the picture.
+        Name of the figure.
     picture : Path
         File to write.
     chosen : mapping
@@ -101,36 +227,20 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
     Raises
     ------
     DeckError
-        If the picture has no such option, the result has nothing to show in it, or it cannot be written.
+        If the figure has no such option, the result has nothing to show in it, or it cannot be written.
     """
-    from ..plotting import FIGURES
+    from ..plotting.registry import entries
 
-    arguments = _arguments(what, FIGURES[what], len(results), chosen)
-    shown = results if "results" in inspect.signature(FIGURES[what]).parameters else results[0]
-    named = listed([result.path for result in results], "and")
-    return _save(lambda: FIGURES[what](shown, **arguments), f"{what} of {named}", picture)
-
-
-def _arguments(
-    what: str, draw: Callable[..., Figure], files: int, chosen: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Turn the options that were given into the arguments of a picture."""
-    known = inspect.signature(draw).parameters
-    if files > 1 and "results" not in known:
-        raise DeckError(f"--what {what} shows one result; expected one FILE, not {files}")
-    arguments: dict[str, Any] = {}
-    for option, value in chosen.items():
-        if option == "step" and "steps" in known:
-            arguments["steps"] = value
-        elif option == "step" and "step" in known:
-            if len(value) > 1:
-                raise DeckError(f"--step: {what} shows one load step; expected one number, not {len(value)}")
-            arguments["step"] = value[0]
-        elif option in known:
-            arguments[option] = value
-        else:
-            raise DeckError(f"--{option}: not an option of --what {what}")
-    return arguments
+    entry = entries()[what]
+    arguments = _arguments(entry, len(results), chosen)
+    shown = [results] if entry.of_several else results
+    named = listed([result.path for result in results], "and") if results else ""
+    about = f"{what} of {named}" if named else what
+    try:
+        figure = entry.draw(*shown, **arguments)
+    except (IndexError, ValueError) as error:  # no such step, nothing in contact
+        raise DeckError(f"cannot draw {about}: {error}") from error
+    return _save(figure, about, picture)
 
 
 def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list[str]:
@@ -150,34 +260,32 @@ def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list
     DeckError
         If none can be drawn or one cannot be written.
     """
-    from ..plotting import FIGURES
+    from ..plotting.registry import SEVERAL_RUNS, entries
 
     lines, written = [], False
-    for what, draw in FIGURES.items():
-        if what in _SEVERAL_RUNS:
+    for what, entry in entries().items():
+        if entry.needs == SEVERAL_RUNS or not entry.of_a_result:
             continue
-        known = inspect.signature(draw).parameters
-        own = {name: value for name, value in chosen.items() if {name, f"{name}s"} & known.keys()}
-        arguments = _arguments(what, draw, 1, own)
+        own = {name: value for name, value in chosen.items() if {name, f"{name}s"} & entry.options.keys()}
+        arguments = _arguments(entry, 1, own)
         try:
-            figure = draw(result, **arguments)
+            figure = entry.draw(result, **arguments)
         except IndexError as error:
             raise DeckError(f"cannot draw {what} of {result.path}: {error}") from error
         except ValueError as error:
             lines.append(f"left out: {what} ({error})")
             continue
-        target = _save(lambda figure=figure: figure, what, first.with_stem(f"{first.stem}_{what}"))  # type: ignore[misc]
-        lines.append(f"written: {target}")
+        lines.append(f"written: {_save(figure, what, first.with_stem(f'{first.stem}_{what}'))}")
         written = True
     if not written:
         raise DeckError(f"nothing of {result.path} can be drawn; {lines[0]}")
     return lines
 
 
-def _save(draw: Callable[[], Figure], what: str, picture: Path) -> Path:
+def _save(figure: Figure, about: str, picture: Path) -> Path:
     """Write a picture."""
     try:
-        draw().savefig(picture, dpi=200)
-    except (IndexError, ValueError) as error:  # no such step, nothing in contact, no such kind of file
-        raise DeckError(f"cannot draw {what}: {error}") from error
+        figure.savefig(picture, dpi=200)
+    except ValueError as error:  # no such kind of file
+        raise DeckError(f"cannot draw {about}: {error}") from error
     return picture

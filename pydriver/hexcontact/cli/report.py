@@ -1,6 +1,6 @@
 """A page that shows a result: one HTML file that needs nothing else, neither a network nor this program.
 
-What the page holds is gathered here and in `hexcontact.plotting.report_data`; how it looks and moves is in
+Its tables are made here, what it draws in `hexcontact.plotting.report_data`; how it looks and moves is in
 data/report.html, which draws from numbers and small pictures in the file itself.
 """
 
@@ -16,50 +16,19 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .._version import __version__
 from ..errors import DeckError
-from ..plotting.report_data import kept_steps, maps_of, rounded
-from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, step_rows, worth_showing
-from ..result.remarks import remarks
-from ..result.view import scaled
+from ..plotting.report_data import drawn_data, kept_steps
+from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
 from ..solve.overview import case_rows
 from ..text import escaped, quantity
-from ..variables import VARIABLES
-from . import tables as summary
+from . import tables
 
 if TYPE_CHECKING:
+    from ..problem.problem import Problem
     from ..result.result import Result
 
 History = Mapping[str, Any]
-
-_CURVES = (  # title, and what is drawn over the step number
-    ("Normal load", ("normal_load",)),
-    ("Approach", ("approach",)),
-    ("Tangential load", ("tangential_load_x", "tangential_load_y")),
-    ("Shift", ("shift_x", "shift_y")),
-    ("Torque", ("torque",)),
-    ("Twist", ("twist",)),
-    ("Contact and stick area", ("contact_area_fit", "stick_area_fit")),
-    ("Largest pressure", ("max_pressure",)),
-    ("Largest shear traction", ("max_traction",)),
-    ("Elastic energy", ("elastic_energy",)),
-    ("Dissipated energy", ("dissipated_energy",)),
-)
-_LOOPS = (  # title, what is drawn over what
-    ("Tangential load over shift, x", "shift_x", "tangential_load_x"),
-    ("Tangential load over shift, y", "shift_y", "tangential_load_y"),
-    ("Torque over twist", "twist", "torque"),
-)
-_SYMBOLS = {
-    "tangential_load_x": "Q_x",
-    "tangential_load_y": "Q_y",
-    "shift_x": "x",
-    "shift_y": "y",
-    "contact_area_fit": "contact",
-    "stick_area_fit": "stick",
-}
 
 
 def write_report(result: Result, target: Path) -> Path:
@@ -102,29 +71,20 @@ def report(result: Result) -> str:
     result : Result
         The result, of a finished run or not.
     """
-    import matplotlib
-
-    histories = result.history.reset_index().to_dict("records")
+    summary = tables.Summary.of_result(result)
+    histories = summary.steps()
     numbers = kept_steps(result)
-    palette = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, 255))[:, :3]
-    data = {
-        "palette": np.round(255 * palette).astype(int).ravel().tolist(),
-        "numbers": [history["step"] for history in histories],
-        "labels": [str(history.get("label", "")) for history in histories],
-        "states": [step_rows(history) for history in histories],
-        "charts": charts_of(histories),
-        "fields": maps_of(result, numbers) if numbers else None,
-    }
+    data = drawn_data(result, histories, numbers)
     title = result.case_title or Path(result.path).stem or "hexcontact result"
     page = resources.files("hexcontact").joinpath("data/report.html").read_text(encoding="utf-8")
     parts = dict(
         title=escaped(title),
-        status=_status(result, histories),
+        status=_status(result, summary.remarks),
         kept=_kept(len(numbers), len(histories)),
-        inputs=_pairs(_inputs(result)),
+        inputs=_pairs(_inputs(result, summary.case)),
         loads=_loads(histories),
         deck=_deck(result.deck),
-        hertz=_hertz(result, histories[-1]),
+        hertz=_hertz(summary),
         accuracy=_accuracy(result),
         residuals=_residuals(histories),
         provenance=_pairs(_provenance(result, histories)),
@@ -136,8 +96,8 @@ def report(result: Result) -> str:
 # --- words ----------------------------------------------------------------------------------------
 
 
-def _status(result: Result, histories: Sequence[History]) -> str:
-    notes = [_unfinished(result), *remarks(histories, result.dataset.attrs)]
+def _status(result: Result, remarks: Sequence[str]) -> str:
+    notes = [_unfinished(result), *remarks]
     return "".join(f'<p class="warning" role="note">{escaped(note)}</p>' for note in notes if note)
 
 
@@ -160,9 +120,8 @@ def _kept(shown: int, steps: int) -> str:
     )
 
 
-def _inputs(result: Result) -> list[tuple[str, ...]]:
+def _inputs(result: Result, case: Problem | None) -> list[tuple[str, ...]]:
     attributes, sizes = result.dataset.attrs, result.dataset.sizes
-    case = summary.case_of(result)
     left_out = {"window", "memory", "load steps"}
     rows: list[tuple[str, ...]] = []
     if case is not None and case.accuracy:
@@ -178,7 +137,7 @@ def _inputs(result: Result) -> list[tuple[str, ...]]:
                 f"beta = {float(attributes['dundurs_beta']):.4g}, "
                 f"gamma = {float(attributes['tangential_compliance_ratio']):.4g}",
             ),
-            ("algorithm", summary.algorithm(attributes)),
+            ("algorithm", tables.algorithm(attributes)),
             ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
         ]
     window = f"{sizes['row']} x {sizes['col']} nodes at the end"
@@ -255,15 +214,14 @@ def _deck(deck: str) -> str:
     )
 
 
-def _hertz(result: Result, history: History) -> str:
-    case = summary.case_of(result)
-    rows = summary.hertz_rows(case, history) if case is not None else []
-    return _table("Last load step against Hertz", summary.HERTZ_HEADERS, rows) if rows else ""
+def _hertz(summary: tables.Summary) -> str:
+    rows = tables.hertz_rows(summary.hertz, summary.histories[-1])
+    return _table("Last load step against Hertz", tables.HERTZ_HEADERS, rows) if rows else ""
 
 
 def _accuracy(result: Result) -> str:
-    rows = summary.trial_rows(result)
-    return _table("Accuracy", summary.TRIAL_HEADERS, rows) if rows else ""
+    rows = tables.trial_rows(result)
+    return _table("Accuracy", tables.TRIAL_HEADERS, rows) if rows else ""
 
 
 def _residuals(histories: Sequence[History]) -> str:
@@ -282,58 +240,3 @@ def _residuals(histories: Sequence[History]) -> str:
     ]
     headers = ("step", "label", *signs, "iterations", "halved", "operator applications", "time")
     return _table("Residuals and work of each load step", headers, rows, link=True)
-
-
-# --- curves ---------------------------------------------------------------------------------------
-
-
-def charts_of(histories: Sequence[History]) -> list[dict[str, Any]]:
-    """Return the curves of a history as the page draws them; none of a single load step.
-
-    Parameters
-    ----------
-    histories : sequence of mapping
-        History of each step.
-    """
-    if len(histories) < 2:
-        return []
-    telling = {name for name in VARIABLES if name in histories[0] and name not in LOADS_AND_MOTIONS}
-    telling |= set(worth_showing(histories))
-    steps = [history["step"] for history in histories]
-    charts: list[dict[str, Any]] = []
-    for title, names in _CURVES:
-        shown = [name for name in names if name in telling and _peak(name, histories) > 0.0]
-        if not shown:
-            continue
-        factor, unit = scaled(max(_peak(name, histories) for name in shown), VARIABLES[shown[0]].units)
-        curves = {_SYMBOLS.get(name, ""): _values(name, histories, factor) for name in shown}
-        charts.append({"title": title, "x": steps, "xlabel": "step", "unit": unit, "curves": curves})
-    for title, over, name in _LOOPS:
-        if {over, name} <= telling and min(_peak(over, histories), _peak(name, histories)) > 0.0:
-            to_x, x_unit = scaled(_peak(over, histories), VARIABLES[over].units)
-            factor, unit = scaled(_peak(name, histories), VARIABLES[name].units)
-            charts.append(
-                {
-                    "title": title,
-                    "x": _values(over, histories, to_x),
-                    "xlabel": f"{over.replace('_', ' ')} [{x_unit}]",
-                    "unit": unit,
-                    "curves": {"": _values(name, histories, factor)},
-                    "points": True,
-                }
-            )
-    signs = {sign: name for sign, name in RESIDUALS.items() if name in histories[0]}
-    curves = {sign: _values(name, histories, 1.0) for sign, name in signs.items() if _peak(name, histories)}
-    charts.append(
-        {"title": "Residuals", "x": steps, "xlabel": "step", "unit": "", "curves": curves, "log": True}
-    )
-    return charts
-
-
-def _peak(name: str, histories: Sequence[History]) -> float:
-    values = np.abs([float(history[name]) for history in histories])
-    return float(values[np.isfinite(values)].max(initial=0.0))
-
-
-def _values(name: str, histories: Sequence[History], factor: float) -> list[float | None]:
-    return rounded([factor * float(history[name]) for history in histories], 5)

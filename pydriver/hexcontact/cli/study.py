@@ -1,158 +1,181 @@
-"""What `hexcontact study` shows and prints: progress, the list of failures, a Slurm job array."""
+"""The command that runs many cases: ``hexcontact study``, here or as a Slurm job array."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shlex
-import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from ..errors import DeckError
-from ..solve.interruption import Interrupted, in_background
-from ..study.study import Outcome, PlannedCase, Study, StudyWatcher
-from ..study.tables import batch_text
-from ..text import quantity, visible
-from .guard import complain, say
+from ..solve.interruption import Interrupted, in_background, news
+from .guard import Content, Failure, command, complain, say
+from .options import AsJson, Level, LogFile, Quiet
 
 if TYPE_CHECKING:
-    from .run_command import Listeners
+    from ..study.study import Outcome, PlannedCase, Study
+    from .messages import Messages
 
 FAILED = 3  # exit code of a study of which some cases failed
-_MOST_TOLD = 20  # failures listed at the end
+_MOST_NAMED = 20  # failures listed at the end
 
 
-class StudyLines(StudyWatcher):
-    """One line by case, for logs and pipes."""
+@command("hexcontact study cases/study_friction.toml --jobs 4")
+def study(
+    context: typer.Context,
+    file: Annotated[
+        Path, typer.Argument(metavar="STUDY", help="The study, a TOML file.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="Result; default: the study's output, or STUDY.nc here. Cases go beside it.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786.")
+    ] = None,
+    slurm: Annotated[bool, typer.Option("--slurm", help="Print a job array for sbatch instead.")] = False,
+    case: Annotated[
+        int | None, typer.Option(metavar="N", help="Run only case N (what a job array does).")
+    ] = None,
+    collect: Annotated[
+        bool, typer.Option("--collect", help="Run nothing, put together what is there.")
+    ] = False,
+    retry: Annotated[bool, typer.Option("--retry", help="Run cases that failed again.")] = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+    log_file: LogFile = None,
+    log_level: Level = None,
+) -> Content:
+    """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    from ..study.study import Study
+    from .messages import Messages
+    from .study_progress import watcher
 
-    def __init__(self, stream: IO[str]) -> None:
-        self.stream = stream
-        self.count = self.total = 0
-
-    @contextlib.contextmanager
-    def watching(self, study: Study, missing: int) -> Iterator[None]:
-        """Say first what there is to do."""
-        self.total, self.study = missing, study
-        self._print(f"{study.title}: {_of_study(study, missing)}")
-        yield
-
-    def finished(self, case: PlannedCase, outcome: Outcome) -> None:
-        """Print the line of a case."""
-        self.count += 1
-        place = f"{self.count:>{len(str(self.total))}}/{self.total}"
-        number = self.study.folder.number(case)
-        self._print(f"{place}  case {number} ({case}): {_ending(outcome)}")
-
-    def _print(self, line: str) -> None:
-        with contextlib.suppress(OSError):  # nobody listens any more; the study goes on
-            print(visible(line), file=self.stream, flush=True)
-
-
-class StudyBar(StudyWatcher):
-    """A progress bar over the cases, the latest one below it."""
-
-    @contextlib.contextmanager
-    def watching(self, study: Study, missing: int) -> Iterator[None]:
-        """Show the bar; it vanishes at the end."""
-        from rich.console import Console, Group
-        from rich.live import Live
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-        from rich.progress import TimeRemainingColumn as Remaining
-        from rich.text import Text
-
-        self.study = study
-        columns = [TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
-        self._bar = Progress(*columns, TimeElapsedColumn(), TextColumn("left:"), Remaining())
-        done = len(study) - missing
-        self._task = self._bar.add_task(visible(study.title), total=len(study), completed=done)
-        self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
-        with Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True):
-            yield
-
-    def finished(self, case: PlannedCase, outcome: Outcome) -> None:
-        """Move the bar on by a case."""
-        latest = f"  case {self.study.folder.number(case)} ({case}): {_ending(outcome)}"
-        self._latest.plain = visible(latest)
-        self._bar.update(self._task, advance=1)
-
-
-def watcher(quiet: bool) -> StudyWatcher:
-    """Return what suits standard error: bar, lines, or silence if `quiet`."""
-    if quiet:
-        return StudyWatcher()
-    return StudyBar() if sys.stderr.isatty() else StudyLines(sys.stderr)
-
-
-def _ending(outcome: Outcome) -> str:
-    if not outcome.exit_code:
-        return f"done in {quantity(outcome.seconds, 's', 3)}"
-    return f"failed: {outcome.message.splitlines()[0]}"
-
-
-def _of_study(study: Study, missing: int) -> str:
-    cases = f"{len(study)} case{'s' * (len(study) != 1)}"
-    return cases if missing == len(study) else f"{cases}, {missing} to run"
-
-
-def report(study: Study, quiet: bool) -> int:
-    """Say what is there, what failed and why; return the exit code."""
-    done = sum(study.folder.done(case) for case in study.cases)
-    failures = study.failures()
-    if not quiet:
-        say(f"written: {study.output}, {done} of {len(study)} cases (their files in {study.folder.folder}/)")
-    if done == len(study):
-        return 0
-    for case, outcome in failures[:_MOST_TOLD]:
-        words = outcome.message.splitlines()[0]
-        complain(f"case {study.folder.number(case)} ({case}) failed: {words}")
-    if len(failures) > _MOST_TOLD:
-        complain(f"... and {len(failures) - _MOST_TOLD} more; all are in {study.output}")
-    missing = len(study) - done - len(failures)
-    if missing:
-        complain(f"{missing} of {len(study)} cases have not been run")
-    if any(outcome.lasting for _, outcome in failures):
-        complain("--retry runs cases again that failed by themselves")
-    return FAILED
+    if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:
+        raise DeckError("expected only one of --jobs, --dask, --slurm, --case and --collect")
+    if slurm and as_json:
+        raise DeckError("--json: expected no --slurm, which prints a script")
+    messages = Messages("study", quiet, as_json, log_file, log_level)
+    planned = Study.from_toml(file, output, check=case is None and not collect)
+    if slurm:
+        print(slurm_script(planned, file, retry) or "# no case is missing")
+        return None
+    with messages.logging(file, planned.output):
+        if case is not None:
+            outcome = _run_case(planned, case, retry, messages, context)
+            if outcome.exit_code:
+                raise Failure(outcome.message, outcome.exit_code)
+            return {
+                "case": case,
+                "output": planned.folder.folder / f"{case:04d}.nc",
+                "seconds": outcome.seconds,
+            }
+        if collect:
+            planned.collect()
+        else:
+            shown = watcher(messages.silent)
+            _run_missing(planned, context, jobs=jobs, dask=dask, retry=retry, watcher=shown)
+    state = _State.of(planned)
+    state.report(quiet or as_json)
+    if as_json:
+        return {"exit_code": state.exit_code, **state.content()}
+    if state.exit_code:
+        raise typer.Exit(state.exit_code)
+    return None
 
 
-def interrupted(study: Study) -> str:
-    """Say what is kept of a study that was interrupted."""
-    done = sum(study.folder.done(case) for case in study.cases)
-    return (
-        f"{done} of {len(study)} cases are finished and kept in {study.folder.folder}/; "
-        "the same command runs the rest"
-    )
+@dataclass(frozen=True)
+class _State:
+    """How far a study is: finished cases, those that failed, and the number of those that were not run."""
+
+    study: Study
+    done: int
+    failures: Sequence[tuple[PlannedCase, Outcome]]
+    missing: int
+
+    @classmethod
+    def of(cls, study: Study) -> _State:
+        """Look at the files of the cases."""
+        done, failures = sum(study.folder.done(case) for case in study.cases), study.failures()
+        return cls(study, done, failures, len(study) - done - len(failures))
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of the command."""
+        return FAILED if self.done < len(self.study) else 0
+
+    def report(self, quiet: bool) -> None:
+        """Say what is there, what failed and why."""
+        study = self.study
+        number = study.folder.number
+        if not quiet:
+            files = f"their files in {study.folder.folder}/"
+            say(f"written: {study.output}, {self.done} of {len(study)} cases ({files})")
+        for case, outcome in self.failures[:_MOST_NAMED]:
+            complain(f"case {number(case)} ({case}) failed: {outcome.message.splitlines()[0]}")
+        if len(self.failures) > _MOST_NAMED:
+            complain(f"... and {len(self.failures) - _MOST_NAMED} more; all are in {study.output}")
+        if self.missing:
+            complain(f"{self.missing} of {len(study)} cases have not been run")
+        if any(outcome.lasting for _, outcome in self.failures):
+            complain("--retry runs cases again that failed by themselves")
+
+    def content(self) -> dict[str, Any]:
+        """Return the same for programs."""
+        study = self.study
+        return {
+            "title": study.title,
+            "output": study.output,
+            "folder": study.folder.folder,
+            "cases": len(study),
+            "done": self.done,
+            "missing": self.missing,
+            "failed": [
+                {
+                    "case": study.folder.number(case),
+                    "parameters": case.settings,
+                    "exit_code": outcome.exit_code,
+                    "message": outcome.message,
+                }
+                for case, outcome in self.failures
+            ],
+        }
 
 
-def run_case(study: Study, number: int, retry: bool, listeners: Listeners, heard: tuple[int, int]) -> Outcome:
-    """Run one case for a job array; signals end the process unless it is done, and what is finished stays."""
+def _run_case(study: Study, number: int, retry: bool, messages: Messages, context: typer.Context) -> Outcome:
+    """Run one case for a job array; signals end the process unless it is done, and finished steps stay."""
     from ..solve.progress import reporter
 
     outcomes: list[Outcome] = []
-    shown = reporter(listeners.silent)
+    shown = reporter(messages.silent)
     try:
         in_background(
             lambda: outcomes.append(study.run_case(number, retry, shown)),
-            heard,
+            context.with_resource(news()),
             lambda _: not outcomes,
         )
     except Interrupted as signaled:
-        listeners.leave(
-            signaled,
-            f"the finished load steps of case {number} are kept; the same command goes on after them",
-        )
+        kept = f"the finished load steps of case {number} are kept; the same command goes on after them"
+        messages.interrupted(signaled, kept)
     return outcomes[0]
 
 
-def run_in_background(
-    study: Study, cancel: threading.Event, options: dict[str, Any]
-) -> tuple[Callable[[], None], Callable[[Interrupted], bool]]:
-    """Return what to do in a second thread, and what cancels it, unless the study is complete by then."""
-    over, complete = threading.Event(), threading.Event()
-    if (where := study.cluster(options.get("jobs"), options.get("dask"))) is not None:
+def _run_missing(study: Study, context: typer.Context, **options: Any) -> None:
+    """Run the missing cases in a second thread; a signal cancels them unless the study is complete."""
+    cancel, over, complete = (threading.Event() for _ in range(3))
+    if (where := study.cluster(options["jobs"], options["dask"])) is not None:
         from ..study.dask import load
 
         load(where)
@@ -169,7 +192,12 @@ def run_in_background(
         over.wait()
         return not complete.is_set()
 
-    return work, ends
+    try:
+        in_background(work, context.with_resource(news()), ends)
+    except Interrupted as signaled:
+        kept = f"{_State.of(study).done} of {len(study)} cases are finished and kept"
+        message = f"interrupted; {kept} in {study.folder.folder}/; the same command runs the rest"
+        raise Failure(message, signaled.exit_code) from None
 
 
 def slurm_script(study: Study, path: Path, retry: bool) -> str:
@@ -184,6 +212,8 @@ def slurm_script(study: Study, path: Path, retry: bool) -> str:
     retry : bool
         Also cases that failed by themselves.
     """
+    from ..study.tables import batch_text
+
     numbers = sorted(study.folder.number(case) for case in study.missing(retry))
     if not numbers:
         return ""

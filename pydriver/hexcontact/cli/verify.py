@@ -1,4 +1,4 @@
-"""Compare a few quick contacts with known solutions: ``hexcontact verify`` tests an installation.
+"""The command that tests an installation: ``hexcontact verify`` compares quick contacts with known solutions.
 
 Decks, quantities, references, tolerances and sources stand in ``data/self_test.toml``. The long comparisons
 with published, analytic and converged solutions are a program of the repository: tests/validation.
@@ -13,9 +13,37 @@ import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from ..errors import DeckError
+from .guard import Content, command
+from .options import AsJson
+
+
+@command("hexcontact verify")
+def verify(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Which comparisons; default: all.", show_default=False),
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
+    as_json: AsJson = False,
+) -> Content:
+    """Test the installation: solve a few contacts and compare them with known solutions.
+
+    Exit code 1 if a comparison fails.
+    """
+    if not as_json:
+        raise typer.Exit(main(names or [], listing=listing))
+    chosen = _chosen(names or [], self_test())
+    if listing:
+        return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
+    found = [check.run().content(check) for check in chosen]
+    passed = all(check["passed"] for check in found)
+    return {"exit_code": int(not passed), "passed": passed, "checks": found}
+
 
 # display unit -> SI
 UNITS = {
@@ -134,6 +162,18 @@ class Comparison:
     def passed(self) -> bool:
         """Whether no row fails."""
         return all(row.passed is not False for row in self.rows)
+
+    def content(self, check: Check) -> dict[str, Any]:
+        """Return the comparison of a check for programs: in SI, relative differences unless absolute."""
+        values = ("computed", "published", "reference", "analytic", "judge", "difference", "tolerance")
+        shown = ("case", "quantity", *values, "absolute", "passed")
+        return {
+            "name": check.name,
+            "title": check.title,
+            "passed": self.passed,
+            "rows": [{name: getattr(row, name) for name in shown} for row in self.rows],
+            "notes": self.notes,
+        }
 
 
 @dataclass(frozen=True)
@@ -254,7 +294,7 @@ def main(
     DeckError
         If there is no check of some name.
     """
-    chosen = _chosen(names, checks)
+    chosen = _chosen(names, self_test() if checks is None else checks)
     if listing:
         width = max(len(check.name) for check in chosen)
         for check in chosen:
@@ -271,24 +311,11 @@ def main(
     return 1 if failed else 0
 
 
-def _chosen(names: Sequence[str], checks: Mapping[str, Check] | None = None) -> list[Check]:
+def _chosen(names: Sequence[str], known: Mapping[str, Check]) -> list[Check]:
     """Return the checks of these names, all if there are none."""
-    known = self_test() if checks is None else checks
     if unknown := [name for name in names if name not in known]:
         raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(known)}")
     return [known[name] for name in names] if names else list(known.values())
-
-
-def for_programs(names: Sequence[str] = (), *, listing: bool = False) -> dict[str, Any]:
-    """Run checks and return what they find, with the exit code; arguments and errors as `main`."""
-    from .json_output import of_comparison
-
-    chosen = _chosen(names)
-    if listing:
-        return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
-    found = [of_comparison(check, check.run()) for check in chosen]
-    passed = all(check["passed"] for check in found)
-    return {"exit_code": int(not passed), "passed": passed, "checks": found}
 
 
 # ------------------------------------------------------------------------------- the self-test

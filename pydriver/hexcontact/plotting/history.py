@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, line_of
 from ..result.view import dataset_of, scaled, title_of
-from .style import COMPUTED, EXACT, GUIDE, STYLE, new_figure, set_title
+from .registry import figure
+from .style import COMPUTED, EXACT, GUIDE, new_figure, set_title
 
 if TYPE_CHECKING:
     import xarray
@@ -57,12 +57,18 @@ def _known(dataset: xarray.Dataset) -> list[str]:
     ]
 
 
-def _values(dataset: xarray.Dataset, name: str) -> Array:
+def values_of(dataset: xarray.Dataset, name: str) -> Array:
+    """Return the history of a quantity."""
     return np.asarray(dataset[name].values, dtype=float)
 
 
+def vectors_of(dataset: xarray.Dataset, name: str) -> Array:
+    """Return the history of a vector, its components in rows."""
+    return np.stack([values_of(dataset, f"{name}_{axis}") for axis in "xy"])
+
+
 def _largest(dataset: xarray.Dataset, names: Sequence[str]) -> float:
-    values = np.concatenate([_values(dataset, name) for name in names])
+    values = np.concatenate([values_of(dataset, name) for name in names])
     finite = values[np.isfinite(values)]
     return float(np.abs(finite).max()) if finite.size else 0.0
 
@@ -89,6 +95,7 @@ def fitted(dataset: xarray.Dataset, names: tuple[str, ...]) -> tuple[str, ...]:
     return fits if all(name in dataset for name in fits) else names
 
 
+@figure("history", "loads, motions, areas, p_max by step or over a load")
 def history(
     result: Result | xarray.Dataset, quantities: Sequence[str] | None = None, over: str = "step"
 ) -> Figure:
@@ -119,21 +126,20 @@ def history(
     if unknown := [name for name in wanted if name not in known]:
         raise ValueError(f"no history of {', '.join(unknown)} in this result; there are {', '.join(known)}")
     panels = [names for names in panels if names != (over,)]
-    with matplotlib.rc_context(STYLE):
-        columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
-        rows = -(-len(panels) // columns)
-        figure = new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
-        grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        empty = grid.size - len(panels)  # at the end of the first row
-        slots = [*grid[0, : columns - empty], *grid[1:].flat]
-        for axes in grid[0, columns - empty :]:
-            axes.set_visible(False)
-        for names, axes in zip(panels, slots, strict=True):
-            draw_history(axes, dataset, names, over)
-        for axes in grid[:-1].flat:
-            axes.set_xlabel("")
-        set_title(figure, title_of(dataset))
-        return figure
+    columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
+    rows = -(-len(panels) // columns)
+    canvas = new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
+    grid = canvas.subplots(rows, columns, sharex=True, squeeze=False)
+    empty = grid.size - len(panels)  # at the end of the first row
+    slots = [*grid[0, : columns - empty], *grid[1:].flat]
+    for axes in grid[0, columns - empty :]:
+        axes.set_visible(False)
+    for names, axes in zip(panels, slots, strict=True):
+        draw_history(axes, dataset, names, over)
+    for axes in grid[:-1].flat:
+        axes.set_xlabel("")
+    set_title(canvas, title_of(dataset))
+    return canvas
 
 
 def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over: str = "step") -> None:
@@ -142,14 +148,14 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
     place, label = dataset["step"].values, "load step"
     if over != "step":
         along, length = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
-        place, label = _values(dataset, over) * along, _titled(over, length)
+        place, label = values_of(dataset, over) * along, _titled(over, length)
     marker = "o" if place.size <= _MANY else ""
     lines = (COMPUTED, "-", marker), (EXACT, "--", "s" if marker else "")
     for name, (color, dash, mark) in zip(names, lines, strict=False):
-        values = _values(dataset, name) * factor
+        values = values_of(dataset, name) * factor
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
         if (bound := _BOUNDS.get(name, "")) in dataset:
-            around = _values(dataset, bound) * factor
+            around = values_of(dataset, bound) * factor
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
     axes.set(xlabel=label, ylabel=_titled(names[0] if len(names) == 1 else _common(names), unit))
@@ -182,6 +188,7 @@ def _apart(name: str, names: Sequence[str]) -> str:
 # --- load against motion --------------------------------------------------------------------------
 
 
+@figure("loop", "tangential load against shift", needs="tangential load")
 def loop(result: Result | xarray.Dataset) -> Figure:
     """Draw the tangential load against the shift; for similar spheres the closed curve, too.
 
@@ -204,38 +211,35 @@ def loop(result: Result | xarray.Dataset) -> Figure:
     dataset = dataset_of(result)
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
         raise ValueError("a contact without friction has no tangential load")
-    load, shift = (
-        np.stack([_values(dataset, f"{name}_{axis}") for axis in "xy"])
-        for name in ("tangential_load", "shift")
-    )
+    load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
     direction = line_of(load, 1e-6 * _largest(dataset, ["normal_load"]), np.inf)
     if direction is None:
         raise ValueError("there is no tangential load in this result")
     index = {(1.0, 0.0): "_x", (0.0, 1.0): "_y"}.get((round(direction[0], 6), round(direction[1], 6)), "")
     beside = "" if index else f" along {np.degrees(np.arctan2(direction[1], direction[0])):.3g}°"
-    with matplotlib.rc_context(STYLE):
-        figure = new_figure(4.6, 3.8)
-        axes = figure.add_subplot()
-        to_force = _draw_loop(
-            axes,
-            (np.array(direction) @ shift, f"shift $\\Delta{index}$" + beside, "m"),
-            (np.array(direction) @ load, f"tangential load $Q{index}$" + beside, "N"),
-            ClosedForms(dataset).shear_loop(),
-            "Cattaneo–Mindlin,\nMindlin–Deresiewicz",
-        )
-        bound = float(dataset.attrs.get("friction_coefficient", np.inf)) * _values(dataset, "normal_load")[-1]
-        low, high = axes.get_ylim()
-        room = 0.04 * (high - low)
-        for level in (-bound * to_force, bound * to_force):
-            if 1.3 * low < level < 1.3 * high:
-                axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
-                low, high = min(low, level - room), max(high, level + room)
-        axes.set_ylim(low, high)
-        axes.legend(*_once(axes))
-        set_title(figure, title_of(dataset))
-        return figure
+    canvas = new_figure(4.6, 3.8)
+    axes = canvas.add_subplot()
+    to_force = _draw_loop(
+        axes,
+        (np.array(direction) @ shift, f"shift $\\Delta{index}$" + beside, "m"),
+        (np.array(direction) @ load, f"tangential load $Q{index}$" + beside, "N"),
+        ClosedForms(dataset).shear_loop(),
+        "Cattaneo–Mindlin,\nMindlin–Deresiewicz",
+    )
+    bound = float(dataset.attrs.get("friction_coefficient", np.inf)) * values_of(dataset, "normal_load")[-1]
+    low, high = axes.get_ylim()
+    room = 0.04 * (high - low)
+    for level in (-bound * to_force, bound * to_force):
+        if 1.3 * low < level < 1.3 * high:
+            axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
+            low, high = min(low, level - room), max(high, level + room)
+    axes.set_ylim(low, high)
+    axes.legend(*_once(axes))
+    set_title(canvas, title_of(dataset))
+    return canvas
 
 
+@figure("torsion", "torque against twist", needs="torque")
 def torsion(result: Result | xarray.Dataset) -> Figure:
     """Draw the torque against the twist over the load steps; for similar spheres Lubkin's curve, too.
 
@@ -256,19 +260,18 @@ def torsion(result: Result | xarray.Dataset) -> Figure:
     dataset = dataset_of(result)
     if "twist" not in dataset or not any("torque" in names for names in panels_of(dataset)):
         raise ValueError("there is no torque in this result")
-    with matplotlib.rc_context(STYLE):
-        figure = new_figure(4.6, 3.8)
-        axes = figure.add_subplot()
-        _draw_loop(
-            axes,
-            (_values(dataset, "twist"), r"twist $\vartheta$", "rad"),
-            (_values(dataset, "torque"), "torque $M_z$", "N m"),
-            ClosedForms(dataset).torsion_loop(),
-            "Lubkin",
-        )
-        axes.legend()
-        set_title(figure, title_of(dataset))
-        return figure
+    canvas = new_figure(4.6, 3.8)
+    axes = canvas.add_subplot()
+    _draw_loop(
+        axes,
+        (values_of(dataset, "twist"), r"twist $\vartheta$", "rad"),
+        (values_of(dataset, "torque"), "torque $M_z$", "N m"),
+        ClosedForms(dataset).torsion_loop(),
+        "Lubkin",
+    )
+    axes.legend()
+    set_title(canvas, title_of(dataset))
+    return canvas
 
 
 Axis = tuple[Array, str, str]  # values, name and unit of what is along an axis

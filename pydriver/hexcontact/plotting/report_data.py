@@ -1,17 +1,20 @@
-"""Fields of a result for a page: each load step as small gray pictures, from which the page makes its maps.
+"""What a page draws of a result: curves of its history, and fields, from which the page makes its maps.
 
-A picture holds 255 shades from 0 to the largest value of its step; shade 0 is outside of the contact.
+Each load step is small gray pictures, with 255 shades from 0 to the largest value of its step; shade 0 is
+outside of the contact.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
+from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, step_rows, worth_showing
 from ..result.raster import Plane, png_of
 from ..result.view import StepView, scaled
 from ..variables import VARIABLES
@@ -27,6 +30,32 @@ _ZONES = 480  # pixels of the longer side of a zone map
 _ARROWS = 15  # along the longer side
 _CUT = 201  # points of a section
 _NOISE = 1e-7  # share of the approach up to which slip is no more than the tolerance leaves
+_CURVES = (  # title, and what is drawn over the step number
+    ("Normal load", ("normal_load",)),
+    ("Approach", ("approach",)),
+    ("Tangential load", ("tangential_load_x", "tangential_load_y")),
+    ("Shift", ("shift_x", "shift_y")),
+    ("Torque", ("torque",)),
+    ("Twist", ("twist",)),
+    ("Contact and stick area", ("contact_area_fit", "stick_area_fit")),
+    ("Largest pressure", ("max_pressure",)),
+    ("Largest shear traction", ("max_traction",)),
+    ("Elastic energy", ("elastic_energy",)),
+    ("Dissipated energy", ("dissipated_energy",)),
+)
+_LOOPS = (  # title, what is drawn over what
+    ("Tangential load over shift, x", "shift_x", "tangential_load_x"),
+    ("Tangential load over shift, y", "shift_y", "tangential_load_y"),
+    ("Torque over twist", "twist", "torque"),
+)
+_SYMBOLS = {
+    "tangential_load_x": "Q_x",
+    "tangential_load_y": "Q_y",
+    "shift_x": "x",
+    "shift_y": "y",
+    "contact_area_fit": "contact",
+    "stick_area_fit": "stick",
+}
 _MAPS = (  # name, title, components, whether the page gives all steps one color scale at first
     ("pressure", "Pressure", ("pressure",), True),
     ("traction", "Shear traction", ("traction_x", "traction_y"), True),
@@ -49,6 +78,34 @@ def kept_steps(result: Result) -> list[int]:
     kept = [n for n in numbers if n % every == 0 or n == numbers[-1]]
     stride = math.ceil(len(kept) / MOST_STEPS)
     return kept[::-1][::stride][::-1]
+
+
+def drawn_data(
+    result: Result, histories: Sequence[Mapping[str, Any]], numbers: Sequence[int]
+) -> dict[str, Any]:
+    """Return all that a page draws, as its JSON holds it.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    histories : sequence of mapping
+        History of each step, with its number.
+    numbers : sequence of int
+        The steps with maps, see `kept_steps`.
+    """
+    palette = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, 255))[:, :3]
+    return {
+        "palette": np.round(255 * palette).astype(int).ravel().tolist(),
+        "numbers": [history["step"] for history in histories],
+        "labels": [str(history.get("label", "")) for history in histories],
+        "states": [step_rows(history) for history in histories],
+        "charts": charts_of(histories),
+        "fields": maps_of(result, numbers) if numbers else None,
+    }
+
+
+# --- maps -----------------------------------------------------------------------------------------
 
 
 def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
@@ -205,3 +262,58 @@ def _scaled_sections(sections: Sequence[dict[str, Array]], x: Array, view: StepV
         values = {n: [rounded(factor * s[n]) if n in s else [] for s in sections] for n in curves}
         panels.append({"title": title, "unit": unit, "curves": values})
     return {"x": rounded(x, 5), "panels": panels}
+
+
+# --- curves ---------------------------------------------------------------------------------------
+
+
+def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the curves of a history as the page draws them; none of a single load step.
+
+    Parameters
+    ----------
+    histories : sequence of mapping
+        History of each step.
+    """
+    if len(histories) < 2:
+        return []
+    telling = {name for name in VARIABLES if name in histories[0] and name not in LOADS_AND_MOTIONS}
+    telling |= set(worth_showing(histories))
+    steps = [history["step"] for history in histories]
+    charts: list[dict[str, Any]] = []
+    for title, names in _CURVES:
+        shown = [name for name in names if name in telling and _peak(name, histories) > 0.0]
+        if not shown:
+            continue
+        factor, unit = scaled(max(_peak(name, histories) for name in shown), VARIABLES[shown[0]].units)
+        curves = {_SYMBOLS.get(name, ""): _values(name, histories, factor) for name in shown}
+        charts.append({"title": title, "x": steps, "xlabel": "step", "unit": unit, "curves": curves})
+    for title, over, name in _LOOPS:
+        if {over, name} <= telling and min(_peak(over, histories), _peak(name, histories)) > 0.0:
+            to_x, x_unit = scaled(_peak(over, histories), VARIABLES[over].units)
+            factor, unit = scaled(_peak(name, histories), VARIABLES[name].units)
+            charts.append(
+                {
+                    "title": title,
+                    "x": _values(over, histories, to_x),
+                    "xlabel": f"{over.replace('_', ' ')} [{x_unit}]",
+                    "unit": unit,
+                    "curves": {"": _values(name, histories, factor)},
+                    "points": True,
+                }
+            )
+    signs = {sign: name for sign, name in RESIDUALS.items() if name in histories[0]}
+    curves = {sign: _values(name, histories, 1.0) for sign, name in signs.items() if _peak(name, histories)}
+    charts.append(
+        {"title": "Residuals", "x": steps, "xlabel": "step", "unit": "", "curves": curves, "log": True}
+    )
+    return charts
+
+
+def _peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
+    values = np.abs([float(history[name]) for history in histories])
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def _values(name: str, histories: Sequence[Mapping[str, Any]], factor: float) -> list[float | None]:
+    return rounded([factor * float(history[name]) for history in histories], 5)

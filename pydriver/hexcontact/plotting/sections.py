@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -15,8 +14,9 @@ from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, PartialSlip
 from ..result.view import StepView, dataset_of, scaled, title_of, worded
-from .maps import step_label
-from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, legend_below, new_figure, set_title, shades
+from .plane import step_label
+from .registry import figure
+from .style import COMPUTED, EXACT, GUIDE, THIRD, legend_below, new_figure, set_title, shades
 
 if TYPE_CHECKING:
     import xarray
@@ -164,12 +164,12 @@ def _pressure_range(axes: Axes, cut: Cut, spacing: float, to_length: float) -> N
     axes.set_xlim(place[0] - rim, place[-1] + rim)
 
 
-def draw_section(figure: FigureBase, view: StepView, angle: float, through: Point | None = None) -> None:
+def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Point | None = None) -> None:
     """Draw the pressure along a line, and below it the difference from Hertz where there is a solution."""
     if view.hertz is None:
-        axes = bottom = figure.add_subplot()
+        axes = bottom = canvas.add_subplot()
     else:
-        axes, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+        axes, bottom = canvas.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     to_length, length = scaled(max(np.abs(view.window()[:2]).max(), view.spacing), "m")
     to_stress, stress = scaled(float(view.pressure.max()), "Pa")
     cut = Cut.of([view], angle, through)
@@ -199,6 +199,7 @@ def draw_section(figure: FigureBase, view: StepView, angle: float, through: Poin
     bottom.set_xlabel(cut.label(length))
 
 
+@figure("section", "pressure along a line, and its difference from Hertz")
 def section(
     result: Result | xarray.Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
 ) -> Figure:
@@ -226,17 +227,17 @@ def section(
     ValueError
         If the pressure of that step was not kept.
     """
-    with matplotlib.rc_context(STYLE):
-        view = StepView.of(result, step)
-        figure = new_figure(4.6, 4.2)
-        draw_section(figure, view, angle, through)
-        set_title(figure, view.title)
-        return figure
+    view = StepView.of(result, step)
+    canvas = new_figure(4.6, 4.2)
+    draw_section(canvas, view, angle, through)
+    set_title(canvas, view.title)
+    return canvas
 
 
 # --- shear traction -------------------------------------------------------------------------------
 
 
+@figure("tractions", "pressure and shear traction along a line, at some steps", needs="friction")
 def tractions(
     result: Result | xarray.Dataset,
     steps: int | Sequence[int] = -1,
@@ -270,23 +271,22 @@ def tractions(
         If the contact is frictionless, or the tractions of that step were not kept.
     """
     chosen = [steps] if isinstance(steps, int) else list(steps)
-    with matplotlib.rc_context(STYLE):
-        views = [StepView.of(result, step) for step in chosen]
-        closed = ClosedForms(dataset_of(result))
-        exact = [closed.partial_slip(view.number) for view in views]
-        cut = Cut.of(views, angle, through)
-        if len(views) == 1:
-            figure = new_figure(4.8, 5.0)
-            upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 3))
-            draw_pressures(upper, views, cut)
-            draw_shear(lower, views[0], exact[0], cut)
-            upper.set_xlabel("")
-            upper.tick_params(labelbottom=False)
-            upper.legend(loc="lower center")
-            set_title(figure, views[0].title)
-        else:
-            figure = _family(views, exact, cut, title_of(dataset_of(result)))
-        return figure
+    views = [StepView.of(result, step) for step in chosen]
+    closed = ClosedForms(dataset_of(result))
+    exact = [closed.partial_slip(view.number) for view in views]
+    cut = Cut.of(views, angle, through)
+    if len(views) == 1:
+        canvas = new_figure(4.8, 5.0)
+        upper, lower = canvas.subplots(2, 1, sharex=True, height_ratios=(2, 3))
+        draw_pressures(upper, views, cut)
+        draw_shear(lower, views[0], exact[0], cut)
+        upper.set_xlabel("")
+        upper.tick_params(labelbottom=False)
+        upper.legend(loc="lower center")
+        set_title(canvas, views[0].title)
+    else:
+        canvas = _family(views, exact, cut, title_of(dataset_of(result)))
+    return canvas
 
 
 def draw_pressures(axes: Axes, views: Sequence[StepView], cut: Cut) -> None:
@@ -357,8 +357,8 @@ def _family(views: Sequence[StepView], exact: Sequence[PartialSlip | None], cut:
     shown = [k for k in (0, 1) if max(float(np.abs(pair[k]).max()) for pair in parts) > 0.005 * largest] or [
         0
     ]
-    figure = new_figure(6.6, 2.2 + 2.3 * len(shown))
-    panels = figure.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    canvas = new_figure(6.6, 2.2 + 2.3 * len(shown))
+    panels = canvas.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
     draw_pressures(panels[0], views, cut)
     panels[0].set_title("\n".join(textwrap.wrap(title, 60)), fontsize=10)
     to_length, length = scaled(max(np.abs(views[0].window()[:2]).max(), views[0].spacing), "m")
@@ -396,5 +396,5 @@ def _family(views: Sequence[StepView], exact: Sequence[PartialSlip | None], cut:
     if named:
         handles.append(Line2D([], [], color="black", label="computed", **cut.look()))
         handles.append(Line2D([], [], label=",\n".join(named), **cut.beside("black", family=True)))
-    figure.legend(handles=handles, loc="outside right upper", handlelength=1.6)
-    return figure
+    canvas.legend(handles=handles, loc="outside right upper", handlelength=1.6)
+    return canvas

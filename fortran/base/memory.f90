@@ -29,18 +29,18 @@ module hc_memory
 contains
 
   !> Refuse work for which there is no memory. Nothing is touched, so that it costs no more than a call of the system.
-  subroutine require_memory(bytes, error, n_threads)
+  subroutine require_memory(bytes, error, threads)
     !> Bytes that the work takes at most
     integer(int64), intent(in) :: bytes
     !> Allocated if they cannot be had
     type(error_t), allocatable, intent(out) :: error
     !> Threads that may have to be started
-    integer, intent(in), optional :: n_threads
+    integer, intent(in), optional :: threads
     integer(int64) :: needed
     character(len=16) :: megabytes
 
     needed = bytes + margin
-    if (present(n_threads)) needed = needed + max(n_threads - 1, 0)*int(stack_size(), int64)
+    if (present(threads)) needed = needed + max(threads - 1, 0)*int(stack_size(), int64)
     if (can_map(int(needed, c_size_t)) /= 0) return
     write (megabytes, '(i0)') needed/1000000 + 1
     call raise(error, status%resources, 'not enough memory: '//trim(megabytes)//' MB more are needed; '// &

@@ -12,13 +12,14 @@ module hc_contact_problem
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: flexibility_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
     normal, along_x, along_y, about_z, n_motion, force_control, within_tolerance, sweeps_used_up, &
     loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
-    tangential_residual, largest_pressure, force_residual, least_traction
+    tangential_residual, force_residual, least_traction
   use hc_coulomb, only: coulomb_t
   use hc_friction_rows, only: zone_row
   use hc_transfer, only: restrict_field, restrict_mask
@@ -53,7 +54,7 @@ module hc_contact_problem
     !> Self-compliances d_n and d_t of a node [m/Pa]
     real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
     !> Threads that share the passes over its nodes
-    integer :: n_threads = 1
+    type(field_space_t) :: space
   contains
     !> The same problem on the lattice of every second node
     procedure :: coarsened
@@ -175,7 +176,7 @@ contains
     coarse%pair = self%pair
     coarse%friction = self%friction
     coarse%goodman = self%goodman
-    coarse%n_threads = self%n_threads
+    coarse%space = self%space
     allocate (coarse%initial_gap, source=restrict_field(self%lattice, self%initial_gap, coarse%lattice))
     allocate (coarse%candidate, source=restrict_mask(self%lattice, self%candidate, coarse%lattice))
     allocate (coarse%x, coarse%y, mold=coarse%initial_gap)
@@ -222,7 +223,7 @@ contains
     type(contact_state_t), intent(out) :: state
     real(wp), allocatable :: displacement(:, :, :)
 
-    call new_friction_state(state, self%lattice, self%n_threads)
+    call new_friction_state(state, self%lattice, self%space)
     state%motion = merge(start%motion, target%value, target%control == force_control)
     if (target%control(normal) == force_control) state%motion(normal) = minval(self%initial_gap, mask=self%candidate)
     allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 3), source=0.0_wp)
@@ -246,7 +247,7 @@ contains
     integer :: row
 
     allocate (tractions(size(pressure, 1), size(pressure, 2), 3))
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do row = 1, size(pressure, 2)
       tractions(:, row, 1) = pressure(:, row)
       tractions(:, row, 2:) = traction(:, row, :)
@@ -277,7 +278,7 @@ contains
     real(wp) :: load(n_motion), part(n_motion, size(pressure, 2))
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do row = 1, size(pressure, 2)
       part(normal, row) = sum(pressure(:, row))
       part(along_x, row) = sum(traction(:, row, 1))
@@ -318,11 +319,11 @@ contains
 
     n_contact = count(state%pressure > 0.0_wp)
     r = self%classification_parameter(n_contact)
-    unit = largest_pressure(state%pressure, self%n_threads)
+    unit = max(self%space%max(state%pressure), 0.0_wp)
     if (unit > 0.0_wp) unit = 1.0_wp/unit
     slope = self%friction%slope()
     finite = .true.
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(col, m) reduction(.and.: finite)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(col, m) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
       do col = 1, size(state%pressure, 1)
         state%gap(col, row) = self%initial_gap(col, row) + displacement(col, row, 1) - state%motion(normal)
@@ -349,9 +350,9 @@ contains
 
     state%load = self%resultants(state%pressure, state%traction)
     state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, &
-                                            self%n_threads)
+                                            self%space)
     state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
-                                                    self%friction, self%tangential_compliance, self%n_threads)
+                                                    self%friction, self%tangential_compliance, self%space)
     call self%judge_loads(target, state)
     ! one by one: the largest of several numbers hides one that is not a number
     finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))

@@ -4,6 +4,7 @@ module hc_contact_residuals
   use hc_precision, only: wp
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, touches_rim, force_control, normal, separated, slip, within_tolerance, &
@@ -14,7 +15,7 @@ module hc_contact_residuals
   private
 
   public :: normal_self_compliance, tangential_self_compliance
-  public :: normal_residual, tangential_residual, tangential_scale, largest_pressure, force_residual, conclude, &
+  public :: normal_residual, tangential_residual, tangential_scale, force_residual, conclude, &
             least_traction
 
   !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
@@ -57,22 +58,22 @@ contains
   !> Bounds tension, penetration and pressure across a gap at once. Without
   !> pressure anywhere the penetration is all there can be: it is 0 if the gap is nowhere
   !> negative, and else infinite; so it is where a number is not finite, which a maximum would hide.
-  real(wp) function normal_residual(pressure, gap, candidate, compliance, n_threads)
+  real(wp) function normal_residual(pressure, gap, candidate, compliance, space)
     !> Pressure [Pa] and gap [m]
     real(wp), intent(in) :: pressure(:, :), gap(:, :)
     !> Nodes that may come into contact
     logical, intent(in) :: candidate(:, :)
     !> Self-compliance d_n [m/Pa]
     real(wp), intent(in) :: compliance
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp) :: p_max, worst, p, g
     integer :: col, row, n_wrong
 
     p_max = 0.0_wp
     worst = 0.0_wp
     n_wrong = 0
-    !$omp parallel do schedule(static) num_threads(n_threads) private(col, p, g) reduction(max: p_max, worst) &
+    !$omp parallel do schedule(static) num_threads(space%threads) private(col, p, g) reduction(max: p_max, worst) &
     !$omp& reduction(+: n_wrong)
     do row = 1, size(pressure, 2)
       !$omp simd private(p, g) reduction(max: p_max, worst) reduction(+: n_wrong)
@@ -101,7 +102,7 @@ contains
   !> Bounds tractions outside of the cone, slip in stick and a wrong direction
   !> of slip at once. The scale tau is mu p_max; the largest traction, but
   !> not less than a thousandth of p_max, without slip; without friction there is nothing to fulfil.
-  real(wp) function tangential_residual(traction, slip_increment, pressure, friction, compliance, n_threads)
+  real(wp) function tangential_residual(traction, slip_increment, pressure, friction, compliance, space)
     !> Traction (n_col, n_row, 2) [Pa] and slip of the step (n_col, n_row, 2) [m]
     real(wp), intent(in), contiguous :: traction(:, :, :), slip_increment(:, :, :)
     !> Pressure (n_col, n_row) [Pa]
@@ -110,18 +111,18 @@ contains
     type(coulomb_t), intent(in) :: friction
     !> Self-compliance d_t [m/Pa]
     real(wp), intent(in) :: compliance
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp) :: p_max, slope, largest, worst
     integer :: row
 
     tangential_residual = 0.0_wp
-    p_max = largest_pressure(pressure, n_threads)
+    p_max = space%max(pressure)
     if (.not. (p_max > 0.0_wp .and. friction%resists())) return
     slope = friction%slope()
     largest = 0.0_wp
     worst = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(n_threads) reduction(max: largest, worst)
+    !$omp parallel do schedule(static) num_threads(space%threads) reduction(max: largest, worst)
     do row = 1, size(pressure, 2)
       call residual_row(size(pressure, 1), 1.0_wp/p_max, slope, 1.0_wp/compliance, pressure(:, row), traction(:, row, 1), &
                         traction(:, row, 2), slip_increment(:, row, 1), slip_increment(:, row, 2), largest, worst)
@@ -141,25 +142,6 @@ contains
     if (friction%no_slip) tangential_scale = max(sqrt(largest), least_traction)
   end function tangential_scale
 
-  !> p_max, 0 without pressure [Pa].
-  real(wp) function largest_pressure(pressure, n_threads)
-    !> Pressure (n_col, n_row) [Pa]
-    real(wp), intent(in), contiguous :: pressure(:, :)
-    !> Threads to use
-    integer, intent(in) :: n_threads
-    integer :: col, row
-
-    largest_pressure = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(n_threads) private(col) reduction(max: largest_pressure)
-    do row = 1, size(pressure, 2)
-      !$omp simd reduction(max: largest_pressure)
-      do col = 1, size(pressure, 1)
-        largest_pressure = max(largest_pressure, pressure(col, row))
-      end do
-    end do
-    !$omp end parallel do
-  end function largest_pressure
-
   !> R_P = |sum A_p p - P|/P; without a load any pressure at all is as wrong as a load that is not carried.
   elemental real(wp) function force_residual(carried, load)
     !> Load carried by the pressure, and prescribed load [N]
@@ -173,7 +155,7 @@ contains
   end function force_residual
 
   !> Zones, load and residuals of a state whose pressure and gap are known.
-  subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance, n_threads, error)
+  subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance, space, error)
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
     !> Lattice and window
@@ -188,21 +170,21 @@ contains
     real(wp), intent(in) :: target
     !> Bound of the residuals
     real(wp), intent(in) :: tolerance
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> Allocated on failure: a pressure or a gap that is not a finite number
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: row_sum(size(state%pressure, 2))
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(n_threads)
+    !$omp parallel do schedule(static) num_threads(space%threads)
     do row = 1, size(row_sum)
       state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
       row_sum(row) = sum(state%pressure(:, row))
     end do
     !$omp end parallel do
     state%load(normal) = lattice%cell_area()*sum(row_sum)
-    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, n_threads)
+    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, space)
     state%residual_force = 0.0_wp
     if (control == force_control) state%residual_force = force_residual(state%load(normal), target)
     ! one by one: the largest of several numbers hides one that is not a number

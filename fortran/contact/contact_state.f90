@@ -4,6 +4,7 @@ module hc_contact_state
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: check_operator, normal, along_x, along_y
   implicit none
@@ -94,21 +95,19 @@ module hc_contact_state
 contains
 
   !> A state without contact.
-  subroutine new_contact_state(state, lattice, n_threads)
+  subroutine new_contact_state(state, lattice, space)
     !> State to be set up
     type(contact_state_t), intent(out) :: state
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Threads to use; absent: one
-    integer, intent(in), optional :: n_threads
-    integer :: row, threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: row
 
-    threads = 1
-    if (present(n_threads)) threads = n_threads
     associate (n => lattice%extent)
       allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)))
     end associate
-    !$omp parallel do schedule(static) num_threads(threads)
+    !$omp parallel do schedule(static) num_threads(space%threads)
     do row = 1, lattice%extent(2)
       state%pressure(:, row) = 0.0_wp
       state%gap(:, row) = 0.0_wp
@@ -118,23 +117,23 @@ contains
   end subroutine new_contact_state
 
   !> A state with friction before the first load: no contact, nothing displaced.
-  subroutine new_friction_state(state, lattice, n_threads)
+  subroutine new_friction_state(state, lattice, space)
     !> State to be set up
     type(contact_state_t), intent(out) :: state
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Threads to use; absent: one
-    integer, intent(in), optional :: n_threads
-    integer :: row, threads
+    !> Space of the fields; absent: one thread
+    type(field_space_t), intent(in), optional :: space
+    integer :: row
+    type(field_space_t) :: own
 
-    threads = 1
-    if (present(n_threads)) threads = n_threads
-    call new_contact_state(state, lattice, threads)
+    if (present(space)) own = space
+    call new_contact_state(state, lattice, own)
     associate (n => lattice%extent)
       allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2), &
                 state%accumulated_slip(n(1), n(2)))
     end associate
-    !$omp parallel do schedule(static) num_threads(threads)
+    !$omp parallel do schedule(static) num_threads(own%threads)
     do row = 1, lattice%extent(2)
       state%traction(:, row, :) = 0.0_wp
       state%relative_displacement(:, row, :) = 0.0_wp
@@ -145,18 +144,18 @@ contains
   end subroutine new_friction_state
 
   !> Tractions and motions of a state, and nothing else: what an iteration starts from.
-  subroutine take_tractions(state, start, n_threads)
+  subroutine take_tractions(state, start, space)
     !> State they come from
     type(contact_state_t), intent(in) :: state
     !> State to be set up
     type(contact_state_t), intent(out) :: start
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     integer :: row
 
     allocate (start%pressure, mold=state%pressure)
     allocate (start%traction, mold=state%traction)
-    !$omp parallel do schedule(static) num_threads(n_threads)
+    !$omp parallel do schedule(static) num_threads(space%threads)
     do row = 1, size(state%pressure, 2)
       start%pressure(:, row) = state%pressure(:, row)
       start%traction(:, row, :) = state%traction(:, row, :)

@@ -55,7 +55,7 @@ contains
     integer :: n_contact, row
 
     n_contact = 0
-    !$omp parallel do schedule(static) num_threads(problem%n_threads) reduction(+: n_contact)
+    !$omp parallel do schedule(static) num_threads(problem%space%threads) reduction(+: n_contact)
     do row = 1, size(contact, 2)
       n_contact = n_contact + count(contact(:, row))
       part(1, row) = sum(problem%x(:, row), mask=contact(:, row))
@@ -84,7 +84,7 @@ contains
     integer :: row
 
     allocate (direction(problem%lattice%extent(1), problem%lattice%extent(2), 2))
-    !$omp parallel do schedule(static) num_threads(problem%n_threads)
+    !$omp parallel do schedule(static) num_threads(problem%space%threads)
     do row = 1, size(direction, 2)
       call self%direction_row(k, problem, row, direction(:, row, 1), direction(:, row, 2))
     end do

@@ -12,6 +12,7 @@ module hc_convolution
   use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_field_space, only: field_space_t
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
   use hc_lock, only: lock, unlock, fftw_planner
   use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, release
@@ -19,16 +20,14 @@ module hc_convolution
   use hc_row_pairs, only: split_rows, join_rows
   use hc_column_blocks, only: gather_columns, scatter_columns
   use hc_spectral_product, only: multiply, multiply_one
-  !$ use omp_lib, only: omp_get_thread_num, omp_get_max_threads
+  !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private
 
-  public :: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t, threads_for
+  public :: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t
 
   !> Bytes that one component of a column block should take, so that blocks stay in cache.
   integer, parameter :: block_bytes = 32768
-  !> Smaller windows are left to one thread: starting the others takes longer than they save.
-  integer, parameter :: worth_sharing = 16384
 
   !> Plans, spectra and scratch space.
   type :: convolution_t
@@ -37,8 +36,8 @@ module hc_convolution
     real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
     !> What the results are multiplied with
     real(wp) :: factor = 1.0_wp
-    !> Threads that share the work
-    integer :: n_threads = 1
+    !> Space of the fields
+    type(field_space_t) :: space
     !> Transform lengths along the two lattice directions
     integer :: padded(2) = 0
     !> Columns in a block, number of blocks
@@ -93,7 +92,7 @@ module hc_convolution
 contains
 
   !> Plans and scratch space for convolutions over a window; the spectra are still to be taken.
-  subroutine new_convolution(self, extent, padded, n_kernel, n_component, error, first_odd, n_threads)
+  subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, first_odd)
     !> Convolution to be set up
     type(convolution_t), intent(out) :: self
     !> Number of columns and rows of the window
@@ -102,17 +101,17 @@ contains
     integer, intent(in) :: padded(2)
     !> Number of kernels, and of components of the fields
     integer, intent(in) :: n_kernel, n_component
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory, a length FFTW cannot plan
     type(error_t), allocatable, intent(out) :: error
     !> The first odd kernel; absent: all are even
     integer, intent(in), optional :: first_odd
-    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
-    integer, intent(in), optional :: n_threads
 
     integer :: stat
 
     self%owner = address(self)
-    self%n_threads = threads_for(extent, n_threads)
+    self%space = space
     self%n_kernel = n_kernel
     self%first_odd = n_kernel + 1
     if (present(first_odd)) self%first_odd = first_odd
@@ -124,8 +123,8 @@ contains
     self%leading = self%n_block*self%width
     associate (column => self%width*padded(2))
       ! the columns that only fill up the last block are transformed too: zeros stay zeros
-      allocate (self%work(self%leading, even(extent(2)), n_component), self%row_buffer(padded(1), 2, self%n_threads), &
-                self%block_buffer(column, n_component, 2, self%n_threads), source=(0.0_wp, 0.0_wp), stat=stat)
+      allocate (self%work(self%leading, even(extent(2)), n_component), self%row_buffer(padded(1), 2, space%threads), &
+                self%block_buffer(column, n_component, 2, space%threads), source=(0.0_wp, 0.0_wp), stat=stat)
     end associate
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
@@ -179,28 +178,14 @@ contains
     if (associated(cache)) call cache%keep(key, self%held)
   end subroutine share_spectra
 
-  !> Threads that a window is worth.
-  integer function threads_for(extent, n_threads)
-    !> Number of columns and rows of the window
-    integer, intent(in) :: extent(2)
-    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
-    integer, intent(in), optional :: n_threads
-
-    threads_for = 1
-    !$ if (product(extent) >= worth_sharing) threads_for = omp_get_max_threads()
-    if (present(n_threads)) then
-      !$ if (n_threads > 0) threads_for = n_threads
-    end if
-  end function threads_for
-
   !> Bytes that a convolution takes: spectra, row transforms, buffers.
-  pure integer(selected_int_kind(18)) function convolution_memory(extent, padded, n_kernel, n_component, n_threads)
+  pure integer(selected_int_kind(18)) function convolution_memory(extent, padded, n_kernel, n_component, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Transform lengths
     integer, intent(in) :: padded(2)
     !> Number of kernels, of components of the fields, of threads
-    integer, intent(in) :: n_kernel, n_component, n_threads
+    integer, intent(in) :: n_kernel, n_component, threads
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: leading, n_row, length, width
 
@@ -209,7 +194,7 @@ contains
     n_row = even(extent(2))
     length = padded(2)
     convolution_memory = n_kernel*leading*length + 2*n_component*leading*n_row &
-                         + n_threads*(4*padded(1) + 4*n_component*width*length)
+                         + threads*(4*padded(1) + 4*n_component*width*length)
     convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
   end function convolution_memory
 
@@ -298,7 +283,7 @@ contains
     end if
 
     thread = 1
-    !$omp parallel num_threads(self%n_threads) private(j, m, b, column, kernel, sign, from) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(j, m, b, column, kernel, sign, from) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     allocate (kernel(n_kernel, 1 - n(1):n(1) - 1, 2))
     !$omp do schedule(dynamic)
@@ -378,7 +363,7 @@ contains
 
     n = self%extent
     thread = 1
-    !$omp parallel num_threads(self%n_threads) private(i, o, row, b) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(i, o, row, b) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     self%row_buffer(n(1) + 1:, 1, thread) = 0.0_wp
     do i = 1, size(field, 3)
@@ -476,7 +461,7 @@ contains
     integer :: row, b, k, thread
 
     thread = 1
-    !$omp parallel num_threads(self%n_threads) private(row, b, k) firstprivate(thread)
+    !$omp parallel num_threads(self%space%threads) private(row, b, k) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     do k = 1, 2
       !$omp do schedule(static)

@@ -9,6 +9,7 @@ module hc_direct_contact
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: dposv
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
@@ -94,7 +95,7 @@ contains
         return
       end if
     end if
-    call new_contact_state(state, self%flexibility%lattice)
+    call new_contact_state(state, self%flexibility%lattice, field_space_t())
     self%flexibility%applications = 0.0_wp
     n = self%flexibility%lattice%size()
     h = reshape(self%initial_gap, [n])
@@ -135,7 +136,8 @@ contains
     state%gap = reshape(gap, shape(state%gap))
     state%motion(normal) = delta
     state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
-    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance, 1, error)
+    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance, &
+                  field_space_t(), error)
     state%operator_applications = self%flexibility%applications
   end subroutine solve
 

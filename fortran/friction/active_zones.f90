@@ -7,7 +7,6 @@ module hc_active_zones
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_spring_blend, only: soft
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
-  use hc_vectors, only: maximum
   implicit none
   private
 
@@ -30,10 +29,10 @@ contains
     integer :: i, n_contact
 
     r = classification_scale/(2.0_wp*pi*now%problem%pair%lambda_1 &
-                              *sqrt(now%problem%lattice%cell_area()*max(count(now%contact), 1)/pi))
+                              *sqrt(now%problem%lattice%cell_area()*max(now%operators%space%count(now%contact), 1)/pi))
     allocate (contact(size(gap)))
     n_contact = 0
-    !$omp parallel do schedule(static) num_threads(now%operators%n_threads) reduction(+: n_contact)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) reduction(+: n_contact)
     do i = 1, size(gap)
       contact(i) = now%candidate(i) .and. now%p(i) - r*gap(i) > 0.0_wp
       n_contact = n_contact + merge(1, 0, contact(i))
@@ -58,11 +57,11 @@ contains
 
     n = size(now%p)
     allocate (zone(n), active(2*n))
-    r = now%caution*now%problem%classification_parameter(count(now%contact))
+    r = now%caution*now%problem%classification_parameter(now%operators%space%count(now%contact))
     if (now%first .and. .not. any(abs(now%q) > 0.0_wp)) r = cautious*r
     associate (friction => now%problem%friction)
-      largest = friction%bound(maximum(now%p, now%operators%n_threads))
-      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(ds, col, i)
+      largest = friction%bound(now%operators%space%max(now%p))
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, col, i)
       do row = 1, now%problem%lattice%extent(2)
         call now%slip_row(row, ds(:, 1), ds(:, 2))
         do col = 1, size(ds, 1)
@@ -82,7 +81,7 @@ contains
       now%held = holding
       if (now%held) call hold(now%shear%compliance, zone)
 
-      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(bound, across, e)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, across, e)
       do i = 1, n
         active(i) = zone(i) /= separated
         active(n + i) = zone(i) == stick
@@ -146,7 +145,7 @@ contains
     call new_driven_motions(driven, now%problem, now%target, now%contact)
     allocate (constraint(2*n, size(driven%motion)), missing(size(driven%motion)))
     do k = 1, size(driven%motion)
-      !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(unit, t, e, col, i)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(unit, t, e, col, i)
       do row = 1, size(part)
         call driven%direction_row(k, now%problem, row, unit(:, 1), unit(:, 2))
         part(row) = 0.0_wp
@@ -175,7 +174,7 @@ contains
 
     n = size(now%p)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
-    !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(x, y, col, i)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(x, y, col, i)
     do row = 1, now%problem%lattice%extent(2)
       do col = 1, now%problem%lattice%extent(1)
         i = (row - 1)*now%problem%lattice%extent(1) + col

@@ -55,7 +55,7 @@ contains
     system%shear => now%shear
     call now%pressure%take(now%contact)
     system%edge = now%pressure%edge
-    system%n_threads = now%operators%n_threads
+    system%space = now%operators%space
     allocate (active(3*n), x(3*n), ax(3*n), rhs(3*n), weight(3*n), plane(2*n))
     active(:n) = now%contact
     active(n + 1:) = shear_active
@@ -98,17 +98,17 @@ contains
       if (allocated(error)) return
       mb(:n, m:) = part
     end if
-    call fulfil(rows, mb, missing(:m), x, independent, system%n_threads)
+    call fulfil(rows, mb, missing(:m), x, independent, system%space)
     if (independent) then
       call system%product(x, ax, error)
       if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
       call find_wanted(now, rhs(n + 1:))
-      weight(:n) = 1.0_wp/(now%problem%normal_compliance*maxval(now%p))
+      weight(:n) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
       weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
                  final_accuracy*now%tolerance)
-      goal = goal*real(count(active), wp)**0.25_wp
+      goal = goal*real(system%space%count(active), wp)**0.25_wp
       call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
                            independent, residual, iterations, now%outcome, error)
       if (allocated(error)) return

@@ -66,7 +66,7 @@ contains
 
     work = 0.0_wp
     predicted = .false.
-    call take_tractions(start, guess, problem%n_threads)
+    call take_tractions(start, guess, problem%space)
     if (size(coarse) == 0) return
     model = coarse(1)
     call restrict_state(problem, start, model, before)
@@ -102,7 +102,7 @@ contains
     type(contact_state_t), intent(out) :: coarse
 
     associate (from => problem%lattice, to => coarse_problem%lattice)
-      call new_friction_state(coarse, to, coarse_problem%n_threads)
+      call new_friction_state(coarse, to, coarse_problem%space)
       coarse%pressure = restrict_field(from, fine%pressure, to)
       coarse%gap = restrict_field(from, fine%gap, to)
       coarse%traction = restrict_vector(from, fine%traction, to)
@@ -126,13 +126,13 @@ contains
 
     allocate (change, mold=state%pressure)
     allocate (change_of_traction, mold=state%traction)
-    call prolong(coarse_problem%lattice, after%pressure - before%pressure, problem%lattice, change, problem%n_threads)
+    call prolong(coarse_problem%lattice, after%pressure - before%pressure, problem%lattice, change, problem%space)
     call prolong_vector(coarse_problem%lattice, after%traction - before%traction, problem%lattice, change_of_traction, &
-                        problem%n_threads)
+                        problem%space)
     allocate (slipping, mold=state%pressure)
     call prolong(coarse_problem%lattice, merge(1.0_wp, 0.0_wp, after%zone == slip), problem%lattice, slipping, &
-                 problem%n_threads)
-    !$omp parallel do schedule(static) num_threads(problem%n_threads) private(col, bound, length)
+                 problem%space)
+    !$omp parallel do schedule(static) num_threads(problem%space%threads) private(col, bound, length)
     do row = 1, size(slipping, 2)
       do col = 1, size(slipping, 1)
         state%pressure(col, row) = merge(max(state%pressure(col, row) + change(col, row), 0.0_wp), 0.0_wp, &

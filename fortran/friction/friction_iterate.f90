@@ -15,7 +15,7 @@ module hc_friction_iterate
   use hc_elastic_operators, only: operators_t
   use hc_friction_systems, only: pressure_system_t, shear_system_t, new_shear_system
   use hc_krylov, only: solution_accurate
-  use hc_vectors, only: fill, copy, add, maximum
+  use hc_field_space, only: field_space_t
   implicit none
   private
 
@@ -126,7 +126,7 @@ contains
     self%target = target
     self%tolerance = tolerance
     self%pressure%operators => operators
-    self%pressure%n_threads = operators%n_threads
+    self%pressure%space = operators%space
     call new_shear_system(self%shear, operators)
     self%dragging = abs(problem%pair%lambda_2) > 0.0_wp
     self%pressing = self%dragging .and. problem%friction%resists() .and. .not. problem%goodman
@@ -135,7 +135,7 @@ contains
     if (target%control(normal) /= force_control .and. .not. self%pressing) highest = target%value(normal)
     allocate (self%h(n), self%origin(2*n), self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
     allocate (self%candidate(n), self%contact(n))
-    !$omp parallel do schedule(static) num_threads(operators%n_threads) private(from, to)
+    !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
     do row = 1, problem%lattice%extent(2)
       to = row*problem%lattice%extent(1)
       from = to - problem%lattice%extent(1) + 1
@@ -174,34 +174,35 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: moved(:)
-    integer :: n, n_threads
+    type(field_space_t) :: space
+    integer :: n
 
     n = size(self%p)
-    n_threads = self%operators%n_threads
+    space = self%operators%space
     self%cut = .false.
     self%joint = .false.
     allocate (moved(3*n))
     if (self%dragging .and. .not. (self%cold .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
-      call copy(moved(:n), self%w, n_threads)
-      call copy(moved(n + 1:), self%u, n_threads)
+      call space%copy(moved(:n), self%w)
+      call space%copy(moved(n + 1:), self%u)
     else
       call self%operators%apply([normal], self%p, [normal], self%w, error)
       if (allocated(error)) return
-      call fill(self%u, 0.0_wp, n_threads)
+      call space%fill(self%u, 0.0_wp)
     end if
-    call fill(self%closing, 0.0_wp, n_threads)
+    call space%fill(self%closing, 0.0_wp)
     if (all_zero(self%q)) return
     if (self%pressing) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
-      call copy(moved(:n), self%closing, n_threads)
+      call space%copy(moved(:n), self%closing)
     else
       call self%operators%apply([along_x, along_y], self%q, [along_x, along_y], moved(n + 1:), error)
       if (allocated(error)) return
     end if
-    call add(moved(n + 1:), self%u, n_threads)
+    call space%add(moved(n + 1:), self%u)
   end subroutine refresh
 
   pure logical function all_zero(values)
@@ -217,7 +218,7 @@ contains
     integer :: i
 
     allocate (gap(size(self%p)))
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%operators%space%threads)
     do i = 1, size(gap)
       gap(i) = self%h(i) + self%closing(i) + self%w(i) - self%motion(normal)
     end do
@@ -252,7 +253,7 @@ contains
 
     n = size(self%p)
     largest = 0.0_wp
-    traction_scale = maximum(self%p, self%operators%n_threads)
+    traction_scale = self%operators%space%max(self%p)
     if (self%problem%friction%no_slip) largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
     traction_scale = tangential_scale(self%problem%friction, largest)*traction_scale
   end function traction_scale
@@ -270,7 +271,7 @@ contains
     allocate (q(2*n))
     unit = pressure_unit(self)
     slope = self%problem%friction%slope()
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(from, to)
+    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(from, to)
     do row = 1, n/n_col
       from = (row - 1)*n_col + 1
       to = row*n_col
@@ -284,7 +285,7 @@ contains
   real(wp) function pressure_unit(self)
     class(iterate_t), intent(in) :: self
 
-    pressure_unit = max(maximum(self%p, self%operators%n_threads), 0.0_wp)
+    pressure_unit = max(self%operators%space%max(self%p), 0.0_wp)
     if (pressure_unit > 0.0_wp) pressure_unit = 1.0_wp/pressure_unit
   end function pressure_unit
 
@@ -311,7 +312,7 @@ contains
     if (.not. (unit > 0.0_wp .and. self%problem%friction%resists())) return
     largest = 0.0_wp
     worst = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) private(ds, from, to) &
+    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(ds, from, to) &
     !$omp& reduction(max: largest, worst)
     do row = 1, self%problem%lattice%extent(2)
       from = (row - 1)*size(ds, 1) + 1
@@ -331,7 +332,7 @@ contains
 
     n = size(self%p)
     is_finite = all(ieee_is_finite(self%motion))
-    !$omp parallel do schedule(static) num_threads(self%operators%n_threads) reduction(.and.: is_finite)
+    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) reduction(.and.: is_finite)
     do i = 1, n
       is_finite = is_finite .and. ieee_is_finite(self%p(i)) .and. ieee_is_finite(self%q(i)) .and. ieee_is_finite(self%q(n + i))
     end do
@@ -393,7 +394,7 @@ contains
       p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate
-    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%n_threads)
+    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%space)
   end function gap_residual
 
 end module hc_friction_iterate

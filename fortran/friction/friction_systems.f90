@@ -20,7 +20,6 @@ module hc_friction_systems
   use hc_friction_rows, only: soften_row
   use hc_krylov, only: linear_system_t
   use hc_active_set, only: packing_t, new_packing
-  use hc_vectors, only: fill, copy
   implicit none
   private
 
@@ -100,7 +99,7 @@ contains
     !> Nodes in contact (n)
     logical, intent(in) :: contact(:)
 
-    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%operators%n_threads)
+    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%operators%space)
   end subroutine take_contact
 
   subroutine pressure_product(self, x, y, error)
@@ -132,11 +131,11 @@ contains
 
     n = operators%flexibility%lattice%size()
     self%operators => operators
-    self%n_threads = operators%n_threads
+    self%space = operators%space
     self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%pair)
     allocate (self%direction(2, n), self%compliance(n), self%weight(n, 2), self%from(2*n), self%onto(2*n), &
               self%displacement(2*n), self%traction(2*n))
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
       self%direction(:, i) = [1.0_wp, 0.0_wp]
       self%compliance(i) = 0.0_wp
@@ -146,7 +145,7 @@ contains
       all_nodes(i) = .true.
     end do
     !$omp end parallel do
-    call new_packing(self%nodes, all_nodes, self%n_threads)
+    call new_packing(self%nodes, all_nodes, self%space)
   end subroutine new_shear_system
 
   !> Take the nodes in contact; weigh the preconditioners by the compliances.
@@ -161,12 +160,12 @@ contains
     if (known) known = count(self%contact .neqv. contact) == 0
     if (.not. known) then
       self%contact = contact
-      call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%n_threads)
-      call new_packing(self%nodes, contact, self%n_threads)
-      call fill(self%from, 0.0_wp, self%n_threads)
+      call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%space)
+      call new_packing(self%nodes, contact, self%space)
+      call self%space%fill(self%from, 0.0_wp)
     end if
     used = .false.
-    !$omp parallel do schedule(static) num_threads(self%n_threads) reduction(.or.: used)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) reduction(.or.: used)
     do i = 1, size(contact)
       self%weight(i, :) = blend(self%compliance(i)/self%elastic_compliance)
       if (contact(i)) used = used .or. self%weight(i, :) > 0.0_wp
@@ -190,7 +189,7 @@ contains
 
     n = size(self%compliance)
     call self%to_frame(plane, traction)
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, to)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, to)
     do from = 1, n, row_block
       to = min(from + row_block - 1, n)
       call soften_row(to - from + 1, self%compliance(from:to), displacement(from:to), displacement(n + from:n + to), &
@@ -211,7 +210,7 @@ contains
     real(wp), intent(inout) :: displacement(:)
     integer :: i
 
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, size(self%compliance)
       displacement(i) = displacement(i) - self%compliance(i)*traction(i)
     end do
@@ -228,7 +227,7 @@ contains
     integer :: i, n
 
     n = size(frame)/2
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
       plane(i) = -self%direction(2, i)*frame(i) + self%direction(1, i)*frame(n + i)
       plane(n + i) = self%direction(1, i)*frame(i) + self%direction(2, i)*frame(n + i)
@@ -246,7 +245,7 @@ contains
     integer :: i, n
 
     n = size(plane)/2
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
       frame(i) = -self%direction(2, i)*plane(i) + self%direction(1, i)*plane(n + i)
       frame(n + i) = self%direction(1, i)*plane(i) + self%direction(2, i)*plane(n + i)
@@ -262,7 +261,7 @@ contains
     integer :: n, k, i
 
     n = size(x)/2
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
         self%from(i) = -self%direction(2, i)*x(i) + self%direction(1, i)*x(n + i)
@@ -272,7 +271,7 @@ contains
     !$omp end parallel do
     call self%operators%apply(shear, self%from, shear, self%onto, error)
     if (allocated(error)) return
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
       y(i) = -self%direction(2, i)*self%onto(i) + self%direction(1, i)*self%onto(n + i) + self%compliance(i)*x(i)
       y(n + i) = self%direction(1, i)*self%onto(i) + self%direction(2, i)*self%onto(n + i)
@@ -290,7 +289,7 @@ contains
 
     n = size(x)/2
     unit = self%operators%tangential%unit
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, loose)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, loose)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
         loose = 1.0_wp - sum(self%weight(i, :)**2)
@@ -303,7 +302,7 @@ contains
     do m = 1, size(self%used)
       if (.not. self%used(m)) cycle
       ! the continuation beyond the contact is made afresh
-      !$omp parallel num_threads(self%n_threads) private(i, t, e)
+      !$omp parallel num_threads(self%space%threads) private(i, t, e)
       !$omp do schedule(static)
       do i = 1, size(self%displacement)
         self%displacement(i) = 0.0_sp
@@ -321,7 +320,7 @@ contains
       !$omp end do
       !$omp end parallel
       call self%operators%precondition_shear(self%edge, m == 2, self%displacement, self%traction)
-      !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, t, e)
+      !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, t, e)
       do k = 1, size(self%nodes%first)
         do i = self%nodes%first(k), self%nodes%last(k)
           t = -self%direction(2, i)*self%traction(i) + self%direction(1, i)*self%traction(n + i)
@@ -344,7 +343,7 @@ contains
 
     n = size(x)/3
     allocate (frame(2*n), traction(3*n), moved(3*n))
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
       frame(i) = x(n + i)
       frame(n + i) = x(2*n + i) + self%slope(i)*x(i)
@@ -354,9 +353,9 @@ contains
     call self%shear%to_plane(frame, traction(n + 1:))
     call self%operators%apply([normal, along_x, along_y], traction, [normal, along_x, along_y], moved, error)
     if (allocated(error)) return
-    call copy(moved(:n), y(:n), self%n_threads)
+    call self%space%copy(moved(:n), y(:n))
     call self%shear%to_frame(moved(n + 1:), y(n + 1:))
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
       y(n + i) = y(n + i) + self%shear%compliance(i)*x(n + i)
     end do

@@ -7,6 +7,8 @@ module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: space_over
+  use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t
   use hc_contact_problem, only: friction_problem_t, friction_solver_t
   use hc_elastic_operators, only: operators_t, new_operators, operators_memory
@@ -52,6 +54,8 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     integer :: l, n_level
 
+    call check_operator(problem%lattice, problem%pair, error, n_threads)
+    if (allocated(error)) return
     self%problem = problem
     n_level = level_count(problem%lattice%extent, smallest_side)
     allocate (self%operators(n_level), self%coarse(2:n_level))
@@ -62,27 +66,27 @@ contains
         self%coarse(l) = self%coarse(l - 1)%coarsened()
       end if
       if (l == 1) then
-        call new_operators(self%operators(l), problem%lattice, problem%pair, error, n_threads, cache)
-        self%problem%n_threads = self%operators(l)%n_threads
+        self%problem%space = space_over(problem%lattice%extent, n_threads)
+        call new_operators(self%operators(l), problem%lattice, problem%pair, self%problem%space, error, cache)
       else
-        call new_operators(self%operators(l), self%coarse(l)%lattice, problem%pair, error, n_threads, cache)
-        self%coarse(l)%n_threads = self%operators(l)%n_threads
+        self%coarse(l)%space = space_over(self%coarse(l)%lattice%extent, n_threads)
+        call new_operators(self%operators(l), self%coarse(l)%lattice, problem%pair, self%coarse(l)%space, error, cache)
       end if
       if (allocated(error)) return
     end do
   end subroutine new_frictional_contact
 
   !> Bytes that a problem takes between its steps: operators and what is given, on all lattices.
-  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, n_threads)
+  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
-    integer, intent(in) :: n_threads
+    integer, intent(in) :: threads
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
     ! initial gap, coordinates, candidates
-    finest = operators_memory(extent, n_threads) + 28*int(extent(1), long)*extent(2)
+    finest = operators_memory(extent, threads) + 28*int(extent(1), long)*extent(2)
     frictional_contact_memory = finest + finest/3
   end function frictional_contact_memory
 
@@ -154,7 +158,7 @@ contains
       return
     end if
     work = 0.0_wp
-    call take_tractions(start, guess, self%problem%n_threads)
+    call take_tractions(start, guess, self%problem%space)
     guessed = .false.
     if (size(self%operators) > 1) then
       if (any(start%pressure > 0.0_wp)) then
@@ -174,7 +178,7 @@ contains
     if (allocated(error)) return
     ! a first step has no state to fall back on: it goes on from where it stands
     if (.not. (state%converged .or. state%sliding .or. any(start%pressure > 0.0_wp))) then
-      call take_tractions(state, guess, self%problem%n_threads)
+      call take_tractions(state, guess, self%problem%space)
       call attempt(guess)
       if (allocated(error)) return
     end if
@@ -227,7 +231,7 @@ contains
       associate (problem => self%coarse(l))
         if (.not. any(problem%candidate)) cycle
         if (.not. problem%is_pressed(target)) cycle
-        call new_friction_state(state, problem%lattice, problem%n_threads)
+        call new_friction_state(state, problem%lattice, problem%space)
         state%motion = guess%motion
         if (allocated(coarser%pressure)) call prolong_state(self%coarse(l + 1), coarser, problem, state)
         call solve_level(problem, self%operators(l), state, origin(l)%value, target, coarse_tolerance, max_sweeps, &
@@ -249,9 +253,9 @@ contains
     type(contact_state_t), intent(inout) :: state
     if (any(shape(coarse%pressure) /= coarse_problem%lattice%extent)) return
     if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
-    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%n_threads)
+    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%space)
     call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
-                       state%traction, problem%n_threads)
+                       state%traction, problem%space)
     state%motion = coarse%motion
   end subroutine prolong_state
 

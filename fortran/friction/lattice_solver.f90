@@ -57,7 +57,7 @@ contains
     held = 0
     operators%flexibility%applications = 0.0_wp
     operators%preconditioning = 0.0_wp
-    call new_friction_state(state, problem%lattice, operators%n_threads)
+    call new_friction_state(state, problem%lattice, operators%space)
     allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
     call now%begin(problem, operators, start, reference, target, tolerance, error)
     if (allocated(error)) return
@@ -118,7 +118,7 @@ contains
 
     n = size(now%p)
     call now%cut_to_cone(q)
-    !$omp parallel do schedule(static) num_threads(now%operators%n_threads) private(from, to)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
     do row = 1, size(state%pressure, 2)
       to = row*size(state%pressure, 1)
       from = to - size(state%pressure, 1) + 1

@@ -14,7 +14,6 @@ module hc_staggered_newton
   use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
   use hc_friction_iterate, only: iterate_t, cautious
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
-  use hc_vectors, only: copy, maximum, total
   implicit none
   private
 
@@ -100,7 +99,7 @@ contains
       call now%find_gap(gap)
       now%residual_normal = now%gap_residual(gap)
       missing = 0.0_wp
-      carried = total(now%p, now%pressure%n_threads)
+      carried = now%pressure%space%sum(now%p)
       if (n_constraint == 1) missing = now%target%value(normal)/cell_area - carried
       if (now%residual_normal <= final_accuracy*now%tolerance .and. &
           abs(missing(1)) <= final_accuracy*now%tolerance*carried) return
@@ -114,7 +113,7 @@ contains
 
       if (changed) call now%pressure%take(now%contact)
       if (searching .and. now%pressing .and. allocated(now%lift)) deallocate (now%lift)
-      !$omp parallel do schedule(static) num_threads(now%pressure%n_threads)
+      !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, n
         if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))
         rhs(i) = level - now%h(i) - now%closing(i)
@@ -125,8 +124,8 @@ contains
       if (allocated(error)) return
       if (changed) then
         if (n_constraint == 1) then
-          missing = now%target%value(normal)/cell_area - total(now%p, now%pressure%n_threads)
-          call fulfil(constraint, mb, missing, now%p, independent, now%pressure%n_threads)
+          missing = now%target%value(normal)/cell_area - now%pressure%space%sum(now%p)
+          call fulfil(constraint, mb, missing, now%p, independent, now%pressure%space)
         end if
         call now%pressure%product(now%p, now%w, error)
         if (allocated(error)) return
@@ -134,7 +133,7 @@ contains
       goal = final_accuracy*now%tolerance
       if (changed .or. now%pressing) goal = max(press_accuracy*min(now%residual_normal, 1.0_wp), goal)
       call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, &
-                        goal*now%problem%normal_compliance*maximum(now%p, now%pressure%n_threads), max_iterations, &
+                        goal*now%problem%normal_compliance*now%pressure%space%max(now%p), max_iterations, &
                         multiplier(:n_constraint), residual, iterations, outcome, error)
       if (allocated(error)) return
       now%outcome = max(now%outcome, outcome)
@@ -163,7 +162,7 @@ contains
       return
     end if
     allocate (x(2*n), ax(2*n), rhs(2*n), q(2*n))
-    call copy(now%q, q, now%shear%n_threads)
+    call now%shear%space%copy(now%q, q)
     holding = .false.
     do
       call classify(now, holding, active)
@@ -172,11 +171,11 @@ contains
       multiplier = driven%multipliers(now%motion)
       call drag_shear(now, active, constraint, .false., mb, error)
       if (allocated(error)) return
-      call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
+      call fulfil(constraint, mb, missing, x, independent, now%shear%space)
       if (.not. independent) then
         call drag_shear(now, active, constraint, .true., mb, error)
         if (allocated(error)) return
-        call fulfil(constraint, mb, missing, x, independent, now%shear%n_threads)
+        call fulfil(constraint, mb, missing, x, independent, now%shear%space)
       end if
       if (independent) then
         call displace(now, x, ax, error)
@@ -255,12 +254,12 @@ contains
     end if
     n = size(now%p)
     allocate (traction(3*n), moved(2*n))
-    call copy(now%p, traction(:n), now%shear%n_threads)
+    call now%shear%space%copy(now%p, traction(:n))
     call now%shear%to_plane(x, traction(n + 1:))
     call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], moved, error)
     if (allocated(error)) return
     call now%shear%to_frame(moved, ax)
-    !$omp parallel do schedule(static) num_threads(now%shear%n_threads)
+    !$omp parallel do schedule(static) num_threads(now%shear%space%threads)
     do i = 1, n
       ax(i) = ax(i) + now%shear%compliance(i)*x(i)
     end do
@@ -285,7 +284,7 @@ contains
     end if
     allocate (mb, mold=now%lift)
     do k = 1, size(mb, 2)
-      !$omp parallel do schedule(static) num_threads(now%pressure%n_threads)
+      !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, size(mb, 1)
         mb(i, k) = merge(now%lift(i, k), 0.0_wp, now%contact(i))
       end do

@@ -27,7 +27,7 @@ module hc_subwindow_solver
     type(frictional_contact_t), allocatable :: part
     !> First and last column and row of the part
     integer :: low(2) = 0, high(2) = 0
-    !> Threads to use
+    !> Threads that were asked for; 0: as many as OpenMP would take
     integer :: n_threads = 0
     !> Spectra that are kept
     type(kernel_cache_t), pointer :: cache => null()
@@ -56,11 +56,11 @@ contains
     if (present(cache)) self%cache => cache
     call new_frictional_contact(self%whole, problem, error, n_threads, self%cache)
     if (allocated(error)) return
-    self%problem%n_threads = self%whole%problem%n_threads
+    self%problem%space = self%whole%problem%space
   end subroutine new_windowed_friction
 
   !> Bytes that a problem takes while a step is solved on the window; on a part alone it is less.
-  pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_contact, n_force, coupled, n_threads)
+  pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_contact, n_force, coupled, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact
@@ -70,19 +70,19 @@ contains
     !> Pressure and shear move each other
     logical, intent(in) :: coupled
     !> Threads to use
-    integer, intent(in) :: n_threads
+    integer, intent(in) :: threads
     integer, parameter :: long = selected_int_kind(18)
     real(wp) :: share
 
     ! what is given is there twice
-    windowed_friction_memory = frictional_contact_memory(extent, n_threads) &
+    windowed_friction_memory = frictional_contact_memory(extent, threads) &
                                + friction_step_memory(extent, n_contact, n_force, coupled) &
                                + 28*int(extent(1), long)*extent(2)
     if (.not. coupled) return
     ! steps that move the edge of the contact are tried on a part first, about as large as the contact will be;
     ! its operators stay meanwhile
     share = min(worth, n_contact/(real(extent(1), wp)*extent(2)))
-    windowed_friction_memory = windowed_friction_memory + frictional_contact_memory(int(sqrt(share)*extent), n_threads)
+    windowed_friction_memory = windowed_friction_memory + frictional_contact_memory(int(sqrt(share)*extent), threads)
   end function windowed_friction_memory
 
   subroutine displacements(self, pressure, traction, displacement, error)
@@ -166,9 +166,9 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
 
     work = 0.0_wp
-    call new_friction_state(state, self%problem%lattice, self%problem%n_threads)
+    call new_friction_state(state, self%problem%lattice, self%problem%space)
     associate (lattice => self%part%problem%lattice, c => [self%low(1), self%high(1)], r => [self%low(2), self%high(2)])
-      call new_friction_state(before, lattice, self%problem%n_threads)
+      call new_friction_state(before, lattice, self%problem%space)
       before%pressure = start%pressure(c(1):c(2), r(1):r(2))
       before%gap = start%gap(c(1):c(2), r(1):r(2))
       before%traction = start%traction(c(1):c(2), r(1):r(2), :)

@@ -6,6 +6,7 @@ module hc_normal_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_memory
@@ -50,7 +51,7 @@ module hc_normal_contact
     type(normal_kernel_t) :: kernel
     !> Spectra that are kept
     type(kernel_cache_t), pointer :: cache => null()
-    !> Threads to use
+    !> Threads that were asked for; 0: as many as OpenMP would take
     integer :: n_threads = 0
   contains
     !> Solve for a normal load or an approach
@@ -101,18 +102,18 @@ contains
           end associate
         end if
         ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
-        call level%prepare(pair, self%kernel, l == 1, l > 1, error, threads_of(level%lattice, self%n_threads), self%cache)
+        call level%prepare(pair, self%kernel, l == 1, l > 1, space_of(self, level%lattice), error, self%cache)
         if (allocated(error)) return
       end associate
     end do
   end subroutine new_normal_contact
 
   !> Bytes that a problem takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function normal_contact_memory(extent, n_threads)
+  pure integer(selected_int_kind(18)) function normal_contact_memory(extent, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
-    integer, intent(in) :: n_threads
+    integer, intent(in) :: threads
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
@@ -120,11 +121,11 @@ contains
 
     n = int(extent(1), long)*extent(2)
     ! on all lattices: products in single precision; gap, candidates; pressure, closing, vectors, zones, punch
-    each = preconditioner_memory(extent, n_threads, .false.) - 2*half*n &
-           + convolution_memory(extent, good_size(2*extent - 1), 1, 1, n_threads) &
+    each = preconditioner_memory(extent, threads, .false.) - 2*half*n &
+           + convolution_memory(extent, good_size(2*extent - 1), 1, 1, threads) &
            + n*(field + half + 2*field + 4*half + 2*half)
     ! on the finest: products in double precision, the kernel; states, start, zones to come, edge of the contact
-    normal_contact_memory = each + each/3 + fft_memory(extent, .true., n_threads) &
+    normal_contact_memory = each + each/3 + fft_memory(extent, .true., threads) &
                             + field*int(maxval(extent), long)**2 + n*(2*field + half + 2*field + 4*half)
   end function normal_contact_memory
 
@@ -156,7 +157,7 @@ contains
         if (.not. any(level%candidate)) cycle
         allocate (state%pressure(level%lattice%extent(1), level%lattice%extent(2)), source=0.0_wp)
         if (allocated(coarse%pressure)) then
-          call prolong_edge(self%level(l + 1)%lattice, coarse%pressure, level%lattice, state%pressure, level%n_threads)
+          call prolong_edge(self%level(l + 1)%lattice, coarse%pressure, level%lattice, state%pressure, level%space)
         else
           where (level%candidate) state%pressure = 1.0_wp
         end if
@@ -174,15 +175,14 @@ contains
     state%operator_applications = work
   end subroutine solve
 
-  !> Threads for a lattice: one where waking the others for each of the short passes takes longer than they save.
-  pure integer function threads_of(lattice, n_threads)
+  !> Space of a lattice: one thread where waking the others for each of the short passes takes longer than they save.
+  type(field_space_t) function space_of(self, lattice)
+    class(normal_contact_t), intent(in) :: self
     type(lattice_t), intent(in) :: lattice
-    !> Threads that were asked for; 0: as many as OpenMP would take
-    integer, intent(in) :: n_threads
 
-    threads_of = n_threads
-    if (n_threads == 0 .and. lattice%size() < worth_sharing) threads_of = 1
-  end function threads_of
+    space_of%threads = 1
+    if (self%n_threads > 0 .or. lattice%size() >= worth_sharing) space_of = space_over(lattice%extent, self%n_threads)
+  end function space_of
 
   !> Nodes of a part of a lattice over those of the whole.
   pure real(wp) function share_of(part, whole)
@@ -229,7 +229,7 @@ contains
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
           sweeps = sweeps + part%sweeps
-          call new_contact_state(state, whole%lattice, whole%n_threads)
+          call new_contact_state(state, whole%lattice, whole%space)
           state%pressure(first(1):last(1), first(2):last(2)) = part%pressure
         end associate
         state%motion = part%motion
@@ -241,7 +241,7 @@ contains
         if (state%converged .or. .not. part%converged) return
       end do
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
-      call whole%prepare(self%pair, self%kernel, .true., .true., error, threads_of(whole%lattice, self%n_threads), self%cache)
+      call whole%prepare(self%pair, self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)
       if (allocated(error)) return
       call solve_level(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
@@ -269,7 +269,7 @@ contains
       inner%lattice = part_of(whole%lattice, low, high)
       inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
       inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
-      call inner%prepare(self%pair, self%kernel, .true., .true., error, threads_of(inner%lattice, self%n_threads), self%cache)
+      call inner%prepare(self%pair, self%kernel, .true., .true., space_of(self, inner%lattice), error, self%cache)
     end associate
   end subroutine take_part
 

@@ -21,7 +21,7 @@ contains
     integer :: col, row
 
     scale = 1.0_wp/now%w_unit
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, gap)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, gap)
     do row = 1, size(now%p, 2)
       !$omp simd private(gap)
       do col = now%span(1, row), now%span(2, row)
@@ -45,7 +45,7 @@ contains
 
     mean = 0.0_wp
     if (by_load .and. .not. held) then
-      !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, row_sum)
+      !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, row_sum)
       do row = 1, size(now%p, 2)
         row_sum = 0.0_wp
         !$omp simd reduction(+: row_sum)
@@ -57,7 +57,7 @@ contains
       !$omp end parallel do
       mean = sum(part)/now%punch_sum
     end if
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, aim)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, aim)
     do row = 1, size(now%p, 2)
       now%d(:, row, 1) = 0.0_sp
       part(row) = 0.0_wp
@@ -84,7 +84,7 @@ contains
     ! what was cut off goes where it changes the approach alone
     if (.not. by_load) return
     lack = real((pressures/now%p_unit - sum(part))/now%punch_sum, sp)
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col)
     do row = 1, size(now%p, 2)
       do col = now%span(1, row), now%span(2, row)
         now%d(col, row, 1) = now%d(col, row, 1) + lack*now%punch(col, row)
@@ -105,7 +105,7 @@ contains
     real(sp) :: back, mean
     integer :: col, row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, z, product_z, total_z)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, z, product_z, total_z)
     do row = 1, size(now%p, 2)
       product_z = 0.0_wp
       total_z = 0.0_wp
@@ -124,7 +124,7 @@ contains
     if (rz > 0.0_wp) back = real(rz_new/rz, sp)
     mean = 0.0_sp
     if (by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col)
     do row = 1, size(now%p, 2)
       if (.not. rz > 0.0_wp) now%d(:, row, 1) = 0.0_sp
       !$omp simd
@@ -150,7 +150,7 @@ contains
     real(wp) :: part(size(now%p, 2)), curvature
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         part(row) = sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))

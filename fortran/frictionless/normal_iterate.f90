@@ -2,6 +2,7 @@
 module hc_normal_iterate
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t, status, raise
+  use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
   use hc_normal_lattice, only: normal_level_t
@@ -79,7 +80,7 @@ contains
     known = any(start > 0.0_wp .and. candidate)
     n_active = 0
     largest = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(level%n_threads) reduction(+: n_active) reduction(max: largest)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(+: n_active) reduction(max: largest)
     do row = 1, n(2)
       now%active(:, row) = candidate(:, row)
       if (known) now%active(:, row) = candidate(:, row) .and. start(:, row) > 0.0_wp
@@ -100,10 +101,10 @@ contains
     if (by_load) scale = target/(level%lattice%cell_area()*sum(part))
     now%span(1, :) = n(1) + 1
     now%span(2, :) = 0
-    call find_span(now, level%n_threads)
+    call find_span(now, level%space)
     now%p_unit = scale*largest
     now%w_unit = now%p_unit*level%preconditioner%unit
-    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, n(2)
       now%d(:, row, 1) = real(now%p(:, row)/largest, sp)
       now%p(:, row) = 0.0_wp
@@ -113,7 +114,7 @@ contains
     call advance(level, now, 1.0_wp)
     if (.not. by_load) then
       call rescale(level, now)
-      now%p_unit = maxval(now%p)
+      now%p_unit = level%space%max(now%p)
       now%w_unit = now%p_unit*level%preconditioner%unit
     end if
   end subroutine begin
@@ -125,7 +126,7 @@ contains
     real(wp) :: overlap(size(now%p, 2)), resistance(size(now%p, 2)), factor
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         overlap(row) = sum(now%p(from:to, row)*(now%approach - level%initial_gap(from:to, row)), &
@@ -135,7 +136,7 @@ contains
     end do
     !$omp end parallel do
     factor = sum(overlap)/sum(resistance)
-    if (.not. factor > 0.0_wp) factor = now%approach/maxval(now%w)
+    if (.not. factor > 0.0_wp) factor = now%approach/level%space%max(now%w)
     now%p = factor*now%p
     now%w = factor*now%w
     now%stale = factor*now%stale
@@ -151,7 +152,7 @@ contains
     real(wp) :: weight(size(now%p, 2)), lift(size(now%p, 2)), w, l, u
     integer :: col, row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads) private(col, w, l, u)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, w, l, u)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         w = 0.0_wp
@@ -201,7 +202,7 @@ contains
     n_next = 0
     n_changed = 0
     n_wrong = 0
-    !$omp parallel do schedule(static) num_threads(level%n_threads) &
+    !$omp parallel do schedule(static) num_threads(level%space%threads) &
     !$omp& reduction(max: p_max, worst, worst_active) reduction(+: n_next, n_changed, n_wrong)
     do row = 1, size(now%p, 2)
       call judge_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
@@ -236,9 +237,9 @@ contains
     call move_alloc(next, now%active)
     call move_alloc(swap, next)
     now%n_active = now%n_next
-    call find_span(now, level%n_threads)
-    call new_edge_extension(now%edge, now%active, level%n_threads)
-    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    call find_span(now, level%space)
+    call new_edge_extension(now%edge, now%active, level%space)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = 0.0_sp
       if (.not. allocated(now%punch)) cycle
@@ -246,17 +247,17 @@ contains
     end do
     !$omp end parallel do
     if (.not. allocated(now%punch)) return
-    now%punch_sum = total(now%punch, level%n_threads)
+    now%punch_sum = level%space%sum(now%punch)
     if (.not. now%punch_sum > 0.0_wp) deallocate (now%punch)
   end subroutine take_set
 
   !> Columns between which the active nodes of each row lie, those of earlier sets included.
-  subroutine find_span(now, n_threads)
+  subroutine find_span(now, space)
     type(iterate_t), intent(inout) :: now
-    integer, intent(in) :: n_threads
+    type(field_space_t), intent(in) :: space
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(n_threads)
+    !$omp parallel do schedule(static) num_threads(space%threads)
     do row = 1, size(now%active, 2)
       if (.not. any(now%active(:, row))) cycle
       now%span(1, row) = min(now%span(1, row), findloc(now%active(:, row), .true., dim=1))
@@ -265,21 +266,6 @@ contains
     !$omp end parallel do
   end subroutine find_span
 
-  !> Sum in double precision, row by row: it does not depend on the number of threads.
-  real(wp) function total(field, n_threads)
-    real(sp), intent(in) :: field(:, :)
-    integer, intent(in) :: n_threads
-    real(wp) :: part(size(field, 2))
-    integer :: row
-
-    !$omp parallel do schedule(static) num_threads(n_threads)
-    do row = 1, size(field, 2)
-      part(row) = sum(real(field(:, row), wp))
-    end do
-    !$omp end parallel do
-    total = sum(part)
-  end function total
-
   !> Pressure of a rigid punch over the active nodes, about, and nowhere negative.
   subroutine press_punch(level, now)
     type(normal_level_t), intent(inout) :: level
@@ -287,19 +273,19 @@ contains
 
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = merge(1.0_sp, 0.0_sp, now%active(:, row))
     end do
     !$omp end parallel do
     call level%precondition(now%edge, now%r, now%z)
     allocate (now%punch(size(now%p, 1), size(now%p, 2)))
-    !$omp parallel do schedule(static) num_threads(level%n_threads)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%punch(:, row) = merge(max(now%z(:, row, 1), 0.0_sp), 0.0_sp, now%active(:, row))
     end do
     !$omp end parallel do
-    now%punch_sum = total(now%punch, level%n_threads)
+    now%punch_sum = level%space%sum(now%punch)
   end subroutine press_punch
 
   !> p <- p + share d, w <- w + share K d.
@@ -314,7 +300,7 @@ contains
     step = share*now%p_unit
     lift = share*now%w_unit
     largest = 0.0_sp
-    !$omp parallel do schedule(static) num_threads(level%n_threads) reduction(max: largest)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
@@ -337,7 +323,7 @@ contains
     integer :: row
 
     pulls = .false.
-    !$omp parallel do schedule(static) num_threads(level%n_threads) reduction(.or.: pulls)
+    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(.or.: pulls)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         pulls = pulls .or. count(now%p(from:to, row) < 0.0_wp) > 0
@@ -353,15 +339,8 @@ contains
     type(iterate_t), intent(in) :: now
     !> What it should be
     real(wp), intent(in) :: pressures
-    real(wp) :: part(size(now%p, 2))
-    integer :: row
 
-    !$omp parallel do schedule(static) num_threads(level%n_threads)
-    do row = 1, size(now%p, 2)
-      part(row) = sum(now%p(:, row))
-    end do
-    !$omp end parallel do
-    load_lack = pressures - sum(part)
+    load_lack = pressures - level%space%sum(now%p)
   end function load_lack
 
   !> Make up for it.

@@ -6,6 +6,7 @@ module hc_normal_lattice
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_fftw, only: good_size
@@ -13,7 +14,7 @@ module hc_normal_lattice
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure_rounded
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t, threads_for
+  use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t
   use hc_contact_state, only: contact_state_t
   use hc_contact_residuals, only: conclude, normal_self_compliance
   use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner, single_cost
@@ -41,8 +42,8 @@ module hc_normal_lattice
     real(wp) :: compliance = 0.0_wp
     !> Work in single precision, in applications of the full operator
     real(wp) :: single_work = 0.0_wp
-    !> Threads that share the vector operations
-    integer :: n_threads = 1
+    !> Space of the fields
+    type(field_space_t) :: space
   contains
     !> Operators
     procedure :: prepare
@@ -64,7 +65,7 @@ module hc_normal_lattice
 contains
 
   !> Operators of a problem whose lattice, gap and candidates are known; those that are there are kept.
-  subroutine prepare(self, pair, kernel, exact, iterating, error, n_threads, cache)
+  subroutine prepare(self, pair, kernel, exact, iterating, space, error, cache)
     class(normal_level_t), intent(inout) :: self
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
@@ -72,10 +73,10 @@ contains
     type(normal_kernel_t), intent(inout), target :: kernel
     !> The operator in double precision is wanted; what iterations need is wanted
     logical, intent(in) :: exact, iterating
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; absent or 0: as many as OpenMP would take
-    integer, intent(in), optional :: n_threads
     !> Spectra that are kept
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     type(rounded_kernel_t) :: rounded
@@ -85,24 +86,23 @@ contains
 
     self%pair = pair
     self%compliance = normal_self_compliance(self%lattice, pair)
-    self%n_threads = threads_for(self%lattice%extent, n_threads)
+    self%space = space
     if (exact .and. .not. self%exact) then
-      call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., n_threads=n_threads, &
+      call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., n_threads=space%threads, &
                                kernel=kernel, cache=cache)
       if (allocated(error)) return
       self%exact = .true.
     end if
     if (self%iterating .or. .not. iterating) return
-    call new_preconditioner(self%preconditioner, self%lattice, pair, error, n_threads, cache=cache)
+    call new_preconditioner(self%preconditioner, self%lattice, pair, space, error, cache=cache)
     if (allocated(error)) return
-    call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, error, &
-                         n_threads=n_threads)
+    call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, space, error)
     if (allocated(error)) return
     if (self%exact) then
       ! copied as fast as it would be found
       call self%single%take_spectra(found, error)
       if (allocated(error)) return
-      !$omp parallel do schedule(static) num_threads(self%n_threads)
+      !$omp parallel do schedule(static) num_threads(self%space%threads)
       do block = 1, self%single%n_block
         self%single%spectrum(:, block, 1) = real(self%flexibility%convolution%spectrum(:, block, 1), sp)
       end do
@@ -112,7 +112,7 @@ contains
       call self%single%take_spectra(found, error, cache, key)
       if (allocated(error)) return
       if (.not. found) then
-        call kernel%cover(self%lattice, n_threads)
+        call kernel%cover(self%lattice, space)
         rounded%kernel => kernel
         call self%single%transform_kernels(rounded, error)
         if (allocated(error)) return
@@ -141,12 +141,12 @@ contains
     self%single_work = 0.0_wp
     call self%multiply_exactly(state%pressure, state%gap, error)
     if (allocated(error)) return
-    !$omp parallel do schedule(static) num_threads(self%n_threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
     do row = 1, size(state%gap, 2)
       state%gap(:, row) = self%initial_gap(:, row) + state%gap(:, row) - state%motion(normal)
     end do
     !$omp end parallel do
-    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%n_threads, error)
+    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%space, error)
   end subroutine conclude_anew
 
   !> K d in single precision, in units of the preconditioner.

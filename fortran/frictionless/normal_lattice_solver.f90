@@ -64,7 +64,7 @@ contains
     level%flexibility%applications = 0.0_wp
     level%single_work = 0.0_wp
     call move_alloc(state%pressure, start)
-    call new_contact_state(state, level%lattice, level%n_threads)
+    call new_contact_state(state, level%lattice, level%space)
     delta = minval(level%initial_gap, mask=level%candidate)
     if (target <= merge(0.0_wp, delta, control == force_control)) then         ! nothing touches
       state%motion(normal) = merge(delta, target, control == force_control)
@@ -76,7 +76,7 @@ contains
       call push_only(level, now, pulls)
       if (pulls .and. level%exact) call find_closing(level, now, error)
       if (allocated(error)) return
-      !$omp parallel do schedule(static) num_threads(level%n_threads)
+      !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%w, 2)
         state%gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
       end do
@@ -84,7 +84,7 @@ contains
       call move_alloc(now%p, state%pressure)
       state%motion(normal) = now%approach
     end if
-    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%n_threads, error)
+    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%space, error)
   end subroutine solve_level
 
   !> Iterations up to the tolerance.

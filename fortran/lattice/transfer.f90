@@ -6,13 +6,11 @@
 module hc_transfer
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t, neighbors
+  use hc_field_space, only: field_space_t
   implicit none
   private
 
   public :: level_count, prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
-
-  !> Smaller fields are left to one thread.
-  integer, parameter :: worth_sharing = 16384
 
 contains
 
@@ -32,19 +30,8 @@ contains
     end do
   end function level_count
 
-  !> Threads for a field of some nodes.
-  pure integer function team(n, n_threads)
-    !> Number of nodes
-    integer, intent(in) :: n
-    !> Threads that may be used; absent: one
-    integer, intent(in), optional :: n_threads
-
-    team = 1
-    if (present(n_threads) .and. n >= worth_sharing) team = n_threads
-  end function team
-
   !> Interpolate a field from the coarse to the fine lattice; zero outside the coarse window.
-  subroutine prolong(coarse_lattice, coarse, fine_lattice, fine, n_threads)
+  subroutine prolong(coarse_lattice, coarse, fine_lattice, fine, space)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse field (n_col, n_row)
@@ -53,11 +40,11 @@ contains
     type(lattice_t), intent(in) :: fine_lattice
     !> Fine field (n_col, n_row)
     real(wp), intent(out) :: fine(:, :)
-    !> Threads to use; absent: one
-    integer, intent(in), optional :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     integer :: col, row, i, j
 
-    !$omp parallel do schedule(static) private(col, i, j) num_threads(team(size(fine), n_threads))
+    !$omp parallel do schedule(static) private(col, i, j) num_threads(space%threads_for(size(fine)))
     do row = 1, size(fine, 2)
       j = fine_lattice%first(2) + row - 1
       do col = 1, size(fine, 1)
@@ -95,7 +82,7 @@ contains
   !> Its square is linear there: the square is continued by a straight line into the
   !> nodes beyond the edge, interpolated, and cut off where it is negative. So the edge
   !> of the fine pressure lies where that of the coarse one does between nodes.
-  subroutine prolong_edge(coarse_lattice, coarse, fine_lattice, fine, n_threads)
+  subroutine prolong_edge(coarse_lattice, coarse, fine_lattice, fine, space)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse pressure (n_col, n_row)
@@ -104,15 +91,15 @@ contains
     type(lattice_t), intent(in) :: fine_lattice
     !> Fine pressure (n_col, n_row)
     real(wp), intent(out) :: fine(:, :)
-    !> Threads to use; absent: one
-    integer, intent(in), optional :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp), allocatable :: square(:, :)
     real(wp) :: beyond, around(size(coarse, 1))
     integer :: col, row, k, n, near(2), next(2), last
 
     last = size(coarse, 1)
     allocate (square(last, size(coarse, 2)))
-    !$omp parallel do schedule(static) private(beyond, around, col, k, n, near, next) num_threads(team(size(coarse), n_threads))
+    !$omp parallel do schedule(static) private(beyond, around, col, k, n, near, next) num_threads(space%threads_for(size(coarse)))
     do row = 1, size(coarse, 2)
       square(:, row) = max(coarse(:, row), 0.0_wp)**2
       ! the largest pressure of the neighbours tells whether there is anything to continue
@@ -140,8 +127,8 @@ contains
       end do
     end do
     !$omp end parallel do
-    call prolong(coarse_lattice, square, fine_lattice, fine, n_threads)
-    !$omp parallel do schedule(static) num_threads(team(size(fine), n_threads))
+    call prolong(coarse_lattice, square, fine_lattice, fine, space)
+    !$omp parallel do schedule(static) num_threads(space%threads_for(size(fine)))
     do row = 1, size(fine, 2)
       fine(:, row) = sqrt(max(fine(:, row), 0.0_wp))
     end do
@@ -149,7 +136,7 @@ contains
   end subroutine prolong_edge
 
   !> Interpolate all components of a field.
-  subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine, n_threads)
+  subroutine prolong_vector(coarse_lattice, coarse, fine_lattice, fine, space)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse field (n_col, n_row, number of components)
@@ -158,17 +145,17 @@ contains
     type(lattice_t), intent(in) :: fine_lattice
     !> Fine field (n_col, n_row, number of components)
     real(wp), intent(out) :: fine(:, :, :)
-    !> Threads to use; absent: one
-    integer, intent(in), optional :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     integer :: m
 
     do m = 1, size(fine, 3)
-      call prolong(coarse_lattice, coarse(:, :, m), fine_lattice, fine(:, :, m), n_threads)
+      call prolong(coarse_lattice, coarse(:, :, m), fine_lattice, fine(:, :, m), space)
     end do
   end subroutine prolong_vector
 
   !> Interpolate a shear traction as its ratio to the pressure: where a node slips it stays on the cone.
-  subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine, n_threads)
+  subroutine prolong_shear(coarse_lattice, coarse_pressure, coarse, fine_lattice, fine_pressure, fine, space)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse pressure (n_col, n_row) and shear traction (n_col, n_row, 2)
@@ -179,13 +166,13 @@ contains
     real(wp), intent(in) :: fine_pressure(:, :)
     !> Fine shear traction (n_col, n_row, 2)
     real(wp), intent(out) :: fine(:, :, :)
-    !> Threads to use; absent: one
-    integer, intent(in), optional :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp), allocatable :: ratio(:, :, :)
     integer :: col, row, k, n, near(2)
 
     allocate (ratio, mold=coarse)
-    !$omp parallel do schedule(static) private(col, k, n, near) num_threads(team(size(coarse_pressure), n_threads))
+    !$omp parallel do schedule(static) private(col, k, n, near) num_threads(space%threads_for(size(coarse_pressure)))
     do row = 1, size(coarse, 2)
       do col = 1, size(coarse, 1)
         ratio(col, row, :) = 0.0_wp
@@ -206,8 +193,8 @@ contains
       end do
     end do
     !$omp end parallel do
-    call prolong_vector(coarse_lattice, ratio, fine_lattice, fine, n_threads)
-    !$omp parallel do schedule(static) private(k) num_threads(team(size(fine_pressure), n_threads))
+    call prolong_vector(coarse_lattice, ratio, fine_lattice, fine, space)
+    !$omp parallel do schedule(static) private(k) num_threads(space%threads_for(size(fine_pressure)))
     do row = 1, size(fine, 2)
       do k = 1, size(fine, 3)
         fine(:, row, k) = fine(:, row, k)*max(fine_pressure(:, row), 0.0_wp)

@@ -5,6 +5,7 @@
 !> that packing is a copy of a few hundred pieces.
 module hc_active_set
   use hc_precision, only: wp
+  use hc_field_space, only: field_space_t
   implicit none
   private
 
@@ -17,7 +18,7 @@ module hc_active_set
   type :: packing_t
     !> Number of active nodes
     integer :: n_active = 0
-    integer, private :: n_threads = 1
+    type(field_space_t), private :: space
     !> First and last node of each run
     integer, allocatable :: first(:), last(:)
     !> Where it begins among the active nodes
@@ -34,20 +35,20 @@ module hc_active_set
 contains
 
   !> Find the runs of active nodes; they end at the ends of blocks, too.
-  subroutine new_packing(self, active, n_threads)
+  subroutine new_packing(self, active, space)
     !> Packing to be set up
     type(packing_t), intent(out) :: self
     !> Active nodes
     logical, intent(in), contiguous :: active(:)
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> Where the runs of each block begin in the list, less one
     integer :: before((size(active) + block_size - 1)/block_size + 1)
     integer :: k, n_block
 
     n_block = size(before) - 1
     before(1) = 0
-    !$omp parallel do schedule(static) num_threads(n_threads)
+    !$omp parallel do schedule(static) num_threads(space%threads)
     do k = 1, n_block
       before(k + 1) = count_runs(active(start(k):min(start(k + 1) - 1, size(active))))
     end do
@@ -58,7 +59,7 @@ contains
     associate (n_run => before(n_block + 1))
       allocate (self%first(n_run), self%last(n_run), self%place(n_run))
     end associate
-    !$omp parallel do schedule(static) num_threads(n_threads)
+    !$omp parallel do schedule(static) num_threads(space%threads)
     do k = 1, n_block
       if (before(k + 1) == before(k)) cycle
       call list_runs(active(start(k):min(start(k + 1) - 1, size(active))), start(k) - 1, &
@@ -69,7 +70,7 @@ contains
       self%place(k) = self%n_active + 1
       self%n_active = self%n_active + self%last(k) - self%first(k) + 1
     end do
-    self%n_threads = n_threads
+    self%space = space
 
   contains
 
@@ -122,7 +123,7 @@ contains
     real(wp), intent(inout), contiguous :: packed(:)
     integer :: k, i, shift
 
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, shift)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
     do k = 1, size(self%first)
       shift = self%place(k) - self%first(k)
       do i = self%first(k), self%last(k)
@@ -156,7 +157,7 @@ contains
     real(wp), intent(inout), contiguous :: field(:)
     integer :: k, i, shift
 
-    !$omp parallel do schedule(static) num_threads(self%n_threads) private(i, shift)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
     do k = 1, size(self%first)
       shift = self%place(k) - self%first(k)
       do i = self%first(k), self%last(k)

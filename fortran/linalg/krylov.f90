@@ -21,7 +21,7 @@ module hc_krylov
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: eliminate
   use hc_active_set, only: packing_t, new_packing
-  use hc_vectors, only: fill, dot, dots, add_columns, sum_block
+  use hc_field_space, only: field_space_t, sum_block
   implicit none
   private
 
@@ -35,8 +35,8 @@ module hc_krylov
   !> A symmetric positive definite operator with a preconditioner, on fields that
   !> are kept as vectors over all nodes.
   type, abstract :: linear_system_t
-    !> Threads that share the vector operations
-    integer :: n_threads = 1
+    !> Space of the vectors
+    type(field_space_t) :: space
   contains
     !> y = A x for an x that vanishes off the active nodes; y is wanted everywhere
     procedure(linear_map), deferred :: product
@@ -80,7 +80,7 @@ contains
     do m = 1, size(constraint, 2)
       call system%precondition(constraint(:, m), mb(:, m), error)
       if (allocated(error)) return
-      !$omp parallel do schedule(static) num_threads(system%n_threads)
+      !$omp parallel do schedule(static) num_threads(system%space%threads)
       do i = 1, size(active)
         if (.not. active(i)) mb(i, m) = 0.0_wp
       end do
@@ -91,7 +91,7 @@ contains
   !> x <- x + M B (C^T M B)^-1 missing: make C^T x what it should be; mostly C is B.
   !>
   !> M B is about the traction that a rigid motion of the active nodes causes.
-  subroutine fulfil(rows, mb, missing, x, independent, n_threads)
+  subroutine fulfil(rows, mb, missing, x, independent, space)
     !> C and M B
     real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> What C^T x lacks
@@ -100,25 +100,25 @@ contains
     real(wp), intent(inout), contiguous :: x(:)
     !> False where the constraints depend on each other: x is left alone
     logical, intent(out) :: independent
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp) :: inverse(size(missing), size(missing))
     integer :: m
 
-    call invert_gram(rows, mb, inverse, independent, n_threads)
-    if (independent) call add_columns(mb, [(dot_product(inverse(m, :), missing), m=1, size(missing))], x, n_threads)
+    call invert_gram(rows, mb, inverse, independent, space)
+    if (independent) call space%add_columns(mb, [(dot_product(inverse(m, :), missing), m=1, size(missing))], x)
   end subroutine fulfil
 
   !> (C^T M B)^-1, zero if the constraints depend on each other.
-  subroutine invert_gram(rows, mb, inverse, independent, n_threads)
+  subroutine invert_gram(rows, mb, inverse, independent, space)
     !> C and M B
     real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> The inverse
     real(wp), intent(out) :: inverse(:, :)
     !> The matrix can be inverted
     logical, intent(out) :: independent
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     real(wp) :: gram(size(mb, 2), size(mb, 2)), scale(size(mb, 2))
     integer :: m, k
 
@@ -127,7 +127,7 @@ contains
     if (size(mb, 2) == 0) return
     do m = 1, size(mb, 2)
       do k = 1, size(mb, 2)
-        gram(k, m) = dot(rows(:, k), mb(:, m), n_threads)
+        gram(k, m) = space%dot(rows(:, k), mb(:, m))
       end do
       scale(m) = gram(m, m)
     end do
@@ -179,30 +179,31 @@ contains
     real(wp), allocatable :: r(:), z(:), d(:), ad(:), x_active(:), ax_active(:), rhs_active(:), b(:, :), m_b(:, :)
     real(wp) :: rz, rz_old, curvature, step
     real(wp) :: inverse(size(constraint, 2), size(constraint, 2))
-    integer :: i, m, n_threads
+    integer :: i, m
+    type(field_space_t) :: space
     logical :: independent
 
-    n_threads = system%n_threads
-    call new_packing(nodes, active, n_threads)
+    space = system%space
+    call new_packing(nodes, active, space)
     associate (n => nodes%n_active)
       allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
     end associate
     allocate (onto(size(x)), from(size(x)))
-    call fill(from, 0.0_wp, n_threads)
+    call space%fill(from, 0.0_wp)
     call nodes%pack_columns(constraint, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack(x, x_active)
     call nodes%pack(ax, ax_active)
     call nodes%pack(rhs, rhs_active)
-    call invert_gram(b, m_b, inverse, independent, n_threads)
+    call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0
     outcome = iterations_used_up
     rz_old = 0.0_wp
     multiplier = 0.0_wp
     if (size(multiplier) > 0) then
-      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       do m = 1, size(multiplier)
-        multiplier(m) = -dot(b(:, m), r, n_threads)/dot(b(:, m), b(:, m), n_threads)
+        multiplier(m) = -space%dot(b(:, m), r)/space%dot(b(:, m), b(:, m))
       end do
     end if
     do
@@ -210,23 +211,23 @@ contains
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
       ! What is left is normal to M B, which keeps the projected preconditioner
       ! symmetric even if the given M B is not quite what its name says.
-      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       if (size(multiplier) > 0) then
-        multiplier = multiplier - matmul(dots(m_b, r, n_threads), inverse)
-        call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, n_threads)
+        multiplier = multiplier - matmul(space%dots(m_b, r), inverse)
+        call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       end if
       if (residual <= tolerance .or. iterations >= max_iterations) exit
       call nodes%unpack(r, from)
       call system%precondition(from, onto, error)
       if (allocated(error)) return
       call nodes%pack(onto, z)
-      call add_columns(m_b, -matmul(inverse, dots(b, z, n_threads)), z, n_threads)
+      call space%add_columns(m_b, -matmul(inverse, space%dots(b, z)), z)
 
-      rz = dot(r, z, n_threads)
+      rz = space%dot(r, z)
       step = 0.0_wp
       if (iterations > 0) step = rz/rz_old
       rz_old = rz
-      !$omp parallel do schedule(static) num_threads(n_threads)
+      !$omp parallel do schedule(static) num_threads(space%threads)
       do i = 1, size(d)
         if (iterations > 0) then
           d(i) = z(i) + step*d(i)
@@ -239,14 +240,14 @@ contains
       call system%product(from, onto, error)
       if (allocated(error)) return
       call nodes%pack(onto, ad)
-      curvature = dot(d, ad, n_threads)
+      curvature = space%dot(d, ad)
       ! nothing is left to gain in working precision
       if (.not. curvature > 0.0_wp) then
         outcome = solution_broke_off
         exit
       end if
       step = rz/curvature
-      !$omp parallel num_threads(n_threads)
+      !$omp parallel num_threads(space%threads)
       !$omp do schedule(static)
       do i = 1, size(d)
         x_active(i) = x_active(i) + step*d(i)
@@ -263,7 +264,7 @@ contains
     end do
     if (residual <= tolerance) outcome = solution_accurate
     ! the largest of several numbers hides one that is not a number
-    if (.not. ieee_is_finite(dot(r, r, n_threads))) outcome = solution_broke_off
+    if (.not. ieee_is_finite(space%dot(r, r))) outcome = solution_broke_off
     call nodes%unpack(x_active, x)
   end subroutine projected_cg
 
@@ -313,17 +314,18 @@ contains
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
-    integer :: i, k, n_threads, stat
+    integer :: i, k, stat
+    type(field_space_t) :: space
 
     iterations = 0
     residual = huge(1.0_wp)
     outcome = solution_broke_off
-    n_threads = system%n_threads
-    call new_packing(nodes, active, n_threads)
+    space = system%space
+    call new_packing(nodes, active, space)
     call nodes%pack_columns(columns, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack_columns(rows, c_rows)
-    call invert_gram(c_rows, m_b, inverse, independent, n_threads)
+    call invert_gram(c_rows, m_b, inverse, independent, space)
     if (.not. independent) return
     associate (n => nodes%n_active)
       allocate (basis(1)%v(n), z(n), w(n), packed(n))
@@ -333,9 +335,9 @@ contains
     call nodes%pack(rhs, basis(1)%v)
     call nodes%pack(ax, packed)
     basis(1)%v = basis(1)%v - packed
-    call add_columns(b, multiplier, basis(1)%v, n_threads)
+    call space%add_columns(b, multiplier, basis(1)%v)
     basis(1)%v = w*basis(1)%v
-    length = sqrt(dot(basis(1)%v, basis(1)%v, n_threads))
+    length = sqrt(space%dot(basis(1)%v, basis(1)%v))
     residual = length
     if (length <= 0.0_wp) outcome = solution_accurate
     if (.not. length > 0.0_wp) return
@@ -357,13 +359,13 @@ contains
       call system%product(from, basis(k)%image, error)
       if (allocated(error)) return
       call nodes%pack(basis(k)%image, basis(k + 1)%v)
-      call add_columns(b, -share, basis(k + 1)%v, n_threads)
+      call space%add_columns(b, -share, basis(k + 1)%v)
       basis(k + 1)%v = w*basis(k + 1)%v
       do i = 1, k
-        h(i, k) = dot(basis(i)%v, basis(k + 1)%v, n_threads)
+        h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
         basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
       end do
-      h(k + 1, k) = sqrt(dot(basis(k + 1)%v, basis(k + 1)%v, n_threads))
+      h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
       if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
       do i = 1, k - 1
         rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
@@ -411,14 +413,14 @@ contains
       call system%precondition(from, onto, error)
       if (allocated(error)) return
       call nodes%pack(onto, z)
-      share = -matmul(inverse, dots(c_rows, z, n_threads))
-      call add_columns(m_b, share, z, n_threads)
+      share = -matmul(inverse, space%dots(c_rows, z))
+      call space%add_columns(m_b, share, z)
     end subroutine expand
 
   end subroutine projected_gmres
 
   !> r = rhs - A x + B m and its largest element.
-  subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, n_threads)
+  subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, space)
     !> Constraint vectors and multipliers
     real(wp), intent(in), contiguous :: b(:, :)
     real(wp), intent(in) :: multiplier(:)
@@ -428,12 +430,12 @@ contains
     real(wp), intent(inout), contiguous :: r(:)
     !> Its largest element
     real(wp), intent(out) :: largest
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     integer :: i, m, from, to
 
     largest = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(n_threads) private(i, m, to) reduction(max: largest)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, to) reduction(max: largest)
     do from = 1, size(r), sum_block
       to = min(from + sum_block - 1, size(r))
       do i = from, to

@@ -1,4 +1,4 @@
-!> The procedures of BLAS and LAPACK that the library calls.
+!> Procedures of BLAS and LAPACK.
 module hc_lapack
   use, intrinsic :: iso_fortran_env, only: real32, int64
   use hc_precision, only: wp
@@ -7,21 +7,13 @@ module hc_lapack
   implicit none
   private
 
-  public :: ddot, dgemm, dposv, dsgesv, dgelss, spotrf, spotrs
+  public :: dgemm, dposv, dsgesv, dgelss, spotrf, spotrs
   public :: prepare_lapack, eliminate
 
   !> Bytes of address space that OpenBLAS takes for a buffer when it is first called, and a reserve.
   integer(int64), parameter :: buffer_space = 160000000
 
   interface
-    !> Scalar product
-    pure real(wp) function ddot(n, dx, incx, dy, incy)
-      import :: wp
-      implicit none
-      integer, intent(in) :: n, incx, incy
-      real(wp), intent(in) :: dx(*), dy(*)
-    end function ddot
-
     !> C = alpha A B + beta C
     subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
       import :: wp

@@ -5,6 +5,7 @@ module hc_elastic_operators
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
@@ -19,8 +20,8 @@ module hc_elastic_operators
   type :: operators_t
     type(fft_flexibility_t) :: flexibility
     type(preconditioner_t) :: normal, tangential
-    !> Threads that share the vector operations
-    integer :: n_threads = 1
+    !> Space of the fields
+    type(field_space_t) :: space
     !> Work of the preconditioners, in applications of the full operator
     real(wp) :: preconditioning = 0.0_wp
   contains
@@ -35,37 +36,37 @@ module hc_elastic_operators
 contains
 
   !> Operator and preconditioners over a window.
-  subroutine new_operators(self, lattice, pair, error, n_threads, cache)
+  subroutine new_operators(self, lattice, pair, space, error, cache)
     !> Operators to be set up
     type(operators_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; absent or 0: as many as OpenMP would take
-    integer, intent(in), optional :: n_threads
     !> Spectra that are kept
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
-    call new_fft_flexibility(self%flexibility, lattice, pair, error, n_threads=n_threads, cache=cache)
+    call new_fft_flexibility(self%flexibility, lattice, pair, error, n_threads=space%threads, cache=cache)
     if (allocated(error)) return
-    call new_preconditioner(self%normal, lattice, pair, error, n_threads, cache=cache)
+    call new_preconditioner(self%normal, lattice, pair, space, error, cache=cache)
     if (allocated(error)) return
-    call new_preconditioner(self%tangential, lattice, pair, error, n_threads, tangential=.true., cache=cache)
-    self%n_threads = self%flexibility%convolution%n_threads
+    call new_preconditioner(self%tangential, lattice, pair, space, error, tangential=.true., cache=cache)
+    self%space = space
   end subroutine new_operators
 
   !> Bytes that operator and preconditioners take, for a window of the given size.
-  pure integer(selected_int_kind(18)) function operators_memory(extent, n_threads)
+  pure integer(selected_int_kind(18)) function operators_memory(extent, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
-    integer, intent(in) :: n_threads
+    integer, intent(in) :: threads
 
-    operators_memory = fft_memory(extent, .false., n_threads) + preconditioner_memory(extent, n_threads, .false.) &
-                       + preconditioner_memory(extent, n_threads, .true.)
+    operators_memory = fft_memory(extent, .false., threads) + preconditioner_memory(extent, threads, .false.) &
+                       + preconditioner_memory(extent, threads, .true.)
   end function operators_memory
 
   !> A product of some components, on vectors.

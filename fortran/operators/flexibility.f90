@@ -13,12 +13,13 @@ module hc_flexibility
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t, check_lattice
+  use hc_field_space, only: most_threads
   use hc_elastic_pair, only: elastic_pair_t, check_pair
   use hc_pyramid_influence, only: k_1, k_xx, k_xy, k_x, k_y
   implicit none
   private
 
-  public :: flexibility_t, check_operator, most_threads, normal, along_x, along_y
+  public :: flexibility_t, check_operator, normal, along_x, along_y
   public :: n_block, first_odd_block, blocks, block_index
 
   !> Components of a traction and of a relative displacement.
@@ -29,9 +30,6 @@ module hc_flexibility
   integer, parameter :: n_block = 6, first_odd_block = 5
   !> Block that stands at (onto, from), negative where its sign is reversed.
   integer, parameter :: block_index(3, 3) = reshape([1, -5, -6, 5, 2, 3, 6, 3, 4], [3, 3])
-
-  !> Threads that may be asked for: more than any machine has, fewer than the system refuses to start.
-  integer, parameter :: most_threads = 1024
 
   !> A flexibility operator over the nodes of a window.
   type, abstract :: flexibility_t

@@ -3,6 +3,7 @@ module hc_flexibility_fft
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility, only: flexibility_t, check_operator, n_block, first_odd_block, blocks, block_index
@@ -59,28 +60,30 @@ contains
     type(lattice_blocks_t) :: source
     type(normal_kernel_t) :: made
     type(kernel_key_t) :: key
+    type(field_space_t) :: space
     logical :: only_normal, found
 
     call check_operator(lattice, pair, error, n_threads)
     if (allocated(error)) return
+    space = space_over(lattice%extent, n_threads)
     only_normal = .false.
     if (present(normal_only)) only_normal = normal_only
     operator%lattice = lattice
     operator%pair = pair
     operator%n_component = merge(1, 3, only_normal)
     call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
-                         merge(1, n_block, only_normal), operator%n_component, error, &
-                         first_odd=first_odd_block, n_threads=n_threads)
+                         merge(1, n_block, only_normal), operator%n_component, space, error, &
+                         first_odd=first_odd_block)
     if (allocated(error)) return
     operator%convolution%factor = pair%lambda_1*lattice%spacing()
     key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, pair)
     call operator%convolution%take_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
     if (only_normal .and. present(kernel)) then
-      call kernel%cover(lattice, n_threads)
+      call kernel%cover(lattice, space)
       call operator%convolution%transform_kernels(kernel, error)
     else if (only_normal) then
-      call made%cover(lattice, n_threads)
+      call made%cover(lattice, space)
       call operator%convolution%transform_kernels(made, error)
     else
       source%basis = lattice%unit_basis()
@@ -92,16 +95,16 @@ contains
   end subroutine new_fft_flexibility
 
   !> Bytes that the operator takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, n_threads)
+  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Only the action of the pressure on the gap will be asked for
     logical, intent(in) :: normal_only
     !> Threads to use
-    integer, intent(in) :: n_threads
+    integer, intent(in) :: threads
 
     fft_memory = convolution_memory(extent, good_size(2*extent - 1), merge(1, n_block, normal_only), &
-                                    merge(1, 3, normal_only), n_threads)
+                                    merge(1, 3, normal_only), threads)
   end function fft_memory
 
   !> Bytes that are needed besides while the full operator is set up.

@@ -16,6 +16,7 @@
 module hc_preconditioner_extension
   use hc_precision, only: wp, sp
   use hc_lattice, only: neighbors
+  use hc_field_space, only: field_space_t
   implicit none
   private
 
@@ -44,8 +45,8 @@ module hc_preconditioner_extension
     integer, allocatable :: beside(:, :), n_beside(:)
     !> Fall from ring to ring over the number of neighbours in the ring before
     real(sp), allocatable :: fall(:)
-    !> Threads that share the work
-    integer :: n_threads = 1
+    !> Space of the rings
+    type(field_space_t) :: space
   contains
     !> Continue a field beyond the active nodes
     procedure :: extend
@@ -56,13 +57,13 @@ module hc_preconditioner_extension
 contains
 
   !> Rings around the active nodes.
-  subroutine new_edge_extension(self, active, n_threads)
+  subroutine new_edge_extension(self, active, space)
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, n_row)
     logical, intent(in) :: active(:, :)
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
 
     !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
     !> those of the rings, `free` elsewhere and `outside` around
@@ -73,8 +74,8 @@ contains
     n_col = size(active, 1)
     width = n_col + 2
     step = neighbors(1, :) + width*neighbors(2, :)
-    call mark_window(active, n_threads, mark, n_active)
-    call find_edge(mark, step, shape(active), n_threads, frontier)
+    call mark_window(active, space, mark, n_active)
+    call find_edge(mark, step, shape(active), space, frontier)
     n_ring = 0
     if (size(frontier) > 0) n_ring = min(most_rings, int(ring_factor*(real(n_active, wp)/size(frontier))**ring_power))
     allocate (node(0), self%ring(1))
@@ -89,9 +90,9 @@ contains
 
     n = size(node)
     n_ring = size(self%ring) - 1
-    if (n >= worth_sharing) self%n_threads = n_threads
+    if (n >= worth_sharing) self%space = space
     allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%inner(6, n), self%beside(7, n))
-    !$omp parallel num_threads(self%n_threads) private(r, k)
+    !$omp parallel num_threads(self%space%threads) private(r, k)
     do r = 1, n_ring
       !$omp do schedule(static)
       do k = self%ring(r), self%ring(r + 1) - 1
@@ -118,10 +119,10 @@ contains
   end subroutine new_edge_extension
 
   !> Marks of all nodes before there are rings.
-  subroutine mark_window(active, n_threads, mark, n_active)
+  subroutine mark_window(active, space, mark, n_active)
     logical, intent(in) :: active(:, :)
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     integer, allocatable, intent(out) :: mark(:)
     !> Number of active nodes
     integer, intent(out) :: n_active
@@ -132,7 +133,7 @@ contains
     mark(:width) = outside
     mark(size(mark) - width + 1:) = outside
     n_active = 0
-    !$omp parallel do schedule(static) num_threads(n_threads) private(start) reduction(+: n_active)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(start) reduction(+: n_active)
     do row = 1, size(active, 2)
       start = row*width + 1
       mark(start) = outside
@@ -151,13 +152,13 @@ contains
   end function profile
 
   !> Active nodes with a neighbour that is not; a node at the rim of the window has none there.
-  subroutine find_edge(mark, step, extent, n_threads, edge)
+  subroutine find_edge(mark, step, extent, space, edge)
     !> Marks of all nodes, and steps to the neighbours of a node
     integer, intent(in) :: mark(:), step(6)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
-    !> Threads to use
-    integer, intent(in) :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> The nodes, as places in the marks
     integer, allocatable, intent(out) :: edge(:)
 
@@ -167,7 +168,7 @@ contains
     type(list_t) :: found(extent(2))
     integer :: is_edge(extent(1)), first(extent(2) + 1), col, row, k, place
 
-    !$omp parallel do schedule(static) num_threads(n_threads) private(is_edge, col, k, place)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(is_edge, col, k, place)
     do row = 1, extent(2)
       place = row*(extent(1) + 2) + 1
       is_edge = 0
@@ -259,7 +260,7 @@ contains
 
     if (.not. allocated(self%node)) return                                     ! not set up: zero beyond the edge
     allocate (value(size(self%node)), smooth(size(self%node)))
-    !$omp parallel num_threads(self%n_threads) private(r, k, s)
+    !$omp parallel num_threads(self%space%threads) private(r, k, s)
     do r = 1, size(self%ring) - 1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
         !$omp do schedule(static)
@@ -295,7 +296,7 @@ contains
 
     if (.not. allocated(self%node)) return
     allocate (value(size(self%node)), share(size(self%node)))
-    !$omp parallel num_threads(self%n_threads) private(r, k, s, i)
+    !$omp parallel num_threads(self%space%threads) private(r, k, s, i)
     do r = size(self%ring) - 1, 1, -1
       associate (first => self%ring(r), last => self%ring(r + 1) - 1)
         !$omp do schedule(static)

@@ -6,8 +6,9 @@
 module hc_pressure_kernel
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_convolution, only: kernel_source_t, threads_for
+  use hc_convolution, only: kernel_source_t
   implicit none
   private
 
@@ -28,12 +29,12 @@ module hc_pressure_kernel
 contains
 
   !> Table for a window; the one that is there has to be of the same lattice, or of one that is coarser or finer.
-  subroutine cover(self, lattice, n_threads)
+  subroutine cover(self, lattice, space)
     class(normal_kernel_t), intent(inout) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
-    !> Threads to use; absent or 0: as many as OpenMP would take
-    integer, intent(in), optional :: n_threads
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     type(pyramid_t) :: pyramid
     integer :: i, j, n(2)
 
@@ -49,7 +50,7 @@ contains
     allocate (self%same(0:n(1), 0:n(2)))
     if (.not. self%equilateral) allocate (self%opposite(0:n(1), 0:n(2)))
     associate (basis => lattice%unit_basis())
-      !$omp parallel do schedule(dynamic, 8) private(i) num_threads(threads_for(lattice%extent, n_threads))
+      !$omp parallel do schedule(dynamic, 8) private(i) num_threads(space%threads)
       do j = 0, n(2)
         do i = merge(j, 0, self%equilateral), n(1)
           self%same(i, j) = pyramid%normal_kernel(i*basis(1, 1) + j*basis(1, 2), i*basis(2, 1) + j*basis(2, 2))

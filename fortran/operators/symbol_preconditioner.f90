@@ -10,6 +10,7 @@ module hc_symbol_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
   use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
@@ -52,17 +53,17 @@ module hc_symbol_preconditioner
 contains
 
   !> Plans and inverse symbol over a window.
-  subroutine new_preconditioner(self, lattice, pair, error, n_threads, tangential, cache)
+  subroutine new_preconditioner(self, lattice, pair, space, error, tangential, cache)
     !> Preconditioner to be set up
     type(preconditioner_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; absent or 0: as many as OpenMP would take
-    integer, intent(in), optional :: n_threads
     !> For shear tractions instead of the pressure
     logical, intent(in), optional :: tangential
     !> Spectra that are kept
@@ -79,7 +80,7 @@ contains
     n_component = merge(2, 1, self%tangential)
     length = good_size(lattice%extent)
     call new_convolution(self%convolution, lattice%extent, length, merge(2*n_tangential, 1, self%tangential), n_component, &
-                         error, n_threads=n_threads)
+                         space, error)
     if (allocated(error)) return
     self%unit = pair%lambda_1*lattice%spacing()
     self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
@@ -91,7 +92,7 @@ contains
     gamma = pair%gamma()
     spring = soft*node_ratio(pair)
     scale = 1.0_wp/product(real(length, wp))
-    !$omp parallel do num_threads(self%convolution%n_threads) private(f, i, k, matrix, symbol)
+    !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, k, matrix, symbol)
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
       if (.not. self%tangential) then
@@ -126,17 +127,17 @@ contains
   end function inverse
 
   !> Bytes that the preconditioner takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, n_threads, tangential)
+  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, threads, tangential)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
-    integer, intent(in) :: n_threads
+    integer, intent(in) :: threads
     !> For shear tractions instead of the pressure
     logical, intent(in) :: tangential
     integer, parameter :: long = selected_int_kind(18)
 
     preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), &
-                                               merge(2, 1, tangential), n_threads)
+                                               merge(2, 1, tangential), threads)
     ! fields in single precision; those of the tangential one belong to the shear system
     if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
   end function preconditioner_memory
@@ -159,8 +160,8 @@ contains
       allocate (given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
       allocate (wanted, mold=given)
     end if
-    associate (n_threads => self%convolution%n_threads)
-      !$omp parallel do collapse(2) schedule(static) num_threads(n_threads)
+    associate (space => self%convolution%space)
+      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
       do m = 1, size(given, 3)
         do row = 1, size(given, 2)
           given(:, row, m) = real(displacement(:, row, m)/self%unit, sp)
@@ -168,7 +169,7 @@ contains
       end do
       !$omp end parallel do
       call self%apply_single(given, wanted, edge)
-      !$omp parallel do collapse(2) schedule(static) num_threads(n_threads)
+      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
       do m = 1, size(wanted, 3)
         do row = 1, size(wanted, 2)
           traction(:, row, m) = wanted(:, row, m)

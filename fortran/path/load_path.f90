@@ -132,7 +132,7 @@ contains
       where (spread(next%pressure <= 0.0_wp, 3, 2)) next%slip_increment = 0.0_wp
       associate (problem => solver%problem)
         next%residual_tangential = tangential_residual(next%traction, next%slip_increment, next%pressure, problem%friction, &
-                                                       problem%tangential_compliance, problem%n_threads)
+                                                       problem%tangential_compliance, problem%space)
       end associate
     end if
     if (next%converged .and. done < 1.0_wp) then
@@ -154,7 +154,7 @@ contains
     real(wp) :: part(size(state%pressure, 2))
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(problem%n_threads)
+    !$omp parallel do schedule(static) num_threads(problem%space%threads)
     do row = 1, size(part)
       associate (q => state%traction(:, row, :), ds => state%slip_increment(:, row, :))
         state%accumulated_slip(:, row) = norm2(ds, dim=2)

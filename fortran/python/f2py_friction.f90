@@ -13,7 +13,7 @@ module hc_f2py_friction
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
-  use hc_convolution, only: threads_for
+  use hc_field_space, only: space_over
   use hc_flexibility_dense, only: dense_memory
   use hc_load_path, only: advance
   implicit none
@@ -102,9 +102,10 @@ contains
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
     if (.not. allocated(error)) call check_size(slot, n_node, error)
     if (.not. allocated(error)) then
+      slot%space = space_over(extent, n_threads)
       bytes = dense_fields*product(int(extent, c_int64_t))
       ! of the largest contact there can be, with all loads prescribed
-      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_motion, goodman == 0, threads_for(extent, n_threads))
+      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_motion, goodman == 0, slot%space%threads)
       call secure(slot, bytes, n_threads, error)
     end if
     if (.not. allocated(error)) then

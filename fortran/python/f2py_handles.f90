@@ -10,8 +10,8 @@ module hc_f2py_handles
   use hc_lock, only: lock, unlock, handle_table
   use hc_memory, only: require_memory
   use hc_lattice, only: lattice_t
-  use hc_flexibility, only: flexibility_t, most_threads
-  use hc_convolution, only: threads_for
+  use hc_field_space, only: field_space_t, most_threads
+  use hc_flexibility, only: flexibility_t
   use hc_normal_contact, only: normal_contact_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_direct_contact, only: direct_contact_t
@@ -31,10 +31,10 @@ module hc_f2py_handles
     integer(c_int64_t) :: generation = 0
     !> At work in some thread
     logical :: busy = .false.
-    !> Bytes that work on it may take, and threads
+    !> Bytes that work on it may take
     integer(c_int64_t) :: working = 0
-    integer(c_int) :: n_threads = 1
     type(lattice_t) :: lattice
+    type(field_space_t) :: space
     class(flexibility_t), pointer :: operator => null()
     type(normal_contact_t), pointer :: normal_contact => null()
     type(direct_contact_t), pointer :: direct_contact => null()
@@ -109,11 +109,13 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     ! such a number is refused by what is set up next
-    if (n_threads < 0 .or. n_threads > most_threads) return
-    slot%n_threads = threads_for(slot%lattice%extent, n_threads)
+    if (n_threads < 0 .or. n_threads > most_threads) then
+      slot%space = field_space_t()
+      return
+    end if
     ! a fifth at least, mostly a quarter, are operators and fields that are there from the beginning on
     slot%working = 4*bytes/5
-    call require_memory(bytes, error, slot%n_threads)
+    call require_memory(bytes, error, slot%space%threads)
   end subroutine secure
 
   !> Look a handle up and mark it as at work.
@@ -148,7 +150,7 @@ contains
     if (.not. allocated(error)) then
       bytes = slot%working
       if (present(more)) bytes = bytes + more
-      call require_memory(bytes, error, slot%n_threads)
+      call require_memory(bytes, error, slot%space%threads)
     end if
     if (allocated(error)) call leave(slot)
   end subroutine enter

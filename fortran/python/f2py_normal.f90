@@ -10,7 +10,7 @@ module hc_f2py_normal
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: along_x, along_y
-  use hc_convolution, only: threads_for
+  use hc_field_space, only: space_over
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
   use hc_contact_state, only: contact_state_t, normal
@@ -114,8 +114,9 @@ contains
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, [0, 0], extent, error)
     if (.not. allocated(error)) then
+      slot%space = space_over(extent, n_threads)
       bytes = dense_fields*product(int(extent, c_int64_t))
-      if (method /= direct) bytes = fft_memory(extent, .false., threads_for(extent, n_threads)) + fft_setup_memory(extent)
+      if (method /= direct) bytes = fft_memory(extent, .false., slot%space%threads) + fft_setup_memory(extent)
       call secure(slot, bytes, n_threads, error)
     end if
     if (.not. allocated(error)) then
@@ -201,8 +202,9 @@ contains
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error)
     if (.not. allocated(error)) call check_size(slot, n_node, error)
     if (.not. allocated(error)) then
+      slot%space = space_over(extent, n_threads)
       bytes = dense_fields*product(int(extent, c_int64_t))
-      if (method /= direct) bytes = normal_contact_memory(extent, threads_for(extent, n_threads))
+      if (method /= direct) bytes = normal_contact_memory(extent, slot%space%threads)
       call secure(slot, bytes, n_threads, error)
     end if
     if (.not. allocated(error)) then

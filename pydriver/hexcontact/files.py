@@ -1,12 +1,15 @@
-"""Reading files that users name: ordinary ones of a bounded size, or one sentence."""
+"""Files: reading those that users name, or one sentence; writing them as a whole, or not at all."""
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import DeckError
+from .errors import LACKING, DeckError, HexcontactError, ResourceError
 
 LARGEST_TEXT = 1 << 25  # bytes; 100,000 load steps of six loads each fit
 
@@ -68,3 +71,61 @@ def require_utf8(path: str | os.PathLike[str], expected: str) -> None:
         os.path.abspath(path).encode()
     except UnicodeEncodeError:
         raise DeckError(f"{os.path.abspath(path)}: is no name in UTF-8; expected {expected}") from None
+
+
+@contextlib.contextmanager
+def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
+    """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
+    require_utf8(path, kind)
+    try:
+        yield
+    except (HexcontactError, FileNotFoundError, MemoryError):
+        raise
+    except PermissionError as error:
+        raise DeckError(f"{path} cannot be read: {error.strerror}") from error
+    except Exception as error:  # damage takes any form: every library below has its own exceptions
+        if isinstance(error, OSError) and error.errno in LACKING:
+            raise ResourceError(f"{path} cannot be read: {error.strerror}") from error
+        raise DeckError(
+            f"{path} is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
+        ) from error
+
+
+# --- writing ------------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
+    """Give the name under which a file is written, which then takes the place of `target` as a whole.
+
+    When this ends, the file is on the disk; after an error nothing is left of it, and `target` is as it was.
+
+    Parameters
+    ----------
+    target : Path
+        The file to replace, which need not be there.
+    temporary : Path, optional
+        The name, in the same file system; by default one beside it that other processes do not use.
+    """
+    temporary = temporary or target.with_name(f"{target.name}.{os.getpid()}.tmp")
+    try:
+        yield temporary
+        flush(temporary)
+        os.replace(temporary, target)
+        flush(target.parent)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+def flush(path: Path) -> None:
+    """See to it that a file, or the names in a folder, are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if not (path.is_dir() and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # not every system can
+            raise
+    finally:
+        os.close(descriptor)

@@ -1,8 +1,4 @@
-"""The public name of `hexcontact.result.pressure_field`."""
+"""The public name of the pressure between the nodes, of `hexcontact.result.interpolate`."""
 
-import sys
-
-from .result import pressure_field
-from .result.pressure_field import *  # noqa: F403
-
-sys.modules[__name__] = pressure_field
+from .result.interpolate import PressureField as PressureField
+from .result.interpolate import linear as linear

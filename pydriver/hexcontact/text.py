@@ -102,6 +102,30 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     return f"{scaled} {PREFIXES[power]}{unit}"
 
 
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Return factor and unit that bring a quantity into 1 ... 1000: ``(1e-6, "MPa")`` for 8.5e8 Pa.
+
+    Parameters
+    ----------
+    largest : float
+        Largest magnitude, SI.
+    unit : str
+        SI unit; "1" or empty for a pure number, which is left alone. An area takes the square of a prefix.
+    """
+    if unit in ("", "1") or not math.isfinite(largest) or largest == 0.0:
+        return 1.0, unit.replace("1", "")
+    power = 2 if unit == "m2" else 1
+    exponent = 3 * math.floor(math.log10(abs(largest) * 1.0000001) / (3 * power))
+    exponent = min(max(exponent, -12), 9)
+    return 10.0 ** (-exponent * power), PREFIXES[exponent] + unit.replace("m2", "m²")
+
+
+def worded(value: float, unit: str) -> str:
+    """Write a quantity with four digits and a prefix: "747.6 µm", "1 kN"."""
+    factor, scaled_unit = scaled(value, unit)
+    return f"{value * factor:.4g} {scaled_unit}"
+
+
 def percent(share: float) -> str:
     """Write a share with two digits, as "0.051 %"."""
     return f"{100.0 * share:.2g} %" if math.isfinite(share) else "-"

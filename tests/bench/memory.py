@@ -28,7 +28,7 @@ COMMAND = """
 import sys
 sys.path.insert(0, {tests!r})
 from bench.square_window import peak_memory
-from hexcontact.cli import main
+from hexcontact.cli.app import main
 try:
     main()
 finally:

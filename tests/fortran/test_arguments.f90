@@ -4,6 +4,7 @@ module test_arguments
   use hc_precision, only: wp
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
@@ -386,14 +387,15 @@ contains
       pressure(2, 2) = 1.0_wp
       gap = 0.0_wp
       gap(9, 3) = odd(i)
-      call check(error, normal_residual(pressure, gap, candidate, 1.0_wp, 1), 0.0_wp, 0.0_wp, 'where nothing can touch')
+      call check(error, normal_residual(pressure, gap, candidate, 1.0_wp, field_space_t()), 0.0_wp, 0.0_wp, &
+                 'where nothing can touch')
       if (allocated(error)) return
       gap(4, 1) = odd(i)
-      call check_true(error, normal_residual(pressure, gap, candidate, 1.0_wp, 1) >= huge(1.0_wp), 'gap')
+      call check_true(error, normal_residual(pressure, gap, candidate, 1.0_wp, field_space_t()) >= huge(1.0_wp), 'gap')
       if (allocated(error)) return
       gap(4, 1) = 0.0_wp
       pressure(8, 1) = odd(i)
-      call check_true(error, normal_residual(pressure, gap, candidate, 1.0_wp, 1) >= huge(1.0_wp), 'pressure')
+      call check_true(error, normal_residual(pressure, gap, candidate, 1.0_wp, field_space_t()) >= huge(1.0_wp), 'pressure')
       if (allocated(error)) return
     end do
   end subroutine test_not_finite

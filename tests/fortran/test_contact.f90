@@ -8,7 +8,7 @@ module test_contact
   use hc_contact_residuals, only: normal_residual, force_residual
   use hc_krylov, only: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, solution_accurate, &
     iterations_used_up, solution_broke_off
-  use hc_vectors, only: dot
+  use hc_field_space, only: field_space_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use testing, only: test_t, new_test, check, check_raised, check_true
@@ -32,7 +32,6 @@ contains
     type(test_t), allocatable, intent(out) :: tests(:)
 
     tests = [ &
-      new_test('dot', test_dot), &
       new_test('projected_cg', test_projected_cg), &
       new_test('three_constraints', test_three_constraints), &
       new_test('outcomes', test_outcomes), &
@@ -49,16 +48,6 @@ contains
       new_test('bad_input', test_bad_input) &
     ]
   end subroutine collect_contact
-
-  !> More terms than one block of the sum.
-  subroutine test_dot(error)
-    type(error_t), allocatable, intent(out) :: error
-    real(wp) :: a(10001)
-    integer :: i
-
-    a = [(real(i, wp), i=1, size(a))]
-    call check(error, dot(a, a, 2), 10001.0_wp*10002.0_wp*20003.0_wp/6.0_wp, 1.0e-3_wp, 'sum of squares')
-  end subroutine test_dot
 
   !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
   subroutine test_projected_cg(error)
@@ -173,7 +162,7 @@ contains
     call check(error, mb(:, 3), [1.5_wp, 0.0_wp, 0.0_wp, 0.2_wp, -1.0_wp/6.0_wp], 1.0e-15_wp, 'M B')
     if (allocated(error)) return
     x = [0.0_wp, 0.0_wp, 7.0_wp, 0.0_wp, 0.0_wp]
-    call fulfil(constraint, mb, wanted, x, independent, 1)
+    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
     call check_true(error, independent, 'independent constraints')
     if (allocated(error)) return
     call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
@@ -193,7 +182,7 @@ contains
     call precondition_constraints(system, active, constraint, mb, error)
     if (allocated(error)) return
     ax = x
-    call fulfil(constraint, mb, wanted, x, independent, 1)
+    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
     call check_true(error, .not. independent, 'constraints that depend on each other')
     if (allocated(error)) return
     call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')
@@ -225,20 +214,20 @@ contains
     candidate = .true.
     p(:, 1) = [10.0_wp, 4.0_wp, 0.0_wp]
     g(:, 1) = [0.0_wp, 0.0_wp, 1.0_wp]
-    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.0_wp, 0.0_wp, 'no violation')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, field_space_t()), 0.0_wp, 0.0_wp, 'no violation')
     if (allocated(error)) return
     g(1, 1) = -0.05_wp
-    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.01_wp, 1.0e-15_wp, 'penetration')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, field_space_t()), 0.01_wp, 1.0e-15_wp, 'penetration')
     if (allocated(error)) return
     g(1, 1) = 0.25_wp
-    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.05_wp, 1.0e-15_wp, 'pressure across a gap')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, field_space_t()), 0.05_wp, 1.0e-15_wp, 'pressure across a gap')
     if (allocated(error)) return
     g(1, 1) = 0.0_wp
     p(2, 1) = -3.0_wp
-    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.3_wp, 1.0e-15_wp, 'tension')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, field_space_t()), 0.3_wp, 1.0e-15_wp, 'tension')
     if (allocated(error)) return
     candidate(2, 1) = .false.
-    call check(error, normal_residual(p, g, candidate, 0.5_wp, 1), 0.0_wp, 0.0_wp, 'not a candidate')
+    call check(error, normal_residual(p, g, candidate, 0.5_wp, field_space_t()), 0.0_wp, 0.0_wp, 'not a candidate')
     if (allocated(error)) return
     call check(error, force_residual(99.0_wp, 100.0_wp), 0.01_wp, 1.0e-15_wp, 'load')
   end subroutine test_residuals

@@ -2,6 +2,7 @@
 module test_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_field_space, only: field_space_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, slip, force_control, displacement_control
   use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t
@@ -47,7 +48,7 @@ contains
     call new_sphere(contact, n, 0.4_wp, -0.2_wp, coulomb_t(mu), error, n_threads=1)
     if (allocated(error)) return
     coarse(1) = contact%problem%coarsened()
-    call new_operators(operators(1), coarse(1)%lattice, coarse(1)%pair, error, n_threads=1)
+    call new_operators(operators(1), coarse(1)%lattice, coarse(1)%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
     call go(contact, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
@@ -180,7 +181,7 @@ contains
     target = load_target_t([f, f, f, d], [load, 0.7_wp*mu*load, 0.0_wp, 0.0_wp])
     call contact%solve_step(state, state%relative_displacement, target, unreachable, 1, next, error)
     if (allocated(error)) return
-    call new_operators(operators(1), contact%problem%lattice, contact%problem%pair, error, n_threads=1)
+    call new_operators(operators(1), contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
     call solve_level(contact%problem, operators(1), state, state%relative_displacement, target, unreachable, 1, alone, error)
     if (allocated(error)) return
@@ -207,7 +208,7 @@ contains
     target = load_target_t([f, f, f, d], [load, 0.4_wp*mu*load, 0.2_wp*mu*load, 0.0_wp])
     call contact%solve_step(virgin, virgin%relative_displacement, target, 1.0e-9_wp, 60, cold, error)
     if (allocated(error)) return
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, error, n_threads=1)
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
     call solve_level(contact%problem, operators, virgin, virgin%relative_displacement, target, 1.0e-9_wp, 60, alone, error)
     if (allocated(error)) return

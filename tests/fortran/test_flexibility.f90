@@ -5,6 +5,7 @@ module test_flexibility
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t, material_t, new_elastic_pair
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
@@ -499,7 +500,7 @@ contains
     if (allocated(error)) return
     call new_fft_flexibility(fft, lattice, pair, error, normal_only=.true.)
     if (allocated(error)) return
-    call new_preconditioner(preconditioner, lattice, pair, error)
+    call new_preconditioner(preconditioner, lattice, pair, field_space_t(), error)
     if (allocated(error)) return
     ! waves of zero mean under a wide envelope
     call lattice%coordinates(x, y)
@@ -526,7 +527,7 @@ contains
     if (allocated(error)) return
     call new_fft_flexibility(fft, lattice, pair, error)
     if (allocated(error)) return
-    call new_preconditioner(preconditioner, lattice, pair, error, tangential=.true.)
+    call new_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=.true.)
     if (allocated(error)) return
     call lattice%coordinates(x, y)
     traction(:, :, 1) = cos(0.9_wp*x + 0.5_wp*y)*exp(-(x**2 + y**2)/100.0_wp)
@@ -557,7 +558,7 @@ contains
     call new_lattice(lattice, equilateral_basis(0.2_wp), [-4, 7], [n_col, n_row], error)
     if (allocated(error)) return
     do n_component = 1, 2
-      call new_preconditioner(preconditioner, lattice, pair, error, tangential=n_component == 2)
+      call new_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=n_component == 2)
       if (allocated(error)) return
       n = n_col*n_row*n_component
       if (allocated(matrix)) deallocate (matrix, unit, answer, values, work)

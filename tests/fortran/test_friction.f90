@@ -5,6 +5,7 @@ module test_friction
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
@@ -159,7 +160,7 @@ contains
       character(len=*), intent(in) :: what
       real(wp), parameter :: p(3, 1) = reshape([10.0_wp, 4.0_wp, 0.0_wp], [3, 1])
 
-      call check(error, tangential_residual(q, ds, p, coulomb_t(0.5_wp), 0.5_wp, 1), expected, 1.0e-15_wp, what)
+      call check(error, tangential_residual(q, ds, p, coulomb_t(0.5_wp), 0.5_wp, field_space_t()), expected, 1.0e-15_wp, what)
     end subroutine violation
 
   end subroutine test_tangential_residual
@@ -174,16 +175,18 @@ contains
     q(:, 1, 2) = [0.0_wp, 400.0_wp]
     ds = 0.0_wp
     ds(1, 1, 1) = 0.5_wp
-    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp, 1), 1.0_wp/400.0_wp, 1.0e-15_wp, &
-               'no slip: the largest traction')
+    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp, field_space_t()), &
+               1.0_wp/400.0_wp, 1.0e-15_wp, 'no slip: the largest traction')
     if (allocated(error)) return
     q = 0.0_wp
-    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp, 1), 100.0_wp, 1.0e-12_wp, &
+    call check(error, tangential_residual(q, ds, p, coulomb_t(no_slip=.true.), 0.5_wp, field_space_t()), 100.0_wp, 1.0e-12_wp, &
                'no slip and no traction: a thousandth of the largest pressure')
     if (allocated(error)) return
-    call check(error, tangential_residual(q, ds, p, coulomb_t(0.0_wp), 0.5_wp, 1), 0.0_wp, 0.0_wp, 'any slip without friction')
+    call check(error, tangential_residual(q, ds, p, coulomb_t(0.0_wp), 0.5_wp, field_space_t()), 0.0_wp, 0.0_wp, &
+               'any slip without friction')
     if (allocated(error)) return
-    call check(error, tangential_residual(q, ds, 0.0_wp*p, coulomb_t(0.5_wp), 0.5_wp, 1), 0.0_wp, 0.0_wp, 'no contact')
+    call check(error, tangential_residual(q, ds, 0.0_wp*p, coulomb_t(0.5_wp), 0.5_wp, field_space_t()), 0.0_wp, 0.0_wp, &
+               'no contact')
   end subroutine test_residual_scales
 
   !> d_t = (lambda_1 + lambda_5/2) K1(0), K1(0) = (3 sqrt(3)/2) ln 3 spacings.
@@ -350,7 +353,7 @@ contains
     pair = elastic_pair_t(0.8_wp, 0.2_wp, 0.5_wp)
     call new_lattice(lattice, equilateral_basis(0.4_wp), [3, -2], [5, 6], error)
     if (allocated(error)) return
-    call new_operators(operators, lattice, pair, error, n_threads=1)
+    call new_operators(operators, lattice, pair, field_space_t(), error)
     if (allocated(error)) return
     call new_dense_flexibility(dense, lattice, pair, error)
     if (allocated(error)) return
@@ -418,7 +421,7 @@ contains
       n = side**2
       call new_lattice(lattice, equilateral_basis(2.0_wp/(side - 1)), [-side/2, -side/2], [side, side], error)
       if (allocated(error)) return
-      call new_operators(operators, lattice, pair, error, n_threads=1)
+      call new_operators(operators, lattice, pair, field_space_t(), error)
       if (allocated(error)) return
       if (allocated(x)) deallocate (x, y, unknown, image, rhs, none)
       allocate (x(side, side), y(side, side), unknown(2*n), image(2*n), rhs(2*n), none(2*n, 0))
@@ -427,7 +430,7 @@ contains
       ! compliances from nothing to that of the whole contact, as they grow across a slip zone
       system%compliance = reshape(2.0_wp*sqrt(x**2 + y**2)**3, [n])
       active = [reshape(x**2 + y**2 < 0.8_wp, [n]), spread(.false., 1, n)]
-      system%n_threads = 1
+      system%space = field_space_t()
       call system%weigh(active(:n))
       unknown = 0.0_wp
       image = 0.0_wp

@@ -2,6 +2,7 @@
 module test_friction_sweeps
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
+  use hc_field_space, only: field_space_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
   use hc_coulomb, only: coulomb_t
   use hc_elastic_operators, only: operators_t, new_operators
@@ -48,7 +49,7 @@ contains
 
     call new_sphere(contact, 10, 0.0_wp, 0.5_wp, coulomb_t(1.0_wp), error, n_threads=1)
     if (allocated(error)) return
-    call new_operators(operators, contact%problem%lattice, contact%problem%pair, error, n_threads=1)
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
     call now%begin(contact%problem, operators, state, state%relative_displacement, &

@@ -3,6 +3,7 @@ module test_lattice
   use hc_precision, only: wp
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_field_space, only: field_space_t
   use hc_transfer, only: prolong, restrict_field, restrict_mask
   use testing, only: test_t, new_test, check, check_raised, check_succeeded, check_true
   implicit none
@@ -106,7 +107,7 @@ contains
     field = 1.0_wp + 2.0_wp*x - 3.0_wp*y
     coarse = lattice%coarsened()
     coarse_field = restrict_field(lattice, field, coarse)
-    call prolong(coarse, coarse_field, lattice, back)
+    call prolong(coarse, coarse_field, lattice, back, field_space_t())
     call check(error, reshape(back, [99]), reshape(field, [99]), 100*thr, 'linear field')
     if (allocated(error)) return
     call check_true(error, count(restrict_mask(lattice, field > 0.0_wp, coarse)) == count(coarse_field > 0.0_wp), 'mask')
@@ -123,7 +124,7 @@ contains
     coarse = lattice%coarsened()
     coarse_hat = 0.0_wp
     coarse_hat(3, 3) = 1.0_wp
-    call prolong(coarse, coarse_hat, lattice, hat)
+    call prolong(coarse, coarse_hat, lattice, hat, field_space_t())
     call lattice%coordinates(x, y)
     call check(error, reshape(hat, [81]), reshape(merge(1.0_wp, merge(0.5_wp, 0.0_wp, hypot(x, y) < 1.1_wp), &
                hypot(x, y) < 0.1_wp), [81]), thr, 'height at the fine nodes')

@@ -3,6 +3,7 @@ module test_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_residuals, only: tangential_residual
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, rim_reached, &
@@ -393,7 +394,7 @@ contains
     associate (problem => contact%problem)
       call check(error, cut%residual_tangential, &
                  tangential_residual(cut%traction, cut%slip_increment, cut%pressure, problem%friction, &
-                                     problem%tangential_compliance, 1), 0.0_wp, 'residual of what is recorded')
+                                     problem%tangential_compliance, field_space_t()), 0.0_wp, 'residual of what is recorded')
     end associate
     if (allocated(error)) return
     call check_true(error, cut%converged .and. cut%residual_tangential > 1.0e-3_wp, 'a residual that is not hidden')

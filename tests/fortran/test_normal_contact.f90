@@ -4,6 +4,7 @@ module test_normal_contact
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
@@ -58,7 +59,7 @@ contains
       call new_lattice(lattice, basis, [0, 0], [12, 9], error)
       if (allocated(error)) return
       kernel = normal_kernel_t()
-      call kernel%cover(lattice)
+      call kernel%cover(lattice, field_space_t())
       basis = lattice%unit_basis()
       call new_pyramid(pyramid, basis)
       worst = 0.0_wp
@@ -105,8 +106,8 @@ contains
     allocate (edge, exact, mold=plain)
     p = hertz(coarse)
     exact = hertz(fine)
-    call prolong(coarse, p, fine, plain)
-    call prolong_edge(coarse, p, fine, edge)
+    call prolong(coarse, p, fine, plain, field_space_t())
+    call prolong_edge(coarse, p, fine, edge, field_space_t())
     call check_true(error, norm2(edge - exact) < norm2(plain - exact)/8.8_wp, 'the edge is found between nodes')
 
   contains
@@ -153,7 +154,7 @@ contains
     active = disc(n, 12.5_wp)
     active(3:5, 30:34) = .true.
     active(1, 1) = .true.
-    call new_edge_extension(edge, active, 2)
+    call new_edge_extension(edge, active, field_space_t(2))
     call random_number(x)
     call random_number(y)
     x = merge(x, 0.0_sp, active)
@@ -203,10 +204,11 @@ contains
     if (.not. allocated(error)) then
       call new_fft_flexibility(flexibility, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error, normal_only=.true.)
     end if
-    if (.not. allocated(error)) call new_preconditioner(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error)
+    if (allocated(error)) return
+    call new_preconditioner(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), field_space_t(), error)
     if (allocated(error)) return
     active = disc(n, 40.3_wp)
-    call new_edge_extension(edge, active, 2)
+    call new_edge_extension(edge, active, field_space_t(2))
     x = 0.0_wp
     r(:, :, 1) = merge(1.0_wp, 0.0_wp, active)
     do i = 1, n, 2
@@ -243,14 +245,14 @@ contains
 
     active = .false.
     active(3::5, 3::5) = .true.
-    call new_edge_extension(edge, active, 2)
+    call new_edge_extension(edge, active, field_space_t(2))
     field = reshape(merge(1.0_sp, 0.0_sp, active), [n*n])
     before = field
     call edge%extend(field)
     call check_true(error, all(abs(field - before) <= 0.0_sp), 'the field is as it was')
     if (allocated(error)) return
     active = .true.
-    call new_edge_extension(edge, active, 2)
+    call new_edge_extension(edge, active, field_space_t(2))
     field = 1.0_sp
     call edge%extend(field)
     call edge%fold(field)
@@ -322,7 +324,7 @@ contains
     if (allocated(error)) return
     allocate (candidate(150, 150), source=.true.)
     residual = normal_residual(state%pressure, gap + w(:, :, 1) - state%motion(normal), candidate, &
-                               normal_self_compliance(lattice, pair), 1)
+                               normal_self_compliance(lattice, pair), field_space_t())
     call check_true(error, state%converged, 'converged')
     if (allocated(error)) return
     call check(error, residual, state%residual_normal, 0.1_wp*tolerance, 'residual')

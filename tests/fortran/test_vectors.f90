@@ -1,18 +1,22 @@
-!> Long vectors and packed ones: whatever the number of threads, the same bits.
+!> Fields and packed ones: whatever the number of threads, the same bits.
 module test_vectors
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
+  use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
   use hc_coulomb, only: coulomb_t, linearize, on_cone
   use hc_friction_rows, only: cone_row, residual_row, soften_row, zone_row
   use hc_contact_state, only: separated
   use hc_active_set, only: packing_t, new_packing
-  use hc_vectors, only: add, add_columns, copy, dot, fill, maximum, total
   use testing, only: test_t, new_test, check, check_true, largest
+  !$ use omp_lib, only: omp_get_max_threads
   implicit none
   private
 
   public :: collect_vectors
+
+  !> One thread.
+  type(field_space_t), parameter :: alone = field_space_t()
 
 contains
 
@@ -21,7 +25,9 @@ contains
     type(test_t), allocatable, intent(out) :: tests(:)
 
     tests = [ &
-      new_test('vectors', test_sums), &
+      new_test('field_space', test_field_space), &
+      new_test('odd_fields', test_odd_fields), &
+      new_test('threads_of_windows', test_threads), &
       new_test('packing', test_packing), &
       new_test('rows_like_nodes', test_rows), &
       new_test('springs', test_springs), &
@@ -55,38 +61,95 @@ contains
     call check_true(error, any([(abs(a(i, i)) <= 0.0_wp, i=1, 3)]), 'dependent equations')
   end subroutine test_elimination
 
-  subroutine test_sums(error)
+  !> Sums, products and extrema do not depend on the number of threads, and are right.
+  subroutine test_field_space(error)
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 10001
-    real(wp) :: x(n), y(n), b(n, 2)
-    integer :: n_threads
+    type(field_space_t) :: space
+    real(wp) :: x(n), y(n), b(n, 2), window(73, 137)
+    integer :: i
 
     x = sample(n)
     b(:, 1) = x**2
     b(:, 2) = 1.0_wp - x
-    do n_threads = 1, 3
-      call check(error, total(x, n_threads), sum(x), 1.0e-12_wp, 'sum')
+    window = reshape(x, shape(window))
+    do i = 1, 3
+      space = field_space_t(threads=i)
+      call check(error, space%sum(x), sum(x), 1.0e-12_wp, 'sum')
       if (allocated(error)) return
-      call check_true(error, abs(total(x, n_threads) - total(x, 1)) <= 0.0_wp, 'the sum does not depend on threads')
+      call check(error, space%sum(window), sum(x), 1.0e-12_wp, 'sum over a window')
       if (allocated(error)) return
-      call check_true(error, abs(dot(x, b(:, 1), n_threads) - dot(x, b(:, 1), 1)) <= 0.0_wp, 'nor does a product')
+      call check_true(error, abs(space%sum(x) - alone%sum(x)) <= 0.0_wp, 'the sum does not depend on threads')
       if (allocated(error)) return
-      call check(error, dot(x, b(:, 1), n_threads), sum(x**3), 1.0e-12_wp, 'product')
+      call check_true(error, abs(space%sum(window) - alone%sum(window)) <= 0.0_wp, 'nor does that over a window')
       if (allocated(error)) return
-      call check(error, maximum(x, n_threads), maxval(x), 0.0_wp, 'largest')
+      call check_true(error, abs(space%dot(x, b(:, 1)) - alone%dot(x, b(:, 1))) <= 0.0_wp, 'nor does a product')
       if (allocated(error)) return
-      call check(error, maximum(-abs(x) - 1.0_wp, n_threads), -minval(abs(x)) - 1.0_wp, 0.0_wp, 'largest of negative numbers')
+      call check(error, space%dot(x, b(:, 1)), sum(x**3), 1.0e-12_wp, 'product')
       if (allocated(error)) return
-      call fill(y, 0.25_wp, n_threads)
-      call add(x, y, n_threads)
-      call add_columns(b, [2.0_wp, -3.0_wp], y, n_threads)
+      call check(error, largest(space%dots(b, x) - matmul(x, b)), 0.0_wp, 1.0e-10_wp, 'products')
+      if (allocated(error)) return
+      call check(error, space%max(x), maxval(x), 0.0_wp, 'largest')
+      if (allocated(error)) return
+      call check(error, space%max(-abs(x) - 1.0_wp), -minval(abs(x)) - 1.0_wp, 0.0_wp, 'largest of negative numbers')
+      if (allocated(error)) return
+      call check(error, space%max(-abs(window) - 1.0_wp), -minval(abs(window)) - 1.0_wp, 0.0_wp, 'the same over a window')
+      if (allocated(error)) return
+      call check_true(error, space%count(x > 0.2_wp) == count(x > 0.2_wp), 'number of nodes')
+      if (allocated(error)) return
+      call space%fill(y, 0.25_wp)
+      call space%add(x, y)
+      call space%add_columns(b, [2.0_wp, -3.0_wp], y)
       call check(error, largest(y - (0.25_wp + x + 2.0_wp*b(:, 1) - 3.0_wp*b(:, 2))), 0.0_wp, 1.0e-14_wp, 'combination')
       if (allocated(error)) return
-      call copy(x, y, n_threads)
+      call space%copy(x, y)
       call check(error, largest(y - x), 0.0_wp, 0.0_wp, 'copy')
       if (allocated(error)) return
     end do
-  end subroutine test_sums
+    y = [(real(i, wp), i=1, n)]
+    call check(error, space%dot(y, y), 10001.0_wp*10002.0_wp*20003.0_wp/6.0_wp, 1.0e-3_wp, 'sum of squares')
+  end subroutine test_field_space
+
+  !> Sums of fields in single precision lose nothing that double precision has; fields without nodes have sums, too.
+  subroutine test_odd_fields(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(sp) :: field(300, 2)
+    real(wp) :: none(0), no_window(0, 3), no_columns(4, 0)
+
+    field = 1.0_sp
+    field(1, :) = 1.0e9_sp
+    call check(error, alone%sum(field), 2.0e9_wp + 598.0_wp, 0.0_wp, 'single precision')
+    if (allocated(error)) return
+    call check(error, [alone%sum(none), alone%sum(no_window), alone%dot(none, none)], spread(0.0_wp, 1, 3), 0.0_wp, 'nothing')
+    if (allocated(error)) return
+    call check_true(error, max(alone%max(none), alone%max(no_window)) <= -huge(1.0_wp), 'largest of nothing')
+    if (allocated(error)) return
+    call check_true(error, alone%count(none > 0.0_wp) == 0, 'no nodes')
+    if (allocated(error)) return
+    call check_true(error, size(alone%dots(no_columns, [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp])) == 0, 'no products')
+  end subroutine test_odd_fields
+
+  !> A number of threads that is asked for is taken; else small fields have one.
+  subroutine test_threads(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(field_space_t) :: space
+    integer :: three
+
+    three = 1
+    !$ three = 3
+    space = space_over([4, 5], 3)
+    call check_true(error, space%threads == three, 'as many as asked for')
+    if (allocated(error)) return
+    call check_true(error, space%threads_for(20) == 1 .and. space%threads_for(10**6) == three, 'one for a small field')
+    if (allocated(error)) return
+    space = space_over([4, 5], 0)
+    call check_true(error, space%threads == 1, 'one for a small window')
+    if (allocated(error)) return
+    three = 1
+    !$ three = min(omp_get_max_threads(), most_threads)
+    space = space_over([400, 500])
+    call check_true(error, space%threads == three, 'as many as OpenMP would take')
+  end subroutine test_threads
 
   !> Runs that begin and end anywhere, also across the blocks that threads look through.
   subroutine test_packing(error)
@@ -96,7 +159,7 @@ contains
     logical :: active(n)
     real(wp) :: x(n), back(n)
     real(wp), allocatable :: packed(:)
-    integer :: pattern, n_threads
+    integer :: pattern, threads
 
     x = sample(n)
     do pattern = 1, 5
@@ -116,8 +179,8 @@ contains
         active = .false.
         active([1, 8192, 8193, 16384, n]) = .true.
       end select
-      do n_threads = 1, 2
-        call new_packing(packing, active, n_threads)
+      do threads = 1, 2
+        call new_packing(packing, active, field_space_t(threads))
         call check_true(error, packing%n_active == count(active), 'number of active nodes')
         if (allocated(error)) return
         call check_true(error, sum(packing%last - packing%first + 1) == count(active), 'length of the runs')

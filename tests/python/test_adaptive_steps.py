@@ -12,7 +12,7 @@ from rich.console import Console
 from hexcontact import Case, ConvergenceError, DeckError
 from hexcontact.cli import tables as summary
 from hexcontact.deck.schema import deck_schema
-from hexcontact.result import history, remarks
+from hexcontact.result import history
 from hexcontact.result.history import describe
 from hexcontact.result.result import Result, Step
 from hexcontact.result.store import Journal, journal_of, open_result
@@ -273,11 +273,11 @@ def test_a_tolerance_that_is_missed_is_told() -> None:
         case.run(on_step=on_step)
     last, number = histories[-1], len(histories)
     assert last["stick_area_step_error"] > 1e-4 * last["contact_area_fit"]
-    assert remarks.limited_steps(histories, 1e-4) == (
+    assert history.limited_steps(histories, 1e-4) == (
         f"1 of {number} load steps change more by halving than solver.step_tolerance = 0.0001, and smaller "
         f"ones did not help: step {number}; their stick_area_step_error holds"
     )
-    assert remarks.limited_steps(histories[:-1], 1e-4) == ""
+    assert history.limited_steps(histories[:-1], 1e-4) == ""
 
 
 def test_a_step_that_does_not_converge_is_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:

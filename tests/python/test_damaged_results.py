@@ -11,7 +11,7 @@ import xarray
 from fuzz.file_made import WINDOW, made_step, written
 
 from hexcontact.errors import DeckError
-from hexcontact.result.record import read_record, write_record
+from hexcontact.result.journal import read_record, write_record
 from hexcontact.result.result import Metadata, assemble
 from hexcontact.result.store import Store, journal_of, open_result
 from hexcontact.result.trials import TrialFolder

@@ -10,7 +10,7 @@ from hexcontact.core.edges import ContactEdges
 from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch
-from hexcontact.result.pressure_field import PressureField, linear
+from hexcontact.pressure_field import PressureField, linear
 
 RIGID_PARTNER = ElasticPair.from_materials(1.0, 0.0, None, None)  # E* = 1
 RADIUS = 50.0  # of spheres

@@ -83,7 +83,7 @@ def test_a_complete_run_exits_with_0_whatever_comes(
     words = [sys.executable, "-c", LATE, str(int(sent)), command, name, "--plot", "-q", "--json"]
     done = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert done.stderr.split() == ["write", "remove", "close", "close", "overview", "tell", "write"]
+    assert done.stderr.split() == ["write", "remove", "close", "close", "overview", "conclude", "write"]
     assert open_result(out).complete
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.nc", "sphere.png", "sphere.toml"]
 

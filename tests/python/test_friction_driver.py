@@ -29,7 +29,7 @@ from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
 from hexcontact.problem.loads import LoadStep, Target
-from hexcontact.result import history, remarks
+from hexcontact.result import history
 from hexcontact.result.history import describe
 from hexcontact.result.result import Result, Step
 from hexcontact.result.store import Journal, journal_of, open_result
@@ -565,7 +565,7 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
     [warning] = warned.list
     expected = "contact and did not converge as a whole" if in_parts else "solutions for smaller loads"
     assert str(warning.message).startswith("step 1 ") and expected in str(warning.message)
-    told = remarks.remarks(result.history.reset_index().to_dict("records"), result.dataset.attrs)
+    told = history.remarks(result.history.reset_index().to_dict("records"), result.dataset.attrs)
     assert told[0] == str(warning.message)
     assert told[1].startswith("1 of 2 load steps did not converge at once: step 1 (halved 2 times); ")
     assert told[1].endswith("up to 4.7e-02" if in_parts else "fulfil the conditions all the same")
@@ -596,7 +596,7 @@ def test_a_first_step_does_not_depend_on_the_window() -> None:
 
 def test_steps_that_were_not_halved_are_not_mentioned() -> None:
     result = sphere().run()
-    assert remarks.remarks(result.history.to_dict("records"), result.dataset.attrs) == []
+    assert history.remarks(result.history.to_dict("records"), result.dataset.attrs) == []
     assert "halved" not in describe(result.history.iloc[0].to_dict())
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from hexcontact import DeckError
-from hexcontact.result.lock import Lock
+from hexcontact.lock import Lock
 from hexcontact.result.result import Metadata
 from hexcontact.result.store import Store, journal_of
 

@@ -163,7 +163,7 @@ def test_nobody_hears_it_who_does_not_listen(tmp_path: Path) -> None:
         "import hexcontact\n"
         f"case = hexcontact.Case.from_text({DECK!r})\n"
         "case.run()\n"
-        "from hexcontact import log\n"
+        "from hexcontact.solve import log\n"
         "log.logger.error('an error')\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment())

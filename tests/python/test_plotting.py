@@ -23,7 +23,7 @@ HEIGHT = np.sqrt(0.75)
 
 
 def made(gap, pressures, loads, spacing=0.1, half=16, modulus=2.0, **attributes) -> xarray.Dataset:
-    """Lay a result out as `hexcontact.result.result.assemble` does; gap and pressures are of (x, y)."""
+    """Lay a result out as `layout.assemble` does; gap and pressures are functions of (x, y)."""
     index = np.arange(-half, half + 1)
     row, col = np.meshgrid(index, index, indexing="ij")
     x, y = spacing * (col + 0.5 * row), spacing * HEIGHT * row

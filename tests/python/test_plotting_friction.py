@@ -1,7 +1,7 @@
 """Pictures of results with friction: what they show is what the result says.
 
-The results here are laid out by `hexcontact.result.result.assemble` from closed solutions: spheres with
-E* = 2, gamma = 0.4, mu = 0.3, pressed by P = 0.8 and sheared or twisted.
+The results here are laid out by `layout.assemble` from closed solutions: spheres with E* = 2,
+gamma = 0.4, mu = 0.3, pressed by P = 0.8 and sheared or twisted.
 """
 
 from collections.abc import Callable, Sequence
@@ -417,7 +417,7 @@ def test_tractions_along_an_oblique_line_through_a_point() -> None:
     x, y = through[0] + s * np.cos(angle), through[1] + s * np.sin(angle)
     expected = (0.1 + 0.05 * x) * np.cos(angle) - 0.02 * y * np.sin(angle)
     np.testing.assert_allclose(q_along, expected, atol=1e-9)  # the field is linear, and so is what is drawn
-    assert lower.get_xlabel() == "distance from (100, -200) mm along 20° (mm)"
+    assert lower.get_xlabel() == "distance from (100, -200) mm along 20° (m)"
 
 
 def test_a_family_of_tractions() -> None:

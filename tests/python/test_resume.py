@@ -19,7 +19,7 @@ import hexcontact
 from hexcontact import Case, ConvergenceError, DeckError, ResourceError
 from hexcontact.core import contact as native
 from hexcontact.result import store as store_module
-from hexcontact.result.record import read_record, write_record
+from hexcontact.result.journal import read_record, write_record
 from hexcontact.result.result import Metadata, Step
 from hexcontact.result.store import Journal, Store, journal_of, open_result
 
@@ -384,7 +384,7 @@ def test_a_process_number_that_was_given_again_holds_no_lock(
 
     out = tmp_path / "out.nc"
     stopped(made(), out, 2)
-    monkeypatch.setattr("hexcontact.result.lock.fcntl.flock", unsupported)
+    monkeypatch.setattr("hexcontact.lock.fcntl.flock", unsupported)
     holder = {"process": os.getpid(), "host": os.uname().nodename, "since": "2026-01-01 00:00:00"}
     (journal_of(out) / "lock").write_text(json.dumps({**holder, "time": 2e9}))
     with pytest.raises(DeckError, match="is being written by another run"):

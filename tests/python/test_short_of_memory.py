@@ -113,7 +113,7 @@ def test_run_that_finds_no_memory_any_more_goes_on_later(tmp_path: Path) -> None
 def test_limits_of_the_process_bound_what_is_available(limit: str) -> None:
     code = f"""
 import resource, psutil
-from hexcontact import memory
+from hexcontact.core import memory
 plenty = memory.available()
 info = psutil.Process().memory_info()
 taken = info.vms if {limit!r} == "RLIMIT_AS" else info.data

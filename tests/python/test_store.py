@@ -23,12 +23,12 @@ import xarray
 from fuzz.file_made import WINDOW, made_step, written
 from numpy.testing import assert_array_equal
 
+from hexcontact import lock as lock_module
 from hexcontact.errors import DeckError, ResourceError
+from hexcontact.lock import Lock
 from hexcontact.result import journal as journal_module
-from hexcontact.result import lock as lock_module
 from hexcontact.result import store as store_module
-from hexcontact.result.lock import Lock
-from hexcontact.result.record import read_record
+from hexcontact.result.journal import read_record
 from hexcontact.result.result import Metadata, Step, assemble
 from hexcontact.result.store import Journal, Store, journal_of, open_result
 

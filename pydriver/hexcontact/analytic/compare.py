@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import DeckError
 from ..text import html_table, quantity, rich_table, text_table
-from ..variables import VARIABLES
+from ..variables import VARIABLES, spelled
 from .recognise import Exact, closed_solutions
 
 if TYPE_CHECKING:
@@ -84,10 +84,6 @@ class Comparison(Sequence[Entry]):
         """Return the number of lines."""
         return len(self.entries)
 
-    def __iter__(self) -> Iterator[Entry]:
-        """Go through the lines."""
-        return iter(self.entries)
-
     @property
     def largest_error(self) -> float:
         """Largest of the errors; NaN if there is nothing to compare with."""
@@ -97,19 +93,16 @@ class Comparison(Sequence[Entry]):
         """Return the table: quantity, solution, unit, exact, computed, error."""
         import pandas
 
-        rows = [
-            (e.quantity, e.solution, VARIABLES[e.quantity].units, e.exact, e.computed, e.error) for e in self
-        ]
-        return pandas.DataFrame(
-            rows, columns=["quantity", "solution", "unit", "exact", "computed", "error"]
-        ).set_index("quantity")
+        table = pandas.DataFrame(self.entries, columns=[entry.name for entry in fields(Entry)])
+        table.insert(2, "unit", [VARIABLES[name].units for name in table["quantity"]])
+        return table.set_index("quantity")
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [
             (
-                entry.quantity.replace("_", " "),
+                spelled(entry.quantity),
                 entry.solution,
-                *(_shown(value, VARIABLES[entry.quantity].units) for value in (entry.exact, entry.computed)),
+                *(quantity(v, VARIABLES[entry.quantity].unit, 6) for v in (entry.exact, entry.computed)),
                 f"{100 * entry.error:.3f} % rms"
                 if math.isnan(entry.exact)
                 else f"{100 * entry.error:+.3f} %",
@@ -134,10 +127,6 @@ class Comparison(Sequence[Entry]):
 
     def _repr_html_(self) -> str:
         return html_table(self._title, _HEADERS if self.entries else (), self._rows(), self.note)
-
-
-def _shown(value: float, unit: str) -> str:
-    return quantity(value, "" if unit == "1" else unit, 6)
 
 
 # --- comparing ----------------------------------------------------------------------------------------------

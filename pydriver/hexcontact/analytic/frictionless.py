@@ -1,4 +1,4 @@
-"""Frictionless contacts with a closed solution: what the solver is checked against.
+"""Frictionless axisymmetric contacts with a closed solution: what the solver is checked against.
 
 Two elastic half-spaces touch with an undeformed separation ``h``; the materials enter through the effective
 modulus E* only, 1/E* = (1-nu_1^2)/E_1 + (1-nu_2^2)/E_2.  All quantities are SI (or any consistent set).
@@ -8,7 +8,8 @@ The axisymmetric solutions come from one theorem (Galin, Sneddon): with
 
     P = 2 E* integral_0^a (delta(a) - delta(t)) dt,     p(r) = E*/pi integral_r^a delta'(t)/sqrt(t^2-r^2) dt.
 
-The solutions with friction are in :mod:`hexcontact.analytic.friction`.
+Contacts over an ellipse are in :mod:`hexcontact.analytic.elliptic`, those with friction in
+:mod:`hexcontact.analytic.friction`.
 """
 
 from __future__ import annotations
@@ -69,53 +70,21 @@ class AxisymmetricContact:
         return p
 
 
-@dataclass(frozen=True)
-class EllipticContact:
-    """Hertz contact over an ellipse; returned by `hertz_ellipse` and `crossed_cylinders`.
-
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    semi_major, semi_minor : float
-        Semi-axes a >= b, m.
-    angle : float
-        Direction of the major axis from x, rad, in (-pi/2, pi/2].
-    approach, normal_load, max_pressure : float
-        delta (m), P (N), p0 (Pa).
-    """
-
-    effective_modulus: float
-    semi_major: float
-    semi_minor: float
-    angle: float
-    approach: float
-    normal_load: float
-    max_pressure: float
-
-    def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Contact pressure (Pa) at the points (x, y) (m, broadcast); 0 outside the contact."""
-        x, y = reals(x, "x"), reals(y, "y")
-        along = x * np.cos(self.angle) + y * np.sin(self.angle)
-        across = y * np.cos(self.angle) - x * np.sin(self.angle)
-        inside = 1.0 - (along / self.semi_major) ** 2 - (across / self.semi_minor) ** 2
-        return np.asarray(self.max_pressure * np.sqrt(np.maximum(inside, 0.0)))
-
-
-def _positive(**values: float) -> None:
+def require_positive(**values: float) -> None:
+    """Refuse values that are not positive numbers, by their names."""
     for name, value in values.items():
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} is {value!r}; expected a positive number")
 
 
-def _one_of(given: Given, with_radius: bool = True) -> tuple[str, float]:
-    """Name and value of the one quantity that was given."""
+def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
+    """Return name and value of the one quantity that was given."""
     names = ("normal_load", "approach", "contact_radius")[: 3 if with_radius else 2]
     if len(given) != 1 or not set(given) <= set(names):
         raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
     [(name, value)] = given.items()
     found = number(value, name, "a positive number")
-    _positive(**{name: found})
+    require_positive(**{name: found})
     return name, found
 
 
@@ -145,11 +114,11 @@ def power_law(
     -------
     AxisymmetricContact
     """
-    _positive(effective_modulus=effective_modulus, coefficient=coefficient)
+    require_positive(effective_modulus=effective_modulus, coefficient=coefficient)
     n = float(exponent)
     if not (np.isfinite(n) and n >= 1.0):
         raise ValueError(f"exponent is {exponent!r}; expected a number of at least 1")
-    name, value = _one_of(given)
+    name, value = driven_by(given)
     log_gamma = scipy.special.gammaln
     c = np.sqrt(np.pi) * np.exp(log_gamma(n / 2 + 1) - log_gamma(n / 2 + 0.5)) * coefficient
     load_factor = 2.0 * effective_modulus * n / (n + 1.0)  # P = load_factor * delta * a
@@ -191,7 +160,7 @@ def hertz_sphere(effective_modulus: float, radius: float, **given: Unpack[Given]
     -------
     AxisymmetricContact
     """
-    _positive(radius=radius)
+    require_positive(radius=radius)
     return power_law(effective_modulus, 0.5 / radius, 2.0, **given)
 
 
@@ -233,8 +202,8 @@ def flat_punch(effective_modulus: float, radius: float, **given: Unpack[Given]) 
     -------
     AxisymmetricContact
     """
-    _positive(effective_modulus=effective_modulus, radius=radius)
-    name, value = _one_of(given, with_radius=False)
+    require_positive(effective_modulus=effective_modulus, radius=radius)
+    name, value = driven_by(given, with_radius=False)
     stiffness = 2.0 * effective_modulus * radius
     load = value if name == "normal_load" else stiffness * value
 
@@ -267,7 +236,7 @@ def rounded_punch(
     -------
     AxisymmetricContact
     """
-    _positive(effective_modulus=effective_modulus, flat_radius=flat_radius, edge_radius=edge_radius)
+    require_positive(effective_modulus=effective_modulus, flat_radius=flat_radius, edge_radius=edge_radius)
     b, radius = flat_radius, edge_radius
 
     def leg(t: Array) -> Array:
@@ -281,7 +250,7 @@ def rounded_punch(
         t = np.maximum(t, b)
         return np.asarray((2.0 * leg(t) - b * np.arctan2(leg(t), b)) / radius)
 
-    return _solve_profile(effective_modulus, delta, rate, _one_of(given), smallest=b)
+    return _solve_profile(effective_modulus, delta, rate, driven_by(given), smallest=b)
 
 
 def axisymmetric(
@@ -309,7 +278,7 @@ def axisymmetric(
     -------
     AxisymmetricContact
     """
-    _positive(effective_modulus=effective_modulus, scale=scale)
+    require_positive(effective_modulus=effective_modulus, scale=scale)
     node, weight = _gauss(64)
     sine = np.sin(np.pi / 2 * node)  # r = t sin(theta), theta = pi/2 * node
 
@@ -321,7 +290,7 @@ def axisymmetric(
         r = np.asarray(t, dtype=float)[..., None] * sine
         return np.asarray(np.pi / 2 * np.sum(weight * (slope(r) + r * curvature(r)), axis=-1))
 
-    return _solve_profile(effective_modulus, delta, rate, _one_of(given), start=scale)
+    return _solve_profile(effective_modulus, delta, rate, driven_by(given), start=scale)
 
 
 def _gauss(n: int) -> tuple[Array, Array]:
@@ -387,97 +356,3 @@ def _maximum(pressure: Profile, first: float, last: float) -> float:
         options={"xatol": 1e-8 * last},
     )
     return -float(found.fun)
-
-
-# ----------------------------------------------------------------------------------- ellipses
-
-
-def hertz_ellipse(effective_modulus: float, hessian: ArrayLike, **given: Unpack[Given]) -> EllipticContact:
-    """Solve Hertz's contact with the separation h = (x, y) H (x, y)^T / 2.
-
-    The complete elliptic integrals (parameter m = e^2 = 1 - b^2/a^2) enter in Carlson's symmetric form,
-    K = R_F(0, 1-m, 1), (K-E)/m = R_D(0, 1-m, 1)/3, (E-(1-m)K)/m = (1-m) R_D(0, 1, 1-m)/3, which keeps all
-    digits for nearly circular and for very slender ellipses.
-
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    hessian : array_like
-        H, the symmetric 2x2 tensor of second derivatives of h (1/m), positive definite.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``.
-
-    Returns
-    -------
-    EllipticContact
-    """
-    _positive(effective_modulus=effective_modulus)
-    tensor = reals(hessian, "hessian")
-    if tensor.shape != (2, 2) or not np.allclose(
-        tensor, tensor.T, rtol=0.0, atol=1e-12 * np.abs(tensor).max()
-    ):
-        raise ValueError("hessian is not a symmetric 2x2 tensor")
-    name, value = _one_of(given, with_radius=False)
-    (small, large), axes = np.linalg.eigh(tensor)
-    if small <= 1e-12 * large:
-        raise ValueError(
-            "the gap does not close into an ellipse: hessian is not positive definite (line contact)"
-        )
-
-    def axis_ratio_error(log_ratio: float) -> float:
-        m1 = np.exp(2.0 * log_ratio)  # (b/a)^2
-        ratio = scipy.special.elliprd(0, m1, 1) / scipy.special.elliprd(0, 1, m1)
-        return float(np.log(ratio) - np.log(small / large))
-
-    m1, k, d = 1.0, np.pi / 2, 0.75 * np.pi  # a circle, with which scipy need not be loaded
-    if small < large * (1 - 1e-15):  # (A/B) lies between (b/a)^2 and b/a
-        lowest = np.log(small / large) - 1e-9
-        m1 = min(np.exp(scipy.optimize.brentq(axis_ratio_error, lowest, 1e-9, xtol=1e-15)), 1.0) ** 2
-        k, d = scipy.special.elliprf(0, m1, 1), scipy.special.elliprd(0, m1, 1)
-    if name == "normal_load":
-        a = (value * d / (np.pi * effective_modulus * small)) ** (1.0 / 3.0)  # A = small/2
-    else:
-        a = np.sqrt(2.0 * value * d / (3.0 * k * small))
-    load = np.pi * effective_modulus * small * a**3 / d
-    delta = 1.5 * load * k / (np.pi * effective_modulus * a)
-    angle = np.arctan2(axes[1, 0], axes[0, 0]) if m1 < 1.0 else 0.0
-    angle = np.pi / 2 - (np.pi / 2 - angle) % np.pi  # an axis has no sense: (-pi/2, pi/2]
-    b = a * np.sqrt(m1)
-    return EllipticContact(
-        effective_modulus,
-        float(a),
-        float(b),
-        float(angle),
-        float(delta),
-        float(load),
-        float(1.5 * load / (np.pi * a * b)),
-    )
-
-
-def crossed_cylinders(
-    effective_modulus: float, radius_1: float, radius_2: float, angle: float, **given: Unpack[Given]
-) -> EllipticContact:
-    """Solve the contact of two cylinders, the first with its axis along x, the second turned by ``angle``.
-
-    Parameters
-    ----------
-    effective_modulus : float
-        E*, Pa.
-    radius_1, radius_2 : float
-        Radii, m.
-    angle : float
-        From the axis of cylinder 1 (the x axis) to that of cylinder 2, rad; not a multiple of pi.
-    **given
-        `Given`: exactly one of ``normal_load``, ``approach``.
-
-    Returns
-    -------
-    EllipticContact
-        Its ``angle`` is that of the major axis from the axis of cylinder 1.
-    """
-    _positive(radius_1=radius_1, radius_2=radius_2)
-    across_1 = np.array([0.0, 1.0])
-    across_2 = np.array([-np.sin(angle), np.cos(angle)])
-    hessian = np.outer(across_1, across_1) / radius_1 + np.outer(across_2, across_2) / radius_2
-    return hertz_ellipse(effective_modulus, hessian, **given)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .frictionless import EllipticContact, hertz_ellipse
+from .elliptic import EllipticContact, hertz_ellipse
 
 if TYPE_CHECKING:
     import xarray
@@ -16,6 +18,31 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SIMILAR = 1e-9  # |beta| of bodies whose pressure is that of the contact without friction
+
+
+def attribute_of(attributes: Mapping[Any, Any], name: str, default: float = math.nan) -> float:
+    """Return a number among the attributes of a result."""
+    return float(attributes.get(name, default))
+
+
+def friction_of(attributes: Mapping[Any, Any]) -> float:
+    """Return the coefficient of friction of a result by its attributes; 0 for one without friction."""
+    if attributes.get("algorithm", "frictionless") == "frictionless":
+        return 0.0
+    return attribute_of(attributes, "friction_coefficient", 0.0)
+
+
+def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
+    """Tell whether the pressure of a result is that of a contact without friction.
+
+    It is where there is none, where the bodies are similar (beta = 0), and where shear is not let move it
+    (Goodman's coupling).
+    """
+    return (
+        friction_of(attributes) == 0.0
+        or abs(attribute_of(attributes, "dundurs_beta")) <= SIMILAR
+        or attributes.get("coupling") == "goodman"
+    )
 
 
 @dataclass(frozen=True)

@@ -17,20 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deck.tables import Deck
-from . import friction, frictionless
-from .hertz_gap import SIMILAR, QuadraticGap
-from .shear import CIRCULAR, ClosedForms, superposed
+from . import friction
+from .frictionless import AxisymmetricContact, cone, flat_punch, power_law, rounded_punch
+from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of, pressure_is_frictionless
+from .shear import ClosedForms, is_circular, superposed
 
 if TYPE_CHECKING:
     import xarray
 
     from ..deck.surfaces import Surface
-    from .frictionless import AxisymmetricContact
 
 Array = NDArray[np.float64]
 
 _STEADY = 1e-6  # share of the sliding load, or of a motion, that counts as none
-_NAMES = {"cone": "Sneddon", "power": "Sneddon", "punch": "Sneddon", "rounded_punch": "Sneddon, Galin"}
 
 
 @dataclass(frozen=True)
@@ -80,31 +79,11 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
         from_python = 'shape = "python"' in str(dataset.attrs.get("deck", ""))
         note = "the gap was given in Python; the solutions are those of its values at the nodes"
         return known, note if from_python else ""
-    if _pressure_is_frictionless(so_far):
+    if pressure_is_frictionless(so_far.attrs):
         return [], "no closed solution is known for these surfaces"
     return [], (
         "no closed solution is known for dissimilar bodies with friction under these loads; there are some "
         "for similar bodies, for pressing without slip, and for pressing with solver.coupling = goodman"
-    )
-
-
-def _attribute(dataset: xarray.Dataset, name: str, default: float = math.nan) -> float:
-    return float(dataset.attrs.get(name, default))
-
-
-def _frictional(dataset: xarray.Dataset) -> bool:
-    return dataset.attrs.get("algorithm", "frictionless") != "frictionless"
-
-
-def _friction(dataset: xarray.Dataset) -> float:
-    return _attribute(dataset, "friction_coefficient", 0.0) if _frictional(dataset) else 0.0
-
-
-def _pressure_is_frictionless(dataset: xarray.Dataset) -> bool:
-    return (
-        _friction(dataset) == 0.0
-        or abs(_attribute(dataset, "dundurs_beta")) <= SIMILAR
-        or dataset.attrs.get("coupling") == "goodman"
     )
 
 
@@ -113,38 +92,75 @@ def _pressure_is_frictionless(dataset: xarray.Dataset) -> bool:
 
 def _normal(dataset: xarray.Dataset, load: float) -> list[Exact]:
     """Return the contact without friction: Hertz where the gap is a quadratic form, else by its shape."""
-    if not _pressure_is_frictionless(dataset):
+    if not pressure_is_frictionless(dataset.attrs):
         return []
-    without_friction = _friction(dataset) == 0.0  # else shear stores energy, too
+    without_friction = friction_of(dataset.attrs) == 0.0  # else shear stores energy, too
     gap = QuadraticGap.of(dataset)
     if gap is not None:
         hertz = gap.contact(load)
-        radius = math.sqrt(hertz.semi_major * hertz.semi_minor)
-        values = {
-            "max_pressure": hertz.max_pressure,
-            "approach": hertz.approach,
-            "contact_radius_fit": radius,
-        }
+        values = {"max_pressure": hertz.max_pressure, "approach": hertz.approach}
+        values["contact_radius_fit"] = hertz.radius
         if without_friction:
             values["elastic_energy"] = 0.4 * load * hertz.approach
         x0, y0 = gap.center
         fields = {"pressure": lambda x, y: hertz.pressure(x - x0, y - y0)}
         return [Exact("Hertz", values, fields, {"pressure": hertz.max_pressure})]
     surface = _only_surface(dataset)
-    if surface is None or surface.shape not in _NAMES:
+    shape = _SHAPES.get(surface.shape) if surface is not None else None
+    if surface is None or shape is None:
         return []
-    contact, energy = _axisymmetric(surface, _attribute(dataset, "effective_modulus"), load)
-    values = {"approach": contact.approach}
-    if surface.shape != "punch":
+    contact = shape.contact(surface, attribute_of(dataset.attrs, "effective_modulus"), load)
+    values = {"max_pressure": contact.max_pressure, "approach": contact.approach}
+    if not shape.rim:
         values["contact_radius_fit"] = contact.contact_radius
-    if without_friction and energy:
+    if without_friction and (energy := shape.energy(surface)):
         values["elastic_energy"] = energy * load * contact.approach
-    fields = {}
-    if math.isfinite(contact.max_pressure):
-        values = {"max_pressure": contact.max_pressure, **values}
-        x0, y0 = surface.offset
-        fields["pressure"] = lambda x, y: contact.pressure(np.hypot(x - x0, y - y0))
-    return [Exact(_NAMES[surface.shape], values, fields, {"pressure": contact.max_pressure})]
+    if not math.isfinite(values["max_pressure"]):
+        del values["max_pressure"]
+        return [Exact(shape.name, values)]
+    x0, y0 = surface.offset
+    fields = {"pressure": lambda x, y: contact.pressure(np.hypot(x - x0, y - y0))}
+    return [Exact(shape.name, values, fields, {"pressure": contact.max_pressure})]
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A surface of revolution with a closed solution.
+
+    Attributes
+    ----------
+    name : str
+        Whose solution it is.
+    contact : callable
+        The contact of a surface of this shape with an effective modulus (Pa) under a load (N).
+    energy : callable
+        Its elastic energy over load times approach; 0: unknown.
+    rim : bool
+        Whether the contact ends at a sharp rim.
+    """
+
+    name: str
+    contact: Callable[[Any, float, float], AxisymmetricContact]
+    energy: Callable[[Any], float]
+    rim: bool = False
+
+
+_SHAPES = {
+    "cone": _Shape("Sneddon", lambda s, e, p: cone(e, s.slope, normal_load=p), lambda s: 1.0 / 3.0),
+    "power": _Shape(
+        "Sneddon",
+        lambda s, e, p: power_law(e, s.coefficient, s.exponent, normal_load=p),
+        lambda s: s.exponent / (2.0 * s.exponent + 1.0),  # P ~ approach^(1 + 1/n)
+    ),
+    "punch": _Shape(
+        "Sneddon", lambda s, e, p: flat_punch(e, s.radius, normal_load=p), lambda s: 0.5, rim=True
+    ),
+    "rounded_punch": _Shape(
+        "Sneddon, Galin",
+        lambda s, e, p: rounded_punch(e, s.flat_radius, s.edge_radius, normal_load=p),
+        lambda s: 0.0,
+    ),
+}
 
 
 def _only_surface(dataset: xarray.Dataset) -> Surface | None:
@@ -156,20 +172,6 @@ def _only_surface(dataset: xarray.Dataset) -> Surface | None:
         return None
     curved = [s for s in (bodies.body_1.surface, bodies.body_2.surface) if s.shape != "flat"]
     return curved[0] if len(curved) == 1 else None
-
-
-def _axisymmetric(surface: Any, modulus: float, load: float) -> tuple[AxisymmetricContact, float]:
-    """Return the contact under a load, and its elastic energy over load times approach (0: unknown)."""
-    if surface.shape == "cone":
-        return frictionless.cone(modulus, surface.slope, normal_load=load), 1.0 / 3.0
-    if surface.shape == "power":
-        n = surface.exponent
-        found = frictionless.power_law(modulus, surface.coefficient, n, normal_load=load)
-        return found, n / (2.0 * n + 1.0)  # P ~ approach^(1 + 1/n)
-    if surface.shape == "punch":
-        return frictionless.flat_punch(modulus, surface.radius, normal_load=load), 0.5
-    found = frictionless.rounded_punch(modulus, surface.flat_radius, surface.edge_radius, normal_load=load)
-    return found, 0.0
 
 
 # --- similar bodies, sheared or twisted ---------------------------------------------------------------------
@@ -185,24 +187,24 @@ def _shear(dataset: xarray.Dataset, number: int) -> list[Exact]:
     sliding = slip.contact.sliding_load
     if abs(slip.turns[-1]) < (1.0 - _STEADY) * sliding:
         values["stick_radius_fit"] = slip.stick_ratio * radius
-        if slip.ellipse.semi_minor >= CIRCULAR * slip.ellipse.semi_major:
+        if is_circular(slip.ellipse):
             shift = float(superposed(slip.contact.shift, slip.turns))
             along = {"shift_x": shift * slip.direction[0], "shift_y": shift * slip.direction[1]}
             values |= {name: value for name, value in along.items() if abs(value) > 1e-9 * abs(shift)}
-    fields: dict[str, Callable[[Array, Array], Array]] = {}
-    if abs(slip.direction[0]) > 1e-9:
-        fields["traction_x"] = lambda x, y: slip.traction(x, y)[0]
-    if abs(slip.direction[1]) > 1e-9:
-        fields["traction_y"] = lambda x, y: slip.traction(x, y)[1]
+
+    def component(axis: int) -> Callable[[Array, Array], Array]:
+        return lambda x, y: slip.traction(x, y)[axis]
+
+    fields = {f"traction_{'xy'[k]}": component(k) for k in (0, 1) if abs(slip.direction[k]) > 1e-9}
     scale = slip.contact.friction_coefficient * slip.ellipse.max_pressure
     return [Exact(slip.name, values, fields, dict.fromkeys(fields, scale))]
 
 
 def _torsion(dataset: xarray.Dataset, number: int) -> list[Exact]:
     """Return Lubkin's twist, if the torque up to this step has it and the contact does not slide."""
-    loop = ClosedForms(dataset).torsion(number) if "torque" in dataset else None
     torque = float(dataset["torque"][-1]) if "torque" in dataset else 0.0
-    if loop is None or not torque or abs(loop[1][-1] - torque) > _STEADY * abs(torque):
+    loop = ClosedForms(dataset).torsion(number) if torque else None
+    if loop is None or abs(loop[1][-1] - torque) > _STEADY * abs(torque):
         return []
     return [Exact("Lubkin", {"twist": float(loop[0][-1])})]
 
@@ -212,28 +214,28 @@ def _torsion(dataset: xarray.Dataset, number: int) -> list[Exact]:
 
 def _dissimilar(dataset: xarray.Dataset, load: float) -> list[Exact]:
     """Return what is known of bodies of different moduli that are pressed, ever more, and not sheared."""
-    beta, mu = _attribute(dataset, "dundurs_beta"), _friction(dataset)
+    beta, mu = attribute_of(dataset.attrs, "dundurs_beta"), friction_of(dataset.attrs)
     goodman = dataset.attrs.get("coupling") == "goodman"
     if mu == 0.0 or abs(beta) <= SIMILAR or not _pressed_only(dataset, mu * load):
         return []
     gap, surface = QuadraticGap.of(dataset), _only_surface(dataset)
     hertz = gap.contact(load) if gap is not None else None
-    circular = hertz is not None and hertz.semi_minor >= CIRCULAR * hertz.semi_major
     incremental = dataset.attrs.get("algorithm") == "incremental"
+    sphere = hertz if hertz is not None and is_circular(hertz) and incremental else None
     if math.isinf(mu) and not goodman and abs(beta) <= 0.5:
         kappa, chi = friction.no_slip_constants(beta)
-        if circular and hertz is not None and incremental:
+        if sphere is not None:
             values = {
-                "approach": chi * (kappa * chi) ** (-2.0 / 3.0) * hertz.approach,
-                "contact_radius": (kappa * chi) ** (-1.0 / 3.0) * hertz.semi_major,
+                "approach": chi * (kappa * chi) ** (-2.0 / 3.0) * sphere.approach,
+                "contact_radius": (kappa * chi) ** (-1.0 / 3.0) * sphere.semi_major,
             }
             return [Exact("Mossakovskii, Spence", values)]
         if surface is not None and surface.shape == "punch":
-            stiffness = 2.0 * _attribute(dataset, "effective_modulus") * surface.radius  # type: ignore[attr-defined]
+            stiffness = 2.0 * attribute_of(dataset.attrs, "effective_modulus") * surface.radius  # type: ignore[attr-defined]
             return [Exact("Mossakovskii", {"approach": load / (kappa * stiffness)})]
-    if math.isfinite(mu) and goodman and circular and hertz is not None and incremental:
+    if math.isfinite(mu) and goodman and sphere is not None:
         ratio = friction.goodman_stick_ratio(beta, mu)
-        return [Exact("Goodman, Spence", {"stick_radius_fit": ratio * hertz.semi_major})]
+        return [Exact("Goodman, Spence", {"stick_radius_fit": ratio * sphere.semi_major})]
     return []
 
 

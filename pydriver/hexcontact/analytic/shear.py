@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .friction import LubkinTorsion, MindlinContact
-from .hertz_gap import SIMILAR, QuadraticGap
+from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of
 
 if TYPE_CHECKING:
     import xarray
 
-    from .frictionless import EllipticContact
+    from .elliptic import EllipticContact
 
 Array = NDArray[np.float64]
 
@@ -120,9 +120,7 @@ class PartialSlip:
 
     def traction(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Shear traction on body 1 along x and y (Pa) at points (m)."""
-        dx, dy, angle = x - self.center[0], y - self.center[1], self.ellipse.angle
-        along, across = dx * np.cos(angle) + dy * np.sin(angle), dy * np.cos(angle) - dx * np.sin(angle)
-        way = np.hypot(along / self.ellipse.semi_major, across / self.ellipse.semi_minor)
+        way = np.hypot(*self.ellipse.local(x - self.center[0], y - self.center[1]))
         radius = way * self.contact.contact_radius
         size = superposed(lambda load: self.contact.traction(radius, load), self.turns)
         return size * self.direction[0], size * self.direction[1]
@@ -139,22 +137,12 @@ class ClosedForms:
 
     def __init__(self, dataset: xarray.Dataset) -> None:
         self.dataset = dataset
-        attributes = dataset.attrs
-        self.friction, self.modulus, self.beta, self.gamma = (
-            float(attributes.get(name, math.nan))
-            for name in (
-                "friction_coefficient",
-                "effective_modulus",
-                "dundurs_beta",
-                "tangential_compliance_ratio",
-            )
-        )
-        self.static = attributes.get("algorithm") == "static"
-        self.apply = (
-            attributes.get("algorithm") in ("static", "incremental")
-            and 0.0 < self.friction < math.inf
-            and abs(self.beta) <= SIMILAR
-        )
+        self.friction = friction_of(dataset.attrs)
+        self.modulus = attribute_of(dataset.attrs, "effective_modulus")
+        self.gamma = attribute_of(dataset.attrs, "tangential_compliance_ratio")
+        self.static = dataset.attrs.get("algorithm") == "static"
+        similar = abs(attribute_of(dataset.attrs, "dundurs_beta")) <= SIMILAR
+        self.apply = similar and 0.0 < self.friction < math.inf
 
     @cached_property
     def _gap(self) -> QuadraticGap | None:
@@ -181,7 +169,7 @@ class ClosedForms:
         contact = MindlinContact(
             self.friction,
             history.normal_load,
-            math.sqrt(hertz.semi_major * hertz.semi_minor),
+            hertz.radius,
             4.0 / self.modulus * (1.0 + 0.5 * self.gamma),
         )
         if np.abs(history["twist"]).max() * contact.contact_radius > _ASIDE * contact.sliding_shift:
@@ -202,7 +190,7 @@ class ClosedForms:
             found = self.partial_slip(int(number))
             if found is not None:
                 loads = _until_sliding(found.loads, found.contact.sliding_load)
-                return _curve(loads, found.contact.shift) if _circular(found.ellipse) else None
+                return _curve(loads, found.contact.shift) if is_circular(found.ellipse) else None
         return None
 
     def torsion_loop(self) -> tuple[Array, Array] | None:
@@ -235,7 +223,7 @@ class ClosedForms:
             self.friction, history.normal_load, hertz.semi_major, 2.0 / self.modulus * (1.0 + self.gamma)
         )
         loads = history.at_constant_pressure(history["torque"], contact.sliding_torque)
-        if loads is None or not _circular(hertz):
+        if loads is None or not is_circular(hertz):
             return None
         turned = _until_sliding(loads.tolist(), _BEFORE_SLIDING * contact.sliding_torque)
         return _curve(turned, _lubkin(contact, max(map(abs, turned))))
@@ -300,7 +288,8 @@ def _until_sliding(loads: Sequence[float], sliding: float) -> list[float]:
     return [*loads] if reached is None else [*loads[:reached], math.copysign(sliding, loads[reached])]
 
 
-def _circular(hertz: EllipticContact) -> bool:
+def is_circular(hertz: EllipticContact) -> bool:
+    """Tell whether an ellipse counts as a circle."""
     return hertz.semi_minor >= CIRCULAR * hertz.semi_major
 
 

@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING, Any
 from .._version import __version__
 from ..errors import DeckError
 from ..plotting.report_data import drawn_data, kept_steps
-from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, load_or_motion, worth_showing
+from ..result.history import RESIDUALS, load_or_motion, worth_showing
 from ..solve.overview import case_rows
 from ..text import escaped, quantity
+from ..variables import label_of
 from . import tables
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ def _loads(histories: Sequence[History]) -> str:
             (str(segment), str(history.get("label", "")), steps, *(load_or_motion(n, history) for n in names))
         )
         before = history["step"]
-    symbols = [LOADS_AND_MOTIONS[name][0] for name in names]
+    symbols = [label_of(name) for name in names]
     return _table("Load history: the end of each segment", ("segment", "label", "steps", *symbols), rows)
 
 

@@ -11,20 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import HexcontactError
 from ..result.history import (
-    LOADS_AND_MOTIONS,
     error_of,
     fitted,
     is_frictional,
     load_or_motion,
+    remarks,
     residuals,
-    spelled,
     step_rows,
     stick_share,
     worth_showing,
 )
-from ..result.remarks import remarks
 from ..text import PREFIXES, percent, quantity, rich_table
-from ..variables import VARIABLES
+from ..variables import VARIABLES, label_of, spelled
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -211,7 +209,7 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
 
     columns: dict[str, Callable[[History], str]] = {"label": lambda h: str(h.get("label", ""))}
     for name in worth_showing(histories):
-        columns[LOADS_AND_MOTIONS[name][0]] = column(functools.partial(load_or_motion, name), name)
+        columns[label_of(name)] = column(functools.partial(load_or_motion, name), name)
     if is_frictional(histories[-1]):
         columns["stick"] = column(stick_share, "stick_area")
     else:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import integer, number, reals, word
 from ..errors import DeckError
+from ..variables import CORE
 from . import _core, kernel_cache
 from .contact import (
     MOST_IN_CONTACT,
@@ -39,26 +40,7 @@ Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
-_FIELDS = (  # in the order of fortran/python/f2py_friction.f90
-    "pressure",
-    "traction_x",
-    "traction_y",
-    "gap",
-    "relative_displacement_x",
-    "relative_displacement_y",
-    "slip_increment_x",
-    "slip_increment_y",
-    "accumulated_slip",
-)
-_NUMBERS = (
-    *("normal_load", "tangential_load_x", "tangential_load_y", "torque"),
-    *("approach", "shift_x", "shift_y", "twist"),
-    "dissipated_energy",
-)
-_RESIDUALS = (
-    *("residual_normal", "residual_tangential", "residual_force", "residual_shear_force"),
-    "residual_torque",
-)
+_FIELDS, _NUMBERS, _RESIDUALS = (CORE[name] for name in ("fields", "numbers", "residuals"))
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,8 @@ from ..deck.surfaces import Separation, principal_curvatures
 from ..deck.tables import Deck, Friction, Output, Solver
 from ..errors import DeckError
 from ..variables import FIELDS
+from ..variables import FRICTIONLESS_FIELDS as FRICTIONLESS_FIELDS
 from .loads import load_steps
-
-FRICTIONLESS_FIELDS = (
-    "pressure",
-    "gap",
-    "zone",
-    *(name for name in FIELDS if name.startswith("displacement_")),
-)
 
 
 def checked_deck(

@@ -6,7 +6,6 @@ attributes their kind, and that what a run always writes is there.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -16,41 +15,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..variables import FIELDS, LARGEST, NOT_KEPT, VARIABLES
+from ..variables import FIELDS, LARGEST, NOT_KEPT, RESIDUALS, VARIABLES, names_where
+from .layout import Metadata, history_of, lattice_of
 
 if TYPE_CHECKING:
     import xarray
 
-    from .result import Metadata, Step
+    from .step import Step
 
 _CLOSE = 1e-6  # spacings by which a node may be away from where it belongs; relative difference of sums
 _ROUNDED = 1 + 1e-5  # of tolerances in the story of a run
 _CHANGED = re.compile(r"(?<!step_)tolerance = (\S+) instead of ([^\s,]+)")
 
-# what a run has always written, and with friction besides
-_HISTORY = (
-    *(
-        "normal_load",
-        "approach",
-        "contact_area",
-        "contact_radius",
-        "max_pressure",
-        "seconds",
-        "segment",
-        "label",
-    ),
-    *("sweeps", "operator_applications", "residual_normal", "residual_force"),
-)
-_FRICTIONAL_HISTORY = (
-    *("tangential_load_x", "tangential_load_y", "torque", "shift_x", "shift_y", "twist", "cuts"),
-    *("stick_area", "stick_radius", "stick_center_x", "stick_center_y", "max_traction", "dissipated_energy"),
-    *("elastic_energy", "residual_tangential", "residual_shear_force", "residual_torque"),
-)
+_ALWAYS = names_where(lambda v: v.required == "always")
+_WITH_FRICTION = names_where(lambda v: bool(v.required))
+_NO_STEP = "{} holds numbers that no load step has"
 
-_NOT_NEGATIVE = (
-    *("normal_load", "contact_area", "contact_radius", "stick_area", "stick_radius", "max_pressure"),
-    *("max_traction", "operator_applications", "seconds"),
-)
+
+Fits = Callable[[Any], bool]  # whether a value is what it should be
 
 
 def _is_number(value: Any) -> bool:
@@ -65,17 +47,15 @@ def _is_text(value: Any) -> bool:
     return isinstance(value, str)
 
 
-def _one_of(*words: str) -> Callable[[Any], bool]:
+def _one_of(*words: str) -> Fits:
     return lambda value: isinstance(value, str) and value in words
 
 
-def _numbers(count: int) -> Callable[[Any], bool]:
-    return lambda value: (
-        np.shape(value) == (count,) and bool(np.isfinite(np.asarray(value, dtype=float)).all())
-    )
+def _numbers(count: int) -> Fits:
+    return lambda value: np.shape(value) == (count,) and bool(np.isfinite(value).all())
 
 
-_PARAMETERS: dict[str, Callable[[Any], bool]] = {  # that describe the case: all of them or, in a test, none
+_PARAMETERS: dict[str, Fits] = {  # that describe the case: all of them or, in a test, none
     "effective_modulus": _is_positive,
     "dundurs_beta": _is_number,
     "tangential_compliance_ratio": _is_number,
@@ -85,15 +65,9 @@ _PARAMETERS: dict[str, Callable[[Any], bool]] = {  # that describe the case: all
     "tolerance": _is_positive,
 }
 MATERIALS = tuple(name for name in _PARAMETERS if name != "tolerance")  # and laws
-_ATTRIBUTES: dict[str, Callable[[Any], bool]] = {
-    "title": _is_text,
-    "deck": _is_text,
-    "source": _is_text,
-    "history": _is_text,
-    "created": _is_text,
-    "run": _is_text,
-    "output_fields": _is_text,
-    "hexcontact_version": _is_text,
+_ATTRIBUTES: dict[str, Fits] = {
+    **dict.fromkeys(("title", "deck", "source", "history", "created", "run"), _is_text),
+    **dict.fromkeys(("output_fields", "hexcontact_version"), _is_text),
     "output_every": _is_positive,
     "planned_steps": lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: not known yet
     "complete": _is_number,
@@ -124,9 +98,9 @@ def fault_of_result(dataset: xarray.Dataset) -> str:
             return f"{name} holds values of another kind ({found.dtype})"
     if "algorithm" in attributes:
         frictional = attributes["algorithm"] != "frictionless"
-        for name in (*_HISTORY, *(_FRICTIONAL_HISTORY if frictional else ())):
-            if name not in dataset.variables:
-                return f"it has no {name}"
+        missing = set(_WITH_FRICTION if frictional else _ALWAYS) - dataset.variables.keys()
+        if missing:
+            return f"it has no {min(missing, key=_WITH_FRICTION.index)}"
     return _fault_of_coordinates(dataset) or _fault_of_histories(dataset)
 
 
@@ -158,9 +132,7 @@ def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
     for name in ("step", "row", "col"):
         if (np.diff(dataset[name].values.astype(float)) != 1).any():
             return f"its coordinate {name} does not count one by one"
-    from .result import window_of
-
-    lattice = window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
+    lattice = lattice_of(dataset)
     for name, place in (("x", lattice.x), ("y", lattice.y)):
         if not (abs(dataset[name].values - place) < _CLOSE * lattice.spacing).all():
             return f"its coordinate {name} is not that of the lattice"
@@ -169,11 +141,11 @@ def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
 
 def _fault_of_histories(dataset: xarray.Dataset) -> str:
     """Tell of numbers that no load step has."""
-    for name in _HISTORY:
-        if name in dataset.variables and name != "label" and np.isnan(dataset[name].values).any():
-            return f"{name} holds numbers that no load step has"
-    known = {str(name) for name in dataset.data_vars if dataset[name].dims == ("step",)} & VARIABLES.keys()
-    history = {name: dataset[name].values for name in known if VARIABLES[name].dtype != "str"}
+    known = [name for name in history_of(dataset) if name in VARIABLES and VARIABLES[name].dtype != "str"]
+    history = {name: dataset[name].values for name in known}
+    for name in known:
+        if name in _ALWAYS and np.isnan(history[name]).any():
+            return _NO_STEP.format(name)
     return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]))
 
 
@@ -182,17 +154,15 @@ def _fault_of_numbers(history: Mapping[str, Any], parameters: Mapping[Any, Any],
     tolerances = [parameters.get("tolerance", 1.0), *map(float, chain(*_CHANGED.findall(story)))]
     cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
     for name, values in history.items():
-        low, high = -LARGEST, LARGEST
+        low, high = VARIABLES[name].least, LARGEST
         if VARIABLES[name].dtype != "f8":
             low, high = NOT_KEPT, max(VARIABLES[name].flags, default=LARGEST)
-        elif name in _NOT_NEGATIVE:
-            low = 0.0
-        elif name.startswith("residual_"):
-            low, high = 0.0, max(tolerances) * _ROUNDED
-            if name == "residual_tangential":  # parts of a step are solved from one to the next
+        elif name in RESIDUALS.values():
+            high = max(tolerances) * _ROUNDED
+            if name == RESIDUALS["R_t"]:  # parts of a step are solved from one to the next
                 values = np.where(cut, np.minimum(values, high), values)
         if (np.less(values, low) | np.greater(values, high)).any():
-            return f"{name} holds numbers that no load step has"
+            return _NO_STEP.format(name)
     return ""
 
 
@@ -225,8 +195,7 @@ def _fault_of_values(
             wrong = ~(abs(values) < LARGEST)
             if known.padding != 0:  # there may be no value out of contact
                 wrong &= contact is not None and contact
-            if name in ("pressure", "accumulated_slip"):
-                wrong |= values < 0
+            wrong |= values < known.least
         if wrong.any():
             return f"{name} holds numbers that no node has"
     if pressure is not None and kept and "max_pressure" in history:
@@ -242,12 +211,10 @@ def _fault_of_values(
 
 def fault_of_record(metadata: Metadata, step: Step) -> str:
     """Return what is wrong with a record of a journal that was read; empty if nothing is."""
-    about = dataclasses.asdict(metadata)
-    texts = ("title", "deck", "run", "created", "version", "deck_file")
     planned = metadata.planned_steps or (1 if step.control else 0)  # not known of adaptive steps
     counts = {"every": metadata.every, "planned_steps": planned, "index": step.index + 1}
-    for name in texts:
-        if not isinstance(about[name], str):
+    for name in ("title", "deck", "run", "created", "version", "deck_file"):
+        if not isinstance(getattr(metadata, name), str):
             return f"its {name} is no text"
     for name, value in counts.items():
         if not isinstance(value, int) or value < 1:
@@ -256,23 +223,18 @@ def fault_of_record(metadata: Metadata, step: Step) -> str:
         return "its metadata hold other things than text"
     if not isinstance(metadata.parameters, dict):
         return "its parameters are no table"
-    given = {
-        name: value for name, value in metadata.parameters.items() if name in _PARAMETERS or name in _LATER
-    }
     known = _PARAMETERS | _LATER
-    for name in given if given else ():
-        if not known[name](given[name]):
+    given = {name: value for name, value in metadata.parameters.items() if name in known}
+    for name, value in given.items():
+        if not known[name](value):
             return f"its {name} is not what it should be"
     if given and (missing := _PARAMETERS.keys() - given):
         return f"it has no {min(missing)}"
-    return _fault_of_step(step) or _fault_of_values_of(metadata, step)
-
-
-def _fault_of_values_of(metadata: Metadata, step: Step) -> str:
-    """Tell of numbers that are none of a load step."""
     history = {name: value for name, value in step.history.items() if not isinstance(value, str)}
-    return _fault_of_numbers(history, metadata.parameters, metadata.story) or _fault_of_values(
-        step.fields, history, step.lattice.spacing
+    return (
+        _fault_of_step(step)
+        or _fault_of_numbers(history, metadata.parameters, metadata.story)
+        or _fault_of_values(step.fields, history, step.lattice.spacing)
     )
 
 
@@ -287,8 +249,6 @@ def _fault_of_step(step: Step) -> str:
     for name, value in step.history.items():
         if name not in VARIABLES or VARIABLES[name].dims != ("step",):
             return f"{name} is no quantity of a load step"
-        if isinstance(value, str) != (VARIABLES[name].dtype == "str") or not isinstance(
-            value, str | int | float
-        ):
+        if not isinstance(value, str if VARIABLES[name].dtype == "str" else int | float):
             return f"{name} is of another kind"
     return ""

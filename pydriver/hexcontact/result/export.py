@@ -14,21 +14,15 @@ from numpy.typing import NDArray
 
 from ..errors import DeckError
 from ..text import escaped, visible
-from ..variables import FIELDS, NOT_KEPT, VARIABLES
-from .mesh import triangles
+from ..variables import CONVENTIONS, FIELDS, VARIABLES, VECTORS
+from . import mesh
+from .interpolate import is_kept
 
 if TYPE_CHECKING:
     import xarray
 
     from .result import Result
 
-_VECTORS = {  # name in VTK files -> its components
-    "traction": ("traction_x", "traction_y"),
-    "relative_displacement": ("relative_displacement_x", "relative_displacement_y"),
-    "slip_increment": ("slip_increment_x", "slip_increment_y"),
-    "displacement_1": ("displacement_1_x", "displacement_1_y", "displacement_1_z"),
-    "displacement_2": ("displacement_2_x", "displacement_2_y", "displacement_2_z"),
-}
 _VTK_TYPES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "i1": "Int8", "u1": "UInt8"}
 _TRIANGLE = 5  # number of this kind of cell in VTK
 
@@ -54,7 +48,7 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
             asked = [int(result.step(number)["step"]) for number in numbers]
         except IndexError as error:
             raise DeckError(f"--step: {error}") from error
-    kept = [number for number in asked if any(_is_kept(field) for _, field in _fields(result, number))]
+    kept = [number for number in asked if any(is_kept(field) for _, field in _fields(result, number))]
     if not kept or (numbers is not None and len(kept) < len(asked)):
         lost = sorted(set(asked) - set(kept))
         where = f"step {lost[0]}" if numbers is not None else "any step"
@@ -65,10 +59,6 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
 def _fields(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any]]]:
     one = result.step(number)
     return ((name, one[name].values) for name in FIELDS if name in one)
-
-
-def _is_kept(values: NDArray[Any]) -> bool:
-    return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())
 
 
 # --- VTK ------------------------------------------------------------------------------------------
@@ -124,13 +114,13 @@ def _vtu(result: Result, number: int) -> str:
     """Return a load step as an unstructured grid in XML."""
     lattice, one = result.lattice, result.step(number)
     points = np.stack([lattice.x.ravel(), lattice.y.ravel(), np.zeros(lattice.size)], axis=1)
-    faces = triangles(lattice.n_row, lattice.n_col)
+    faces = mesh.triangles(lattice.n_row, lattice.n_col)
     history = {
         name: one[name].values.reshape(1)
         for name, variable in VARIABLES.items()
         if variable.dims == ("step",) and variable.dtype != "str" and name in one.variables
     }
-    data = [_array(name, values, VARIABLES[name].units) for name, values in history.items()]
+    data = [_array(name, values, VARIABLES[name].unit) for name, values in history.items()]
     fields = [_array(name, values, unit) for name, values, unit in _point_data(result, number)]
     cells = [
         _array("connectivity", faces.ravel().astype("i4")),
@@ -161,13 +151,13 @@ def _point_data(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any]
     fields = dict(_fields(result, number))
     if "initial_gap" in result.dataset:
         yield "initial_gap", result.dataset["initial_gap"].values.ravel(), "m"
-    for vector, parts in _VECTORS.items():
+    for vector, parts in VECTORS.items():
         if all(part in fields for part in parts):
             columns = [fields.pop(part).ravel() for part in parts]
             columns += [np.zeros_like(columns[0])] * (3 - len(parts))
-            yield vector, np.stack(columns, axis=1), VARIABLES[parts[0]].units
+            yield vector, np.stack(columns, axis=1), VARIABLES[parts[0]].unit
     for name, values in fields.items():
-        yield name, values.ravel(), VARIABLES[name].units
+        yield name, values.ravel(), VARIABLES[name].unit
 
 
 def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
@@ -183,7 +173,7 @@ def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
     kind = _VTK_TYPES[data.dtype.str[1:]]
     return (
         f'<DataArray type="{kind}" Name="{escaped(name)}"{shape}{alone} format="binary">\n{text}\n'
-        f"{key if unit not in ('', '1') else ''}</DataArray>\n"
+        f"{key if unit else ''}</DataArray>\n"
     )
 
 
@@ -215,9 +205,6 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
         If there is nothing to export.
     """
     import netCDF4
-
-    from ..variables import CONVENTIONS
-    from . import mesh
 
     steps = kept_steps(result, numbers)
     if min(result.lattice.shape) < 2:
@@ -301,8 +288,8 @@ def _cell(value: Any) -> Any:
 
 
 def _with_unit(name: str) -> str:
-    unit = VARIABLES[name].units
-    return f"{name} [{unit}]" if unit not in ("", "1") else name
+    unit = VARIABLES[name].unit
+    return f"{name} [{unit}]" if unit else name
 
 
 def _make(folder: Path) -> None:

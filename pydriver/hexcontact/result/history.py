@@ -1,125 +1,102 @@
-"""What the history of a load step says, in words and numbers for people."""
+"""What the history of a load step, or of a run, says in words and numbers for people."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..text import percent, quantity
+from ..text import listed, percent, quantity
+from ..variables import RESIDUALS as RESIDUALS
+from ..variables import SUMMARY, VARIABLES, label_of, names_where, spelled
 
 History = Mapping[str, Any]
 Row = tuple[str, ...]
 
-_FURTHER = {  # shown of a load step besides loads and motions
-    "max_pressure": "Pa",
-    "max_traction": "Pa",
-    "contact_radius": "m",
-    "stick_radius": "m",
-    "elastic_energy": "J",
-    "dissipated_energy": "J",
+LOADS_AND_MOTIONS = {
+    name: (label_of(name), VARIABLES[name].units) for name in names_where(lambda v: v.motion)
 }
+"""What each load and motion is called where there is little room, and its unit."""
 
-LOADS_AND_MOTIONS = {  # with friction: what it is called, unit
-    "normal_load": ("P", "N"),
-    "tangential_load_x": ("Qx", "N"),
-    "tangential_load_y": ("Qy", "N"),
-    "torque": ("Mz", "N m"),
-    "approach": ("approach", "m"),
-    "shift_x": ("shift x", "m"),
-    "shift_y": ("shift y", "m"),
-    "twist": ("twist", "rad"),
-}
-RESIDUALS = {  # by the symbol of the theory
-    "R_n": "residual_normal",
-    "R_t": "residual_tangential",
-    "R_P": "residual_force",
-    "R_Q": "residual_shear_force",
-    "R_M": "residual_torque",
-}
 _NOTICED = 1e-6  # share of the normal load or approach from which something tangential is worth showing
 _NOISE = 1e-9  # ... below which it is written as zero
+_MOST_NAMED = 8  # load steps named in a sentence
 
 
-def _scale(name: str, history: Mapping[str, Any]) -> float:
+def _scale(name: str, history: History) -> float:
     """Return what a load or motion of a step is to be compared with to tell whether it is noise."""
-    load, approach = abs(history["normal_load"]), abs(history["approach"])
-    length = history["contact_radius"]
-    if name in ("normal_load", "approach"):
+    beside, power = VARIABLES[name].scale
+    if not beside:
         return 0.0
-    if name == "torque":
-        return float(load * length)
-    if name == "twist":
-        return float(approach / length) if length else math.inf
-    return float(load if name.startswith("tangential") else approach)
+    length = float(history["contact_radius"])
+    return abs(history[beside]) * length**power if length or power >= 0 else math.inf
 
 
-def worth_showing(histories: Iterable[Mapping[str, Any]]) -> list[str]:
+def worth_showing(histories: Iterable[History]) -> list[str]:
     """Return those of `LOADS_AND_MOTIONS` to show: the normal ones, and others that are more than noise."""
-    shown = {"normal_load", "approach"}
-    for history in histories:
-        shown |= {
-            name
-            for name in LOADS_AND_MOTIONS.keys() - shown
-            if abs(history.get(name, 0.0)) > _NOTICED * _scale(name, history)
-        }
-    return [name for name in LOADS_AND_MOTIONS if name in shown]
+    histories = list(histories)
+
+    def shown(name: str) -> bool:
+        normal = VARIABLES[name].motion == "z"
+        return normal or any(abs(h.get(name, 0.0)) > _NOTICED * _scale(name, h) for h in histories)
+
+    return list(filter(shown, LOADS_AND_MOTIONS))
 
 
-def load_or_motion(name: str, history: Mapping[str, Any]) -> str:
+def load_or_motion(name: str, history: History) -> str:
     """Write one of `LOADS_AND_MOTIONS`, noise as zero."""
     value = float(history[name])
-    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, LOADS_AND_MOTIONS[name][1])
+    return quantity(0.0 if abs(value) < _NOISE * _scale(name, history) else value, VARIABLES[name].units)
 
 
-def fitted(name: str, history: Mapping[str, Any]) -> float:
+def fitted(name: str, history: History) -> float:
     """Return an area or radius to the edge between the nodes; as its nodes have it where no fit was kept."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
 
 
-def error_of(name: str, history: Mapping[str, Any]) -> str:
+def error_of(name: str, history: History) -> str:
     """Write the estimated error of what `fitted` or `load_or_motion` give, as " ± 0.05 %"; empty if none."""
     own = name if math.isnan(float(history.get(f"{name}_fit", math.nan))) else f"{name}_fit"
     value, error = abs(float(history[own])), float(history.get(f"{own}_error", 0.0))
-    least = _NOISE * _scale(name, history) if name in LOADS_AND_MOTIONS else 0.0
+    least = _NOISE * _scale(name, history)
     return f" ± {percent(error / value)}" if value > least and error > 0.0 else ""
 
 
-def stick_share(history: Mapping[str, Any]) -> str:
+def stick_share(history: History) -> str:
     """Write how much of the contact area sticks."""
     area = fitted("contact_area", history)
     return f"{100 * fitted('stick_area', history) / area:.1f} %" if area else "-"
 
 
-def step_error_share(history: Mapping[str, Any]) -> float | None:
+def step_error_share(history: History) -> float | None:
     """Return the bound on the error of the stick area by load steps, as a share of the contact area."""
     error, area = float(history.get("stick_area_step_error", math.nan)), fitted("contact_area", history)
     return None if math.isnan(error) or not area else error / area
 
 
-def halved(history: Mapping[str, Any]) -> str:
+def halved(history: History) -> str:
     """Say how often a step was halved until the solver converged; empty if it was not."""
     cuts = int(history.get("cuts", 0))
     return f"halved {cuts} time{'s' * (cuts > 1)}" if cuts else ""
 
 
-def residuals(history: Mapping[str, Any]) -> dict[str, float]:
+def residuals(history: History) -> dict[str, float]:
     """Return the residuals that there are, by the symbol of the theory."""
     found = {sign: float(history.get(name, math.nan)) for sign, name in RESIDUALS.items()}
     return {sign: value for sign, value in found.items() if not math.isnan(value)}
 
 
-def is_frictional(history: Mapping[str, Any]) -> bool:
+def is_frictional(history: History) -> bool:
     """Tell whether a step was solved with friction."""
     return "stick_area" in history
 
 
-def describe(history: Mapping[str, Any], short: bool = False) -> str:
+def describe(history: History, short: bool = False) -> str:
     """Return a line of text about a step from its history."""
     parts = [str(history.get("label", ""))]
     for name in worth_showing([history]):
-        parts.append(f"{LOADS_AND_MOTIONS[name][0]} {load_or_motion(name, history)}")
+        parts.append(f"{label_of(name)} {load_or_motion(name, history)}")
     if is_frictional(history):
         error = step_error_share(history)
         around = "" if error is None or short else f" ± {100 * error:.1f} %"
@@ -142,8 +119,8 @@ def step_rows(history: History) -> list[Row]:
         for name in worth_showing([history])
     ]
     rows += [
-        (spelled(name), quantity(fitted(name, history), unit) + error_of(name, history))
-        for name, unit in _FURTHER.items()
+        (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
+        for name in SUMMARY
         if name in history
     ]
     if is_frictional(history):
@@ -154,11 +131,6 @@ def step_rows(history: History) -> list[Row]:
         rows.append(("load steps", words))
     found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
     return [*rows, ("residuals", found), ("work", _work(history))]
-
-
-def spelled(name: str) -> str:
-    """Return the name of a quantity as words."""
-    return name.replace("_", " ")
 
 
 def _stick(history: History) -> str:
@@ -177,3 +149,81 @@ def _work(history: History) -> str:
         f"{history['sweeps']} iterations, {parts}{history['operator_applications']:.3g} operator "
         f"applications, {quantity(history['seconds'], 's', 3)}"
     )
+
+
+# --- remarks ------------------------------------------------------------------------------------------------
+
+
+def remarks(histories: Sequence[History], parameters: History) -> list[str]:
+    """Return sentences about the load steps of a run; none if there is nothing to say.
+
+    Parameters
+    ----------
+    histories : sequence of mapping
+        History of each load step, from the first on.
+    parameters : mapping
+        How they were solved: what `hexcontact.solve.parameters_of` returns, or the attributes of a result.
+    """
+    tolerance = float(parameters.get("tolerance", 0.0))
+    static = parameters.get("algorithm") == "static"
+    cold = [
+        number
+        for number, (before, history) in enumerate(zip([{}, *histories], histories, strict=False), start=1)
+        if history.get("cuts") and (static or not before.get("contact_area"))
+    ]
+    in_parts = [k for k in cold if histories[k - 1]["residual_tangential"] > tolerance]
+    said = [
+        unasked_path(in_parts, in_parts=True),
+        unasked_path([k for k in cold if k not in in_parts], in_parts=False),
+        halved_steps(histories, tolerance),
+        limited_steps(histories, float(parameters.get("step_tolerance", 0.0))),
+    ]
+    return [sentence for sentence in said if sentence]
+
+
+def unasked_path(numbers: Sequence[int], in_parts: bool) -> str:
+    """Say where halved steps come from that begin without contact, or are static; empty if there are none."""
+    if not numbers:
+        return ""
+    several, steps = len(numbers) > 1, _steps(list(map(str, numbers)))
+    if in_parts:
+        return (
+            f"{steps} begin{'s' * (not several)} without contact and did not converge as a whole: the load "
+            "was applied in parts, a path that the load history does not have and that the result may depend "
+            "on; expected more load steps from the first contact on"
+        )
+    return (
+        f"{steps} did not converge at once and {'were' if several else 'was'} reached from solutions for "
+        "smaller loads: if friction admits several states, another start may lead to another of them"
+    )
+
+
+def halved_steps(histories: Sequence[History], tolerance: float) -> str:
+    """Say which load steps were halved, and what their record is; empty if none was."""
+    cut = {number: history for number, history in enumerate(histories, start=1) if history.get("cuts")}
+    if not cut:
+        return ""
+    named = _steps([f"{number} ({halved(history)})" for number, history in cut.items()])
+    largest = max(float(history["residual_tangential"]) for history in cut.values())
+    record = "as they are recorded they fulfil the conditions all the same"
+    if largest > tolerance:
+        record = (
+            f"each part met solver.tolerance; R_t is of whole steps as they are recorded, up to {largest:.1e}"
+        )
+    return f"{len(cut)} of {len(histories)} load steps did not converge at once: {named}; {record}"
+
+
+def limited_steps(histories: Sequence[History], tolerance: float) -> str:
+    """Say which adaptive load steps missed their tolerance; empty if none did."""
+    missed = [f"{k}" for k, history in enumerate(histories, start=1) if history.get("step_limited") == 1]
+    if not missed:
+        return ""
+    return (
+        f"{len(missed)} of {len(histories)} load steps change more by halving than solver.step_tolerance = "
+        f"{tolerance:g}, and smaller ones did not help: {_steps(missed)}; their stick_area_step_error holds"
+    )
+
+
+def _steps(names: Sequence[str]) -> str:
+    shown = listed([*names[:_MOST_NAMED], *["..."] * (len(names) > _MOST_NAMED)], "and")
+    return f"step{'s' * (len(names) > 1)} {shown}"

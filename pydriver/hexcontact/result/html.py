@@ -1,4 +1,4 @@
-"""Tables and small pictures that notebooks and terminals show for cases, steps and results."""
+"""Tables and small pictures of results that notebooks and terminals show."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..text import Row, html_table, quantity, visible
+from ..variables import spelled
+from .history import step_rows
+from .layout import history_of
+from .raster import Plane, png_of
+from .view import StepView
 
 if TYPE_CHECKING:
-    from .result import Result
+    import xarray
 
 # Colors of a map of pressure, from none to the largest (viridis), and of zones: separated, stick, slip.
 _SHADES = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725")
@@ -19,67 +24,57 @@ _ZONES = ("#ffffff", "#0072b2", "#f0c05a")
 _PIXELS = 240  # of the longer side of a picture
 
 
-# --- results ------------------------------------------------------------------------------------------------
-
-
-def result_header(result: Result) -> str:
+def result_header(dataset: xarray.Dataset, path: str) -> str:
     """Return what a result is of: title, file, how much of it there is."""
-    sizes, attributes = result.dataset.sizes, result.dataset.attrs
-    steps = f"{len(result)} load step{'s' * (len(result) != 1)}"
-    if not result.complete:
+    sizes, attributes = dataset.sizes, dataset.attrs
+    steps = f"{sizes['step']} load step{'s' * (sizes['step'] != 1)}"
+    if not attributes.get("complete", True):
         planned = attributes.get("planned_steps")
         steps += f"{f' of {planned}' if planned else ''} (unfinished run)"
-    named = [f"Result of {result.case_title!r}" if result.case_title else "Result", result.path]
+    title = str(attributes.get("title", ""))
+    named = [f"Result of {title!r}" if title else "Result", path]
     about = f"{steps}, {sizes['row']} x {sizes['col']} nodes"
     spacing = quantity(float(attributes.get("lattice_spacing", np.nan)), "m")
     return visible(", ".join(filter(None, named))) + f"\n  {about}, spacing {spacing}"
 
 
-def result_rows(result: Result) -> list[Row]:
+def result_rows(dataset: xarray.Dataset) -> list[Row]:
     """Return what the last step of a result came to."""
-    from .history import step_rows
-
-    last = result.dataset.isel(step=-1)
-    names = [name for name, values in result.dataset.data_vars.items() if values.dims == ("step",)]
-    history = {str(name): last[name].item() for name in names}
+    last = dataset.isel(step=-1)
+    history = {name: last[name].item() for name in history_of(dataset)}
     try:
         return list(step_rows(history))
     except KeyError:  # a result that was put together by hand, of some quantities
-        return [(name.replace("_", " "), f"{value}") for name, value in history.items()]
+        return [(spelled(name), f"{value}") for name, value in history.items()]
 
 
-def result_html(result: Result) -> str:
-    """Return the last step of a result as a table beside maps of it, and all there is to unfold."""
-    title, _, about = result_header(result).partition("\n")
-    last = f"Load step {int(result.dataset['step'][-1])}"
-    note = about.strip() + (f"; {result.stopped}" if result.stopped else "")
-    table = html_table(f"{title}: {last}", ("", ""), result_rows(result), note)
-    pictures = "".join(_pictures(result))
-    below = f"<details><summary>all quantities</summary>{result.quantities._repr_html_()}</details>"
+def result_html(dataset: xarray.Dataset, path: str, quantities: str) -> str:
+    """Return the last step of a result as a table beside maps of it; `quantities` (HTML) unfold below."""
+    title, _, about = result_header(dataset, path).partition("\n")
+    last, stopped = f"Load step {int(dataset['step'][-1])}", dataset.attrs.get("stopped")
+    note = about.strip() + (f"; {stopped}" if stopped else "")
+    table = html_table(f"{title}: {last}", ("", ""), result_rows(dataset), note)
+    below = f"<details><summary>all quantities</summary>{quantities}</details>"
     row = "display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start"
-    return f'<div><div style="{row}"><div>{table}</div>{pictures}</div>{below}</div>'
+    return f'<div><div style="{row}"><div>{table}</div>{"".join(_pictures(dataset))}</div>{below}</div>'
 
 
-def _pictures(result: Result) -> Iterable[str]:
+def _pictures(dataset: xarray.Dataset) -> Iterable[str]:
     """Yield maps of the last step: pressure, and where there is friction the zones."""
-    from .raster import Plane
-    from .view import StepView
-
     try:
-        view = StepView.of(result, -1)
+        view = StepView(dataset, -1)
     except ValueError:  # not kept
         return
     if not view.contact.any():
         return
-    plane = Plane(view.window(1.15), _PIXELS)
-    values = view.at(*plane.points)
-    largest = float(view.pressure.max())
+    limits = view.window(1.15)
+    plane = Plane(limits, _PIXELS)
+    values, largest = view.at(*plane.points), float(view.pressure.max())
     shades = np.array([_rgb(color) for color in _SHADES])
-    share = np.clip(values / largest, 0.0, 1.0) * (len(shades) - 1)
-    places = np.arange(len(shades))
+    share, places = values / largest, np.linspace(0.0, 1.0, len(shades))
     colors = np.stack([np.interp(share, places, shades[:, k]) for k in range(3)], axis=-1)
     colors[values <= 0.0] = 255.0
-    width = quantity(view.window(1.15)[1] - view.window(1.15)[0], "m", 3)
+    width = quantity(limits[1] - limits[0], "m", 3)
     yield _figure(colors, f"pressure, up to {quantity(largest, 'Pa')}; {width} wide")
     if view.friction and "zone" in view.data:
         row, col, inside = plane.nearest(view)
@@ -95,8 +90,6 @@ def _rgb(color: str) -> list[int]:
 
 def _figure(colors: NDArray[np.float64], caption: str) -> str:
     """Return a picture with its caption (HTML)."""
-    from .raster import png_of
-
     picture = png_of(np.round(colors).astype("u1"))
     rows, cols = colors.shape[:2]
     frame = "border:1px solid #999;display:block"

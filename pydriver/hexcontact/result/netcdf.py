@@ -1,13 +1,19 @@
-"""One result file: writing it step by step, reading it back, refusing what is damaged or foreign."""
+"""One result file: writing it step by step, reading it back, refusing what is damaged or foreign.
+
+HDF5 files may be longer than what belongs to them. After it a result holds 48 bytes, its seal: a mark, and a
+SHA-256 of the SHA-256 of each block of all that comes before. So damage is noticed before HDF5 reads it,
+wherever it is, in indices of chunks too. What rewrites the file with HDF5 takes the seal away.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import errno
+import hashlib
 import os
 import sys
 import threading
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,18 +21,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import memory
-from ..errors import LACKING, DeckError, HexcontactError, ResourceError
-from ..files import require_ordinary, require_utf8
+from ..errors import DeckError
+from ..files import reading, require_ordinary
 from ..variables import SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
-from .result import Layout, Metadata, Result, Step
-from .seal import check_seal, is_sealed, seal
+from .layout import Layout, Metadata
+from .result import Result
+from .step import Step
 
 if TYPE_CHECKING:
     import netCDF4
 
 _CHUNK = 512  # nodes of a chunk along row and col
+_MARK = b"hexcontact sha-2"
+_SIZE = len(_MARK) + 32
+_BLOCK = 1 << 22  # bytes
+_HDF5 = b"\x89HDF\r\n\x1a\n\x02\x08\x08"  # version of the head, then sizes of addresses and lengths
+_END = slice(28, 36)  # in the head: the address where the file ends
+
 _netcdf = threading.Lock()  # the netCDF library must not be entered by two threads
 
 
@@ -42,7 +55,7 @@ def _alone() -> Iterator[None]:
 
 
 def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
-    """Write the file of a result and flush it to disk.
+    """Write the file of a result.
 
     Parameters
     ----------
@@ -87,7 +100,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
 
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Create a file; in the end close it, add its checksum and flush it to disk."""
+    """Create a file; in the end close it and add its checksum."""
     import netCDF4
 
     memory.claim(memory.WRITING)  # it crashes without
@@ -102,7 +115,6 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     except RuntimeError as error:  # the HDF5 library hides the reason, a full disk mostly
         raise OSError(None, str(error), str(path)) from error
     seal(path)
-    flush(path)
 
 
 def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variable:
@@ -138,37 +150,7 @@ def _write_text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> None:
     column[...] = characters
 
 
-def flush(path: Path) -> None:
-    """See to it that a file, or the names in a folder, are on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if not (path.is_dir() and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # not every system can
-            raise
-    finally:
-        os.close(descriptor)
-
-
 # --- reading --------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
-    """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
-    require_utf8(path, kind)
-    try:
-        yield
-    except (HexcontactError, FileNotFoundError, MemoryError):
-        raise
-    except PermissionError as error:
-        raise DeckError(f"{path} cannot be read: {error.strerror}") from error
-    except Exception as error:  # damage takes any form: every library below has its own exceptions
-        if isinstance(error, OSError) and error.errno in LACKING:
-            raise ResourceError(f"{path} cannot be read: {error.strerror}") from error
-        raise DeckError(
-            f"{path} is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
-        ) from error
 
 
 def _check_ours(attributes: dict[str, Any], path: Path) -> None:
@@ -238,3 +220,51 @@ def read_output(path: Path) -> Result:
             raise DeckError(f"{path} is damaged: {fault}")
         _ = result.lattice, result.complete, Metadata.from_attributes(result.dataset.attrs)
         return result
+
+
+# --- the seal -----------------------------------------------------------------------------------------------
+
+
+def _digest(descriptor: int, size: int) -> bytes:
+    """Return the digest of the first `size` bytes of a file."""
+
+    def of_block(start: int) -> bytes:
+        return hashlib.sha256(os.pread(descriptor, min(_BLOCK, size - start), start)).digest()
+
+    with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:  # which hashing lets run
+        return hashlib.sha256(b"".join(pool.map(of_block, range(0, size, _BLOCK)))).digest()
+
+
+def seal(path: Path) -> None:
+    """Add the checksum to a file."""
+    with path.open("r+b") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.write(_MARK + _digest(file.fileno(), size))
+
+
+def is_sealed(path: Path) -> bool:
+    """Tell whether a file ends with a seal, be it broken."""
+    with path.open("rb") as file:
+        file.seek(-min(_SIZE, path.stat().st_size), os.SEEK_END)
+        return file.read(len(_MARK)) == _MARK
+
+
+def check_seal(path: Path) -> bool:
+    """Tell whether a file is as it was written; False if it has no seal to tell by.
+
+    Raises
+    ------
+    DeckError
+        If it has changed since.
+    """
+    with path.open("rb") as file:
+        head, size = file.read(_END.stop), file.seek(0, os.SEEK_END)
+        file.seek(max(0, size - _SIZE))
+        end = file.read(_SIZE)
+        if end.startswith(_MARK):
+            if _digest(file.fileno(), size - _SIZE) == end[len(_MARK) :]:
+                return True
+            raise DeckError(f"{path} is damaged: its bytes are not those that were written (SHA-256)")
+    if head.startswith(_HDF5) and size > int.from_bytes(head[_END], "little"):
+        raise DeckError(f"{path} is damaged: the checksum at its end cannot be read")
+    return False

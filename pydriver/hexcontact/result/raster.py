@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .interpolate import nearest_nodes
 from .view import StepView
 
 Array = NDArray[np.float64]
@@ -49,17 +50,7 @@ class Plane:
 
     def nearest(self, view: StepView) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
         """Return row and column of the node next to each pixel, and whether the window has it."""
-        x, y = self.points
-        away = np.stack([x - view.start[0], y - view.start[1]], axis=-1)
-        index = away @ np.linalg.inv(view.basis)
-        corner = np.floor(index).astype(np.intp)
-        corners = corner + np.array([(0, 0), (1, 0), (0, 1), (1, 1)])[:, None, None, :]
-        distance = np.linalg.norm(corners @ view.basis - away, axis=-1)
-        chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0]
-        col, row = chosen[..., 0], chosen[..., 1]
-        n_row, n_col = view.x.shape
-        inside = (row >= 0) & (row < n_row) & (col >= 0) & (col < n_col)
-        return np.clip(row, 0, n_row - 1), np.clip(col, 0, n_col - 1), inside
+        return nearest_nodes(view.lattice.shape, view.basis, view.start, *self.points)
 
 
 def png_of(gray: NDArray[np.uint8]) -> str:

@@ -1,337 +1,94 @@
-"""The result of a run: what each load step leaves, and how it is laid out in a file.
+"""The result of a run by the names of its quantities, and what one does with it.
 
-The quantities are those of `hexcontact.variables`. `Layout` turns a run into dimensions, coordinates
-and attributes (CF-1.11); `assemble` fills an `xarray.Dataset` with it, `hexcontact.netcdf` a file.
+Fields between the nodes and along lines, tables, comparison with closed solutions.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import datetime
-import uuid
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..text import did_you_mean
-from ..variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES
-from .step import Step
-from .tools import ResultTools
+from ..text import did_you_mean, html_table, text_table
+from ..variables import FIELDS, VARIABLES, Variable
+from . import html
+from .interpolate import (
+    Line,
+    Point,
+    PressureField,
+    chosen_fields,
+    first_node,
+    interpolate,
+    profile,
+    section_line,
+)
+from .layout import Layout as Layout
+from .layout import Metadata as Metadata
+from .layout import assemble as assemble
+from .layout import history_of, lattice_of, step_of
+from .layout import now as now
+from .layout import window_of as window_of
+from .step import Step as Step
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
 
+    from ..analytic.compare import Comparison
     from ..core.lattice import Lattice
-    from .pressure_field import PressureField
 
-_COORDINATES = ("step", "row", "col", "x", "y")
-_ATTRIBUTES = (  # all but those that describe the case
-    *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
-    *("lattice_spacing", "lattice_basis", "lattice_origin"),
-    *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
-)
-
-
-def now() -> str:
-    """Return date and time, UTC."""
-    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+_HEADERS = ("quantity", "unit", "given", "meaning")
+_GIVEN = {
+    ("step", "row", "col"): "at each node, by step",
+    ("row", "col"): "at each node",
+    ("step",): "by step",
+}
 
 
-def _version() -> str:
-    from .._version import __version__
-
-    return __version__
-
-
-@dataclass(frozen=True)
-class Metadata:
-    """What a result says about the run it comes from.
-
-    Attributes
-    ----------
-    title : str
-        Title of the case.
-    deck : str
-        The whole deck as text; empty for a case that was built in Python.
-    fields : tuple of str
-        Fields the output keeps; empty: all that there are.
-    every : int
-        The output keeps the fields of every so manieth step, and of the last one.
-    planned_steps : int
-        Load steps the whole run has; 0 while adaptive steps leave it open.
-    parameters : mapping of str to number or text
-        What else describes the case: materials, tolerance, ...
-    run : str
-        A name of this run that no other run has.
-    created : str
-        Start of the run, UTC.
-    version : str
-        Version of the program that started it.
-    resumed : tuple of str
-        A line for each time that the run was resumed.
-    deck_file : str
-        The file that the deck was read from, which its relative file names belong to; not in the output.
-    """
-
-    title: str = ""
-    deck: str = ""
-    fields: tuple[str, ...] = ()
-    every: int = 1
-    planned_steps: int = 0
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    run: str = field(default_factory=lambda: uuid.uuid4().hex)
-    created: str = field(default_factory=now)
-    version: str = field(default_factory=_version)
-    resumed: tuple[str, ...] = ()
-    deck_file: str = ""
-
-    @property
-    def story(self) -> str:
-        """When the run was started and resumed, a line for each."""
-        return "\n".join([f"{self.created} started by hexcontact {self.version}", *self.resumed])
-
-    def attributes(self) -> dict[str, Any]:
-        """Global attributes of a file."""
-        own = {
-            "title": self.title,
-            "output_fields": " ".join(self.fields),
-            "output_every": np.int32(self.every),
-            "planned_steps": np.int32(self.planned_steps),
-            "run": self.run,
-            "created": self.created,
-            "deck": self.deck,
-        }
-        return {**self.parameters, **own}
-
-    @classmethod
-    def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
-        """Return what `dataclasses.asdict` had, from JSON."""
-        tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
-        return cls(**{**values, **tuples})
-
-    @classmethod
-    def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
-        """Read them back.
-
-        Raises
-        ------
-        KeyError, ValueError
-            If one is missing or not what it should be.
-        """
-        return cls(
-            title=str(attributes["title"]),
-            deck=str(attributes["deck"]),
-            fields=tuple(str(attributes["output_fields"]).split()),
-            every=int(attributes["output_every"]),
-            planned_steps=int(attributes["planned_steps"]),
-            parameters={name: value for name, value in attributes.items() if name not in _ATTRIBUTES},
-            run=str(attributes["run"]),
-            created=str(attributes["created"]),
-            version=str(attributes["hexcontact_version"]),
-            resumed=tuple(str(attributes["history"]).splitlines()[1:]),
-        )
-
-
-class Layout:
-    """Dimensions, coordinates, variables and attributes of a result.
+class Quantities(Mapping[str, Variable]):
+    """The quantities that a result holds, by name; printed, a table of them.
 
     Parameters
     ----------
-    metadata : Metadata
-        Where the result comes from, and which fields it keeps.
-    steps : sequence of Step
-        All its steps (heads are enough), in order.
-    trials : mapping of str to sequence, optional
-        What was solved on other lattices, by the names of `hexcontact.variables`: values by trial.
+    names : iterable of str
+        Names, see `hexcontact.variables`.
     """
 
-    def __init__(
-        self, metadata: Metadata, steps: Sequence[Step], trials: Mapping[str, Sequence[Any]] | None = None
-    ) -> None:
-        if not steps:
-            raise ValueError("a result needs at least one finished step")
-        self.metadata = metadata
-        self.steps = steps
-        self.window = _union([step.lattice for step in steps])
-        present = {name for step in steps for name in (*step.fields, *step.history)}
-        if unknown := present - VARIABLES.keys():
-            raise ValueError(f"the result has no quantity named {', '.join(sorted(unknown))}")
-        if metadata.fields:
-            present -= set(FIELDS) - set(metadata.fields)
-        self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
-        self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
-        self.trials = {name: np.array(v, VARIABLES[name].dtype) for name, v in (trials or {}).items()}
-        if self.trials:
-            self.variables |= {name: VARIABLES[name] for name in self.trials}
-            self.sizes["trial"] = len(next(iter(self.trials.values())))
+    def __init__(self, names: list[str]) -> None:
+        self._names = [name for name in VARIABLES if name in names]
 
-    def attributes_of(self, name: str) -> dict[str, Any]:
-        """CF attributes of a variable; those with an estimated error name it."""
-        attributes = VARIABLES[name].attributes
-        if (error := f"{name}_error") in self.variables:
-            attributes["ancillary_variables"] = error
-        return attributes
+    def __getitem__(self, name: str) -> Variable:
+        """Return what a quantity is: units, long_name, dims."""
+        if name not in self._names:
+            raise KeyError(f"the result has no {name}{did_you_mean(name, self._names)}")
+        return VARIABLES[name]
 
-    def coordinates(self) -> dict[str, NDArray[Any]]:
-        """Values of the coordinates."""
-        return {
-            "step": np.array([step.number for step in self.steps], dtype="i4"),
-            "row": np.asarray(self.window.rows, dtype="i4"),
-            "col": np.asarray(self.window.cols, dtype="i4"),
-            "x": np.asarray(self.window.x),
-            "y": np.asarray(self.window.y),
-        }
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names."""
+        return iter(self._names)
 
-    def attributes(self, complete: bool) -> dict[str, Any]:
-        """Global attributes; `complete` says whether all planned steps are there."""
-        from .._version import __version__
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._names)
 
-        window = self.window
-        return {
-            "Conventions": CONVENTIONS,
-            "source": f"hexcontact {__version__}",
-            "history": self.metadata.story,
-            "hexcontact_version": __version__,
-            "schema_version": np.int32(SCHEMA_VERSION),
-            "complete": np.int32(complete),
-            "lattice_spacing": float(window.spacing),
-            "lattice_basis": np.asarray(window.basis, dtype=float).ravel(),
-            "lattice_origin": np.asarray(window.origin, dtype=float),
-            **self.metadata.attributes(),
-        }
+    def _rows(self) -> list[tuple[str, str, str, str]]:
+        return [
+            (name, v.unit.replace("m2", "m²"), _GIVEN[v.dims], v.long_name)
+            for name, v in self.items()
+            if v.dims in _GIVEN
+        ]
 
-    def keeps(self, position: int) -> bool:
-        """Whether the fields of the step at `position` are kept."""
-        last = position == len(self.steps) - 1
-        return last or self.steps[position].number % self.metadata.every == 0
+    def __repr__(self) -> str:
+        """Return the table as text."""
+        return text_table(_HEADERS, self._rows())
 
-    @property
-    def fields(self) -> list[str]:
-        """Names of what has a value at every node."""
-        return [name for name, variable in self.variables.items() if variable.dims[-2:] == ("row", "col")]
-
-    def histories(self) -> dict[str, NDArray[Any]]:
-        """Values of what has one value by step; texts as objects."""
-        return {
-            name: np.array(
-                [step.history.get(name, "" if v.dtype == "str" else v.missing) for step in self.steps],
-                dtype=object if v.dtype == "str" else v.dtype,
-            )
-            for name, v in self.variables.items()
-            if v.dims == ("step",)
-        }
-
-    def field(self, name: str, position: int, step: Step) -> NDArray[Any]:
-        """Values of a field in one step, padded to the whole window."""
-        if self.keeps(position) and name in step.fields:
-            return self.padded(name, step)
-        variable = self.variables[name]
-        return np.full(self.window.shape, variable.missing, dtype=variable.dtype)
-
-    def padded(self, name: str, step: Step) -> NDArray[Any]:
-        """Return a field of `step` on the window of the whole result."""
-        variable = VARIABLES[name]
-        values = np.asarray(step.fields[name], dtype=variable.dtype)
-        if values.shape != step.lattice.shape:
-            raise ValueError(
-                f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
-            )
-        if step.lattice == self.window:
-            return values
-        return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
-
-    def initial_gap(self, known: NDArray[Any] | None, step: Step) -> NDArray[Any]:
-        """Return the initial gap on the whole window: what is `known` so far, completed by `step`."""
-        values = self.padded("initial_gap", step)
-        return values if known is None else np.where(np.isnan(known), values, known)
+    def _repr_html_(self) -> str:
+        return html_table("", _HEADERS, self._rows())
 
 
-def _union(windows: Sequence[Lattice]) -> Lattice:
-    """Return the smallest window that holds all `windows` of one lattice."""
-    first = windows[0]
-    if any((w.spacing, w.origin) != (first.spacing, first.origin) for w in windows):
-        raise ValueError("the steps of a result share one lattice: spacing and origin must not change")
-    row_first = min(w.row_first for w in windows)
-    col_first = min(w.col_first for w in windows)
-    return dataclasses.replace(
-        first,
-        row_first=row_first,
-        col_first=col_first,
-        n_row=max(w.row_first + w.n_row for w in windows) - row_first,
-        n_col=max(w.col_first + w.n_col for w in windows) - col_first,
-    )
-
-
-def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[Any]) -> Lattice:
-    """Return the lattice window that the attributes and index coordinates of a file describe."""
-    from ..core.lattice import Lattice
-
-    x0, y0 = np.asarray(attributes["lattice_origin"], dtype=float)
-    return Lattice(
-        spacing=float(attributes["lattice_spacing"]),
-        row_first=int(rows[0]),
-        col_first=int(cols[0]),
-        n_row=len(rows),
-        n_col=len(cols),
-        origin=(float(x0), float(y0)),
-    )
-
-
-def assemble(
-    metadata: Metadata,
-    steps: Iterable[Step],
-    complete: bool = True,
-    trials: Mapping[str, Sequence[Any]] | None = None,
-) -> xarray.Dataset:
-    """Put the steps of a run together.
-
-    Parameters
-    ----------
-    metadata : Metadata
-        Where the steps come from.
-    steps : iterable of Step
-        The finished steps in order; gone through twice, so not a generator.
-    complete : bool
-        Whether these are all steps of the run.
-    trials : mapping of str to sequence, optional
-        As for `Layout`.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimensions ``step``, ``row``, ``col``; the layout is described in docs/netcdf.md.
-    """
-    import xarray
-
-    layout = Layout(metadata, [step.head for step in steps], trials)
-    values = {
-        name: np.empty([layout.sizes[dim] for dim in VARIABLES[name].dims], VARIABLES[name].dtype)
-        for name in layout.fields
-        if name != "initial_gap"
-    }
-    gap = None
-    for position, step in enumerate(steps):
-        for name, array in values.items():
-            array[position] = layout.field(name, position, step)
-        if "initial_gap" in step.fields:
-            gap = layout.initial_gap(gap, step)
-    if gap is not None:
-        values["initial_gap"] = gap
-    values |= layout.histories() | layout.coordinates() | layout.trials
-    variables = {
-        name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
-        for name, v in VARIABLES.items()
-        if name in values
-    }
-    coordinates = {name: variables.pop(name) for name in _COORDINATES}
-    return xarray.Dataset(variables, coords=coordinates, attrs=layout.attributes(complete))
-
-
-class Result(ResultTools):
+class Result:
     """A result by the names of its quantities.
 
     ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; everything else
@@ -410,7 +167,7 @@ class Result(ResultTools):
     @property
     def lattice(self) -> Lattice:
         """The lattice window that the result covers."""
-        return window_of(self.dataset.attrs, self.dataset["row"].values, self.dataset["col"].values)
+        return lattice_of(self.dataset)
 
     def step(self, number: int) -> xarray.Dataset:
         """Return one load step.
@@ -425,12 +182,7 @@ class Result(ResultTools):
         IndexError
             If there is no such step.
         """
-        numbers = self.dataset["step"].values
-        if -len(self) <= number < 0:
-            return self.dataset.isel(step=number)
-        if number in numbers:
-            return self.dataset.sel(step=number)
-        raise IndexError(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
+        return step_of(self.dataset, number)
 
     def pressure_field(self, number: int = -1) -> PressureField:
         """Return the pressure of a load step at any point, a function of x and y (m).
@@ -450,8 +202,6 @@ class Result(ResultTools):
         ValueError
             If pressure or gap of the step were not kept.
         """
-        from .pressure_field import PressureField
-
         data = self.step(number)
         for name in ("pressure", "gap"):
             if name not in data or not np.isfinite(data[name].values).any():
@@ -459,14 +209,203 @@ class Result(ResultTools):
                     f"the {name} of step {int(data['step'])} was not kept (output.fields, output.every)"
                 )
         lattice = self.lattice
-        start = float(lattice.x[0, 0]), float(lattice.y[0, 0])
-        return PressureField(data["pressure"].values, data["gap"].values, lattice.basis, start)
+        pressure, gap = data["pressure"].values, data["gap"].values
+        return PressureField(pressure, gap, lattice.basis, first_node(lattice))
 
     @property
     def history(self) -> pandas.DataFrame:
         """Table of everything that has one value by step."""
-        names = [str(name) for name in self.dataset.data_vars if self.dataset[name].dims == ("step",)]
-        return self.dataset[names].to_dataframe()
+        return self.dataset[history_of(self.dataset)].to_dataframe()
+
+    # --- between the nodes ----------------------------------------------------------------------------------
+
+    def at(self, name: str, x: ArrayLike, y: ArrayLike, step: int = -1) -> NDArray[np.float64]:
+        """Return a field at any points of the plane, as the solution means it: linear on the triangles.
+
+        Parameters
+        ----------
+        name : str
+            Name of the field, such as "pressure". Of the zone, that of the nearest node is returned.
+        x, y : array_like
+            Points (m), broadcast.
+        step : int
+            Number of the load step, the first is 1; -1 is the last one.
+
+        Returns
+        -------
+        ndarray
+            Values (SI). Outside the window tractions and slip are 0, other fields NaN.
+
+        Raises
+        ------
+        DeckError
+            If there is no such field, or it was not kept.
+        IndexError
+            If there is no such step.
+        """
+        [values] = self._fields([name], step).values()
+        return interpolate(self.lattice, name, values, x, y)
+
+    def profile(
+        self, *names: str, start: Point, end: Point, step: int = -1, points: int | None = None
+    ) -> xarray.Dataset:
+        """Return fields along a line between two points.
+
+        Along a line a field is a polygon. By default the points are its corners, so that the profile
+        joined by straight lines is exactly what the solution means.
+
+        Parameters
+        ----------
+        *names : str
+            Names of fields, such as "pressure"; all that were kept if none is given.
+        start, end : tuple of float
+            Ends of the line, m.
+        step : int
+            Number of the load step, the first is 1; -1 is the last one.
+        points : int, optional
+            Number of evenly spaced points instead.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dimension ``distance`` (m) from the start; ``x`` and ``y`` (m) are coordinates.
+
+        Raises
+        ------
+        DeckError
+            If there is no such field, it was not kept, or the line has no length.
+        IndexError
+            If there is no such step.
+        """
+        return self._along(Line(start, end), names, step, points)
+
+    def section(
+        self,
+        *names: str,
+        angle: float = 0.0,
+        through: Point | None = None,
+        step: int = -1,
+        points: int | None = None,
+    ) -> xarray.Dataset:
+        """Return fields along a line across the whole contact.
+
+        Parameters
+        ----------
+        *names : str
+            Names of fields, such as "pressure"; all that were kept if none is given.
+        angle : float
+            Direction of the line from x, rad.
+        through : tuple of float, optional
+            A point on it (m), from which ``distance`` counts; by default the node next to the center of
+            pressure.
+        step, points : int, optional
+            As for `profile`.
+
+        Returns
+        -------
+        xarray.Dataset
+            As for `profile`.
+
+        Raises
+        ------
+        DeckError
+            If there is no such field, it was not kept, or nothing is in contact.
+        IndexError
+            If there is no such step.
+        """
+        pressure = self._fields(["pressure"], step)["pressure"]
+        line = section_line(self.lattice, pressure, angle, through)
+        return self._along(line, names, step, points)
+
+    def _along(self, line: Line, names: Sequence[str], step: int, points: int | None) -> xarray.Dataset:
+        number = int(self.step(step)["step"])
+        return profile(self.lattice, self._fields(names, step), line, points, step=number)
+
+    def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
+        """Return the values at the nodes of some fields of a step, or of all."""
+        data = self.step(step)
+        known = [str(n) for n, values in data.data_vars.items() if values.dims == ("row", "col")]
+        # xarray reads from the file what is asked for only
+        return chosen_fields(names, {name: cast(Any, data[name]) for name in known}, int(data["step"]))
+
+    # --- tables ---------------------------------------------------------------------------------------------
+
+    @property
+    def quantities(self) -> Quantities:
+        """What there is: names, units, meanings. Printed, a table."""
+        return Quantities([str(name) for name in self.dataset.variables])
+
+    def to_dataframe(self, *names: str, step: int | None = None) -> pandas.DataFrame:
+        """Return quantities as a table; ``attrs["units"]`` of it has their units.
+
+        Parameters
+        ----------
+        *names : str
+            Names of quantities. Without any, or with such as have one value by step only, a line is a load
+            step; with fields it is a node of a load step.
+        step : int, optional
+            Number of the only step that is wanted; -1 is the last one.
+
+        Returns
+        -------
+        pandas.DataFrame
+            SI units. The index is ``step``, or ``step, row, col`` with columns ``x`` and ``y``.
+
+        Raises
+        ------
+        KeyError
+            If there is no such quantity.
+        IndexError
+            If there is no such step.
+        """
+        data = self.dataset if step is None else self.dataset.sel(step=[int(self.step(step)["step"])])
+        chosen = [self[name].name for name in names] or list(self.history.columns)
+        fields = any("row" in data[name].dims for name in chosen)
+        for name in () if fields else ("x", "y"):
+            data = data.drop_vars(name)
+        index = ["step", "row", "col"] if fields else ["step"]
+        table = data[chosen].to_dataframe(dim_order=index)
+        if fields:
+            table = table[["x", "y", *(name for name in chosen if name not in ("x", "y"))]]
+        table.attrs["units"] = {str(n): VARIABLES[str(n)].units for n in table.columns}
+        return table
+
+    def compare(
+        self, exact: Mapping[str, float] | object | None = None, step: int = -1, name: str = "given"
+    ) -> Comparison:
+        """Compare a load step with the closed solutions that hold for it, or with a solution of your own.
+
+        Parameters
+        ----------
+        exact : optional
+            Values (SI) by the names of quantities, or a solution of `hexcontact.analytic`. By default the
+            closed solutions are found from the deck and the load history: Hertz, Sneddon and others for the
+            pressure, Cattaneo, Mindlin and Deresiewicz for shear, Lubkin for torsion, Spence for dissimilar
+            bodies. Each is listed only where it holds.
+        step : int
+            Number of the load step, the first is 1; -1 is the last one.
+        name : str
+            What to call a solution of your own.
+
+        Returns
+        -------
+        Comparison
+            A table: quantity, solution, exact, computed, error. Empty, with a reason, where none is known.
+
+        Raises
+        ------
+        KeyError
+            If there is no quantity of a name.
+        IndexError
+            If there is no such step.
+        """
+        from ..analytic.compare import compare
+
+        for quantity in exact if isinstance(exact, Mapping) else ():
+            self[str(quantity)]  # else KeyError
+        return compare(self.dataset, self.step(step), exact, name)
+
+    # --- what is shown --------------------------------------------------------------------------------------
 
     def close(self) -> None:
         """Let go of the file; only needed before the file is moved or deleted on some systems."""
@@ -474,15 +413,11 @@ class Result(ResultTools):
 
     def __repr__(self) -> str:
         """Say in a few lines what is there."""
-        from ..text import text_table
-        from .html import result_header, result_rows
-
         fields = [name for name in FIELDS if name in self.dataset]
-        table = text_table(("", ""), result_rows(self))
-        lines = [result_header(self), *table.splitlines(), f"fields: {', '.join(fields)}"]
+        table = text_table(("", ""), html.result_rows(self.dataset))
+        header = html.result_header(self.dataset, self.path)
+        lines = [header, *table.splitlines(), f"fields: {', '.join(fields)}"]
         return "\n  ".join([*lines, *([self.stopped] if self.stopped else [])])
 
     def _repr_html_(self) -> str:
-        from .html import result_html
-
-        return result_html(self)
+        return html.result_html(self.dataset, self.path, self.quantities._repr_html_())

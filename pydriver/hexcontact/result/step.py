@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..text import did_you_mean
-from .profiles import Line, Point, chosen_fields, interpolate, profile, section_line
+from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line
 
 if TYPE_CHECKING:
     import xarray

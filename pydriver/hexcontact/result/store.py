@@ -17,20 +17,21 @@ import shlex
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
-from ..files import require_utf8
-from .journal import STOPPED
+from ..files import flush, reading, replacing, require_utf8
+from ..lock import Lock, names_a_run
+from .journal import STOPPED, SUFFIX, write_record
 from .journal import Journal as Journal
 from .journal import journal_of as journal_of
-from .lock import Lock, names_a_run
-from .netcdf import flush, is_ours, read_output, reading, write
-from .record import SUFFIX, write_record
-from .result import Layout, Metadata, Result, Step
-from .trials import TrialFolder
+from .layout import Layout, Metadata
+from .netcdf import is_ours, read_output, write
+from .result import Result
+from .step import Step
+from .trials import TrialFolder, foreign_file, remove_all
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _LACKING = {*LACKING, None}
@@ -193,7 +194,7 @@ class Store:
         if output is not None:
             output.close()
         if ours and complete:  # killed while it cleared the journal away
-            journal.remove()
+            remove_all(self.folder)
             return None
         if left is not None:
             self.metadata = left
@@ -241,7 +242,7 @@ class Store:
             self.folder.mkdir(exist_ok=True)
             flush(self.path.parent)
             left = names_a_run(self.folder / "lock")
-            if not left and (foreign := Journal(self.folder).foreign()):
+            if not left and (foreign := foreign_file(self.folder)):
                 raise DeckError(
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"
@@ -275,7 +276,7 @@ class Store:
                         self._put_together(layout, left, left.complete)
                     if old is not None:
                         old.close()
-            left.remove()
+            remove_all(self.folder)
 
     def __enter__(self) -> Self:
         """Return the store."""
@@ -324,21 +325,14 @@ class Store:
             kind = ResourceError if error.errno in _LACKING else DeckError
             raise kind(f"cannot write {what} of {self.path}: {reason}") from error
 
-    def _replace(self, target: Path, write_to: Callable[[Path], None]) -> None:
-        """Have `target` written under a temporary name, then put it in its place."""
-        temporary = self.folder / (target.name + ".tmp")
-        try:
-            write_to(temporary)
-            os.replace(temporary, target)
-            flush(target.parent)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
-            raise
+    def _replacing(self, target: Path) -> contextlib.AbstractContextManager[Path]:
+        """Give the name in the journal under which a file is written that then replaces `target`."""
+        return replacing(target, self.folder / (target.name + ".tmp"))
 
-    def _put_together(self, layout: Layout, journal: Journal, complete: bool) -> None:
-        """Make the output of all finished steps."""
-        self._replace(self.path, lambda path: write(path, layout, journal, complete))
+    def _put_together(self, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
+        """Make the output of finished steps."""
+        with self._replacing(self.path) as path:
+            write(path, layout, steps, complete)
 
     def append(self, step: Step) -> None:
         """Commit a finished step: when this returns it is on the disk.
@@ -349,25 +343,21 @@ class Store:
             If it cannot be written; the steps before it are kept.
         """
         with self._mutex:
-            if self._closed:
-                raise ValueError("the store is closed")
+            self._require_open()
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
-            with self.writing(f"step {step.number}"):
-                record = self.folder / f"{step.number:06d}{SUFFIX}"
-                self._replace(record, lambda path: write_record(path, self.metadata, step))
+            record = self.folder / f"{step.number:06d}{SUFFIX}"
+            with self.writing(f"step {step.number}"), self._replacing(record) as path:
+                write_record(path, self.metadata, step)
             self.heads.append(step.head)
             steps, moment = self._published
+            # doubling keeps the cost of all interim versions linear
             due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
-            if (
-                due and self.interim and not self._in_the_way
-            ):  # doubling keeps the cost of all interim versions linear
-                self._publish(complete=False)
-
-    def _publish(self, complete: bool) -> None:
-        with self.writing("the output"):
-            self._put_together(Layout(self.metadata, self.heads), Journal(self.folder), complete)
-        self._published = (len(self.heads), time.monotonic())
+            if due and self.interim and not self._in_the_way:
+                with self.writing("the output"):
+                    layout = Layout(self.metadata, self.heads)
+                    self._put_together(layout, Journal(self.folder), complete=False)
+                self._published = (len(self.heads), time.monotonic())
 
     def finish(self) -> None:
         """Put the output in its place and clear the journal away.
@@ -378,13 +368,9 @@ class Store:
             If it cannot be written; the journal is kept.
         """
         with self._mutex:
-            if self._closed:  # by a signal, while the last step was on its way
-                raise ValueError("the store is closed")
+            self._require_open()  # a signal may have closed it while the last step was on its way
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
-            self._publish(complete=True)
-            self.finished = True
-            Journal(self.folder).remove()
-            self.close()
+            self._finish(Layout(self.metadata, self.heads), Journal(self.folder))
 
     def finish_with(
         self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]
@@ -398,22 +384,27 @@ class Store:
         steps : iterable of Step
             The steps; gone through twice, so not a generator.
         trials : mapping of str to sequence
-            What was solved on other lattices, as for `hexcontact.result.Layout`.
+            What was solved on other lattices, as for `hexcontact.result.layout.Layout`.
 
         Raises
         ------
         DeckError, ResourceError
             If it cannot be written; the journal is kept.
         """
-        layout = Layout(metadata, [step.head for step in steps], trials)
         with self._mutex:
-            if self._closed:
-                raise ValueError("the store is closed")
-            with self.writing("the output"):
-                self._replace(self.path, lambda path: write(path, layout, steps, complete=True))
-            self.finished = True
-            Journal(self.folder).remove()
-            self.close()
+            self._finish(Layout(metadata, [step.head for step in steps], trials), steps)
+
+    def _finish(self, layout: Layout, steps: Iterable[Step]) -> None:
+        self._require_open()
+        with self.writing("the output"):
+            self._put_together(layout, steps, complete=True)
+        self.finished = True
+        remove_all(self.folder)
+        self.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise ValueError("the store is closed")
 
     def close(self, reason: str = "") -> None:
         """Let go of the files; the journal of an unfinished run stays.

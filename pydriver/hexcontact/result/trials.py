@@ -16,16 +16,16 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import DeckError
-from .netcdf import flush, reading
-from .result import Metadata, Result
-
-if TYPE_CHECKING:
-    from .journal import Journal
+from ..files import reading, replacing
+from ..lock import names_a_run
+from .journal import Journal, journal_of
+from .layout import Metadata
+from .result import Result
 
 VERSION = 2  # 1 had no checksum
 _JOURNAL = re.compile(r"\d+_\d+\.nc\.d")
@@ -114,28 +114,15 @@ class TrialFolder:
             "solutions": [dataclasses.asdict(solution) for solution in solutions],
         }
         about = json.loads(json.dumps(about, default=np.generic.item))  # as it will be read
-        try:
-            with self._temporary.open("w", encoding="utf-8") as file:
-                json.dump({"sha256": _digest(about), **about}, file)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(self._temporary, self.ledger)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                self._temporary.unlink()
-            raise
-        flush(self.folder)
+        with replacing(self.ledger, self._temporary) as path:
+            path.write_text(json.dumps({"sha256": _digest(about), **about}), encoding="utf-8")
 
     def drop(self, level: int, copy: int = 0) -> None:
         """Delete the load steps of a lattice."""
-        from .journal import Journal, journal_of
-
         _clear(Journal(journal_of(self.path(level, copy))))
 
     def _latest(self) -> tuple[int, Journal]:
         """Return the level of the finest finished lattice, else 0, and its load steps."""
-        from .journal import Journal, journal_of
-
         metadata, solutions = self.read()
         level = max((solution.level for solution in solutions if not solution.copy), default=0)
         journal = Journal(journal_of(self.path(level)))
@@ -185,9 +172,7 @@ class TrialFolder:
     def foreign(self) -> Iterator[Path]:
         """Go through the files with names of a run's, in a folder with no list of finished lattices."""
         yield from (path for path in (self.ledger, self._temporary) if path.exists())
-        for journal in self._journals():
-            if (found := journal.foreign()) is not None:
-                yield found
+        yield from (journal.files[0] for journal in self._journals() if journal.files and not journal.is_ours)
 
     @property
     def _temporary(self) -> Path:
@@ -195,8 +180,6 @@ class TrialFolder:
 
     def _journals(self) -> list[Journal]:
         """Return the load steps of all lattices."""
-        from .journal import Journal
-
         names = sorted(os.listdir(self.folder)) if self.folder.is_dir() else []
         return [Journal(self.folder / name) for name in names if _JOURNAL.fullmatch(name)]
 
@@ -212,13 +195,28 @@ class TrialFolder:
 
 def _clear(journal: Journal) -> None:
     """Delete a journal that no run is writing."""
-    from .lock import names_a_run
-
     journal.remove()
     if names_a_run(lock := journal.folder / "lock"):
         lock.unlink()
     with contextlib.suppress(OSError):
         journal.folder.rmdir()
+
+
+def remove_all(folder: Path) -> None:
+    """Delete what a run has left in the folder of its journal, load steps and lattices; the lock stays."""
+    Journal(folder).remove()
+    TrialFolder(folder).remove()
+
+
+def foreign_file(folder: Path) -> Path | None:
+    """Return a file with a name of a journal's in a folder that no run has written to; None if there is none.
+
+    A run is known by one of its records or its list of finished lattices.
+    """
+    journal, trials = Journal(folder), TrialFolder(folder)
+    if journal.is_ours or trials.is_ours:
+        return None
+    return next(iter([*journal.files, *trials.foreign()]), None)
 
 
 def _digest(about: dict[str, Any]) -> str:

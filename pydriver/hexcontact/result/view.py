@@ -5,53 +5,38 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analytic.hertz_gap import SIMILAR, QuadraticGap
-from ..text import visible
-from ..variables import LARGEST, NOT_KEPT
-from .pressure_field import PressureField, linear
-from .result import Result
+from ..analytic.hertz_gap import QuadraticGap, friction_of, pressure_is_frictionless
+from ..text import scaled as scaled
+from ..text import visible, worded
+from ..variables import LARGEST, spelled
+from .interpolate import PressureField, first_node, is_kept, linear
+from .layout import lattice_of, step_of
 
 if TYPE_CHECKING:
     import xarray
 
-    from ..analytic import EllipticContact
-
-    Results = Result | xarray.Dataset | Sequence[Result | xarray.Dataset]
-
 Array = NDArray[np.float64]
 
 STICK = 1  # value of zone at a sticking node
-_PREFIX = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
-def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Factor and unit that bring a quantity into 1 ... 1000: ``scaled(8.5e8, "Pa")`` is ``(1e-6, "MPa")``.
+class HasDataset(Protocol):
+    """A result: what has a data set."""
 
-    Parameters
-    ----------
-    largest : float
-        Largest magnitude, SI.
-    unit : str
-        SI unit; "1" or empty for a pure number, which is left alone. An area takes the square of a prefix.
-    """
-    if unit in ("", "1") or not np.isfinite(largest) or largest == 0.0:
-        return 1.0, unit.replace("1", "")
-    power = 2 if unit == "m2" else 1
-    exponent = int(3 * np.floor(np.log10(abs(largest) * 1.0000001) / (3 * power)))
-    exponent = min(max(exponent, -12), 9)
-    return 10.0 ** (-exponent * power), _PREFIX[exponent] + unit.replace("m2", "m²")
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Its data set."""
+        ...
 
 
-def worded(value: float, unit: str) -> str:
-    """Write a quantity with four digits and a prefix: "747.6 µm", "1 kN"."""
-    factor, scaled_unit = scaled(value, unit)
-    return f"{value * factor:.4g} {scaled_unit}"
+if TYPE_CHECKING:
+    AnyResult = HasDataset | xarray.Dataset
+    Results = AnyResult | Sequence[AnyResult]
 
 
 def title_of(dataset: xarray.Dataset) -> str:
@@ -59,11 +44,10 @@ def title_of(dataset: xarray.Dataset) -> str:
     return visible(str(dataset.attrs.get("title", ""))).replace("$", r"\$")
 
 
-@dataclass(frozen=True)
 class StepView:
     """One load step of a result, as pictures need it; lengths in m, pressure in Pa.
 
-    Parameters
+    Attributes
     ----------
     title : str
         Title of the case with the step (of several) and its loads.
@@ -75,30 +59,41 @@ class StepView:
         Coordinates of the nodes and contact pressure.
     contact : ndarray of bool, shape (n_row, n_col)
         Nodes with pressure.
+    lattice : Lattice
+        The window.
     spacing : float
         l_e.
     basis : ndarray, shape (2, 2)
         Basis vectors of the lattice as rows.
+    start : tuple of float
+        Position of the first node of the window, m.
     center : tuple of float
         Center of the Hertz contact, else of the pressure.
     hertz : EllipticContact or None
         Hertz solution, if the initial gap is a quadratic form.
     """
 
-    title: str
-    number: int
-    data: xarray.Dataset
-    x: Array
-    y: Array
-    pressure: Array
-    contact: NDArray[np.bool_]
-    spacing: float
-    basis: Array
-    center: tuple[float, float]
-    hertz: EllipticContact | None
+    def __init__(self, dataset: xarray.Dataset, step: int) -> None:
+        self.data = step_of(dataset, step)
+        self.number = int(self.data["step"])
+        self.pressure = self.field("pressure")
+        self.contact = self.pressure > 0.0
+        self.x, self.y = dataset["x"].values, dataset["y"].values
+        self.lattice = lattice_of(dataset)
+        self.spacing, self.basis = self.lattice.spacing, self.lattice.basis
+        self.start = first_node(self.lattice)
+        gap, load = QuadraticGap.of(dataset), float(self.data["normal_load"])
+        if gap is None:
+            weight = max(float(self.pressure.sum()), np.finfo(float).tiny)
+            x, y = (float((self.pressure * place).sum() / weight) for place in (self.x, self.y))
+        self.center = (x, y) if gap is None else gap.center
+        self.hertz = gap.contact(load) if gap and load > 0.0 else None
+        several = f"step {self.number}" if dataset.sizes["step"] > 1 else ""
+        named = ", ".join(filter(None, (title_of(dataset), several)))
+        self.title = f"{named} ({_loads(self.data)})".lstrip()
 
     @classmethod
-    def of(cls, result: Result | xarray.Dataset, step: int) -> StepView:
+    def of(cls, result: AnyResult, step: int) -> StepView:
         """Look at step number ``step`` (from 1; -1 is the last one) of a result.
 
         Raises
@@ -108,51 +103,17 @@ class StepView:
         ValueError
             If the pressure of that step was not kept.
         """
-        dataset = dataset_of(result)
-        one = Result(dataset).step(step)
-        if "pressure" not in one:
-            raise ValueError("the pressure was not kept (output.fields)")
-        pressure = one["pressure"].values
-        if not np.isfinite(pressure).any():
-            raise ValueError(f"the pressure of step {int(one['step'])} was not kept (output.every)")
-        _refuse_nonsense("pressure", pressure)
-        x, y = dataset["x"].values, dataset["y"].values
-        gap, load = QuadraticGap.of(dataset), float(one["normal_load"])
-        if gap is None:
-            weight = max(float(pressure.sum()), np.finfo(float).tiny)
-            center = (float((pressure * x).sum() / weight), float((pressure * y).sum() / weight))
-        else:
-            center = gap.center
-        named = [title_of(dataset)]
-        if dataset.sizes["step"] > 1:
-            named.append(f"step {int(one['step'])}")
-        title = ", ".join(filter(None, named)) + f" ({_loads(one)})"
-        return cls(
-            title=title.lstrip(),
-            number=int(one["step"]),
-            data=one,
-            x=x,
-            y=y,
-            pressure=pressure,
-            contact=pressure > 0.0,
-            spacing=float(dataset.attrs["lattice_spacing"]),
-            basis=np.asarray(dataset.attrs["lattice_basis"], dtype=float).reshape(2, 2),
-            center=center,
-            hertz=gap.contact(load) if gap and load > 0.0 else None,
-        )
+        return cls(dataset_of(result), step)
 
     @property
     def friction(self) -> float:
         """Coefficient of friction; 0 for a contact that was solved without friction."""
-        if self.data.attrs.get("algorithm", "frictionless") == "frictionless":
-            return 0.0
-        return float(self.data.attrs.get("friction_coefficient", 0.0))
+        return friction_of(self.data.attrs)
 
     @property
     def hertz_holds(self) -> bool:
-        """Whether the pressure is that of Hertz: no friction, or similar bodies."""
-        similar = abs(float(self.data.attrs.get("dundurs_beta", 1.0))) <= SIMILAR
-        return self.hertz is not None and (self.friction == 0.0 or similar)
+        """Whether the pressure is that of Hertz."""
+        return self.hertz is not None and pressure_is_frictionless(self.data.attrs)
 
     @property
     def tangential_load(self) -> float:
@@ -168,15 +129,16 @@ class StepView:
         ValueError
             If the result, or this step of it, does not hold the field.
         """
-        words = name.replace("_", " ")
+        words = spelled(name)
         if name not in self.data:
             if self.friction == 0.0 and name.startswith(("traction", "slip", "accumulated")):
                 raise ValueError(f"a contact without friction has no {words}")
             raise ValueError(f"the {words} was not kept (output.fields)")
         values = self.data[name].values
-        if (values == NOT_KEPT).all() if name == "zone" else not np.isfinite(values).any():
+        if not is_kept(values):
             raise ValueError(f"the {words} of step {self.number} was not kept (output.every)")
-        _refuse_nonsense(words, values)
+        if (abs(values) > LARGEST).any():  # of a file that was changed: what is computed with it overflows
+            raise ValueError(f"the {words} holds numbers that no contact has")
         return np.asarray(values, dtype=float)
 
     @property
@@ -199,11 +161,6 @@ class StepView:
         """
         return linear(self.pressure if values is None else values, self.basis, self.start, x, y)
 
-    @property
-    def start(self) -> tuple[float, float]:
-        """Position of the first node of the window, m."""
-        return float(self.x[0, 0]), float(self.y[0, 0])
-
     @functools.cached_property
     def pressure_field(self) -> PressureField | None:
         """Pressure at any point, to the edge between the nodes; None if the gap was not kept."""
@@ -222,12 +179,6 @@ class StepView:
         return middle_x - half_x, middle_x + half_x, middle_y - half_y, middle_y + half_y
 
 
-def _refuse_nonsense(words: str, values: Array) -> None:
-    """Refuse a field of a file that somebody has changed: what is computed with it would overflow."""
-    if (abs(values) > LARGEST).any():
-        raise ValueError(f"the {words} holds numbers that no contact has")
-
-
 def _loads(one: xarray.Dataset) -> str:
     """Name the loads of a step: the normal load, and those that friction has to work for."""
     normal = float(one["normal_load"])
@@ -244,11 +195,11 @@ def _loads(one: xarray.Dataset) -> str:
     return ", ".join(named)
 
 
-def as_list(results: Results) -> list[Result | xarray.Dataset]:
+def as_list(results: Results) -> list[AnyResult]:
     """Return the results as a list, also if it is only one."""
     return list(results) if isinstance(results, Sequence) else [results]
 
 
-def dataset_of(result: Result | xarray.Dataset) -> xarray.Dataset:
+def dataset_of(result: AnyResult) -> xarray.Dataset:
     """Return the dataset of a result, or the dataset itself."""
     return cast("xarray.Dataset", getattr(result, "dataset", result))

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from ..errors import DeckError, HexcontactError
-from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, worth_showing
+from ..result.history import worth_showing
 from ..text import visible
+from ..variables import RESIDUALS, label_of
 
 if TYPE_CHECKING:
     from ..core.lattice import Lattice
@@ -103,7 +104,7 @@ def finished(step: Step, total: int | None) -> None:
     values: dict[str, Any] = {"segment": history.get("segment", "-"), "label": history.get("label", "")}
     values["fraction"] = step.ramp_done
     shown = worth_showing([history])
-    values |= {LOADS_AND_MOTIONS[name][0].replace(" ", "_"): float(history[name]) for name in shown}
+    values |= {label_of(name).replace(" ", "_"): float(history[name]) for name in shown}
     values["p_max"] = float(history["max_pressure"])
     values |= _zones(step)
     values |= {sign: _rounded(history[name]) for sign, name in RESIDUALS.items() if name in history}

@@ -16,8 +16,8 @@ import numpy as np
 
 from .._version import __version__
 from ..errors import DeckError, HexcontactError
+from ..result.journal import PHYSICS, physics
 from ..result.netcdf import read_output
-from ..result.record import PHYSICS, physics
 from ..result.result import Metadata, Result, Step, now
 from ..result.store import Store, journal_of, open_result
 from ..result.trials import TrialFolder

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..deck.series import LOADS
 from ..errors import AccuracyWarning, HexcontactError, PathWarning, StopRun
-from ..result.remarks import unasked_path
+from ..result.history import unasked_path
 from ..result.result import Metadata, Result, Step, assemble
 from ..text import visible
 from . import log, nonconvergence

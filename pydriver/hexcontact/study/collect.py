@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DeckError, ResourceError
-from ..files import require_ordinary
-from ..result.netcdf import flush, reading
-from ..result.seal import check_seal
+from ..files import flush, reading, require_ordinary
+from ..result.netcdf import check_seal
 from ..variables import CONVENTIONS, VARIABLES
 from .folder import StudyFolder
 from .plan import Axis, Plan

@@ -19,9 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ConvergenceError, DeckError, ResourceError
-from ..files import require_ordinary, text_of
-from ..result.lock import Lock
-from ..result.netcdf import flush
+from ..files import flush, require_ordinary, text_of
+from ..lock import Lock
 from .plan import Plan, PlannedCase, hash_of
 
 _INDEX = "index.json"

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ..errors import DeckError
+from .errors import DeckError
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
 _LONGEST = 1000  # bytes of a lock

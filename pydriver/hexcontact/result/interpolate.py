@@ -1,23 +1,24 @@
 """Fields between the nodes: at any point, and along lines.
 
 A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
-a polygon, whose corners lie where the line crosses the edges of triangles; nothing is smoothed.
+a polygon, whose corners lie where the line crosses the edges of triangles; nothing is smoothed. In
+`PressureField` alone the pressure ends at the edge of the contact, like a square root.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.edges import ContactEdges
 from ..errors import DeckError
 from ..text import did_you_mean
 from ..variables import NOT_KEPT, VARIABLES
-from .pressure_field import linear
 
 if TYPE_CHECKING:
     import xarray
@@ -30,6 +31,67 @@ Fields = Mapping[str, NDArray[Any]]
 
 _MARGIN = 0.15  # of a section on both sides, in widths of the contact
 _SAME = 1e-9  # spacings between corners that are one
+
+
+def linear(values: Array, basis: Array, start: tuple[float, float], x: ArrayLike, y: ArrayLike) -> Array:
+    """Interpolate values at the nodes of a lattice linearly on its triangles; 0 outside the window.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_row, n_col)
+        Values at the nodes.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as rows, m.
+    start : tuple of float
+        Position of node [0, 0], m.
+    x, y : array_like
+        Points, m.
+
+    Returns
+    -------
+    ndarray
+        Values at the points, in their shape.
+    """
+    points = np.stack([np.ravel(x), np.ravel(y)], axis=1) - start
+    col, row = np.linalg.solve(np.asarray(basis).T, points.T)
+    col, row = np.round(col, 9), np.round(row, 9)  # a node is a node
+    i, j = np.floor(col).astype(int), np.floor(row).astype(int)
+    u, v = col - i, row - j
+    padded = np.pad(values, 1)
+    n_row, n_col = padded.shape
+    lower = u + v <= 1
+    total = np.zeros(u.shape)
+    for dj, di, weight in (
+        (0, 0, np.maximum(1 - u - v, 0.0)),
+        (0, 1, np.where(lower, u, 1 - v)),
+        (1, 0, np.where(lower, v, 1 - u)),
+        (1, 1, np.maximum(u + v - 1, 0.0)),
+    ):
+        value = padded[np.clip(j + dj + 1, 0, n_row - 1), np.clip(i + di + 1, 0, n_col - 1)]
+        total += np.where(weight > 0.0, weight * value, 0.0)
+    return total.reshape(np.shape(x))
+
+
+def nearest_nodes(
+    shape: tuple[int, int], basis: Array, start: Point, x: Array, y: Array
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
+    """Return row and column of the node next to each point, and whether the window of this shape has it.
+
+    Without such a node they are those of one at the rim. The other arguments are those of `linear`.
+    """
+    away = np.stack([x - start[0], y - start[1]], axis=-1)
+    corner = np.floor(away @ np.linalg.inv(basis)).astype(np.intp)
+    corners = corner + np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).reshape(4, *(1,) * x.ndim, 2)
+    distance = np.linalg.norm(corners @ basis - away, axis=-1)
+    chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0]
+    node = np.clip(chosen, 0, np.array(shape)[::-1] - 1)
+    return node[..., 1], node[..., 0], (node == chosen).all(axis=-1)
+
+
+def first_node(lattice: Lattice) -> Point:
+    """Return the position (m) of the first node of a window."""
+    alone = replace(lattice, n_row=1, n_col=1)
+    return alone.x.item(), alone.y.item()
 
 
 def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike, y: ArrayLike) -> Array:
@@ -53,30 +115,43 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
         Values at the points. Outside the window tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-    start = float(lattice.x[0, 0]), float(lattice.y[0, 0])
+    start = first_node(lattice)
     variable = VARIABLES[name]
     if variable.flags:
-        return _nearest(lattice, values, start, x, y, variable.padding)
+        row, col, inside = nearest_nodes(lattice.shape, lattice.basis, start, x, y)
+        return np.where(inside, values[row, col], variable.padding).astype(float)
     found = linear(np.asarray(values, dtype=float), lattice.basis, start, x, y)
     if math.isnan(variable.padding):
-        inside = linear(np.ones(lattice.shape), lattice.basis, start, x, y)
-        found = np.where(inside > 1.0 - _SAME, found, np.nan)
+        share = linear(np.ones(lattice.shape), lattice.basis, start, x, y)  # 1 inside the window
+        found = np.where(share > 1.0 - _SAME, found, np.nan)
     return found
 
 
-def _nearest(
-    lattice: Lattice, values: NDArray[Any], start: Point, x: Array, y: Array, outside: float
-) -> Array:
-    """Return values at the nodes next to some points."""
-    away = np.stack([x - start[0], y - start[1]], axis=-1)
-    corner = np.floor(away @ np.linalg.inv(lattice.basis))
-    corners = corner + np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).reshape(4, *(1,) * x.ndim, 2)
-    distance = np.linalg.norm(corners @ lattice.basis - away, axis=-1)
-    chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0].astype(int)
-    col, row = chosen[..., 0], chosen[..., 1]
-    inside = (row >= 0) & (row < lattice.n_row) & (col >= 0) & (col < lattice.n_col)
-    at = values[np.clip(row, 0, lattice.n_row - 1), np.clip(col, 0, lattice.n_col - 1)]
-    return np.where(inside, at, outside).astype(float)
+class PressureField:
+    """The pressure of a solution at any point.
+
+    Near the edge of the contact its square is interpolated, which is linear in the distance; elsewhere, and
+    where the contact ends at nodes that can never touch, the pressure itself is.
+
+    Parameters
+    ----------
+    pressure, gap : ndarray, shape (n_row, n_col)
+        Contact pressure (Pa) and gap (m) at the nodes; the gap is NaN where nothing can touch.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as rows, m.
+    start : tuple of float
+        Position of node [0, 0], m.
+    """
+
+    def __init__(self, pressure: Array, gap: Array, basis: Array, start: tuple[float, float]) -> None:
+        self._pressure, self._basis, self._start = pressure, basis, start
+        self._squares = ContactEdges(pressure, gap, pressure > 0.0, np.isfinite(gap), basis, start).squares()
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the pressure (Pa) at some points (m), in their shape; 0 outside the window."""
+        plain = linear(self._pressure, self._basis, self._start, x, y)
+        square = linear(self._squares, self._basis, self._start, x, y)
+        return np.where(np.isnan(square), plain, np.sqrt(np.maximum(square, 0.0)))
 
 
 # --- lines --------------------------------------------------------------------------------------------------
@@ -199,7 +274,7 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
             hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
             raise DeckError(f"{name} {what}{hint}")
     found = {name: np.asarray(fields[name]) for name in names or fields}
-    kept = {name: values for name, values in found.items() if _is_kept(name, values)}
+    kept = {name: values for name, values in found.items() if is_kept(values)}
     for name in names:
         if name not in kept:
             raise DeckError(f"{name} of step {step} was not kept (output.every)")
@@ -208,8 +283,9 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
     return kept
 
 
-def _is_kept(name: str, values: NDArray[Any]) -> bool:
-    return bool((values != NOT_KEPT).any() if VARIABLES[name].flags else (~np.isnan(values)).any())
+def is_kept(values: NDArray[Any]) -> bool:
+    """Tell whether the output holds a field of a step, by its values."""
+    return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())
 
 
 def profile(
@@ -247,20 +323,19 @@ def profile(
         raise DeckError(f"points = {points!r}: expected a whole number of at least 2")
     distance = line.corners(lattice) if points is None else np.linspace(0.0, line.length, points)
     x, y = line.points(distance)
-    length = {"units": "m"}
+    places = {
+        "distance": (distance - line.zero, "distance along the line"),
+        "x": (x, "x coordinate"),
+        "y": (y, "y coordinate"),
+    }
     return xarray.Dataset(
         {
             name: ("distance", interpolate(lattice, name, values, x, y), VARIABLES[name].attributes)
             for name, values in fields.items()
         },
         coords={
-            "distance": (
-                "distance",
-                distance - line.zero,
-                {"long_name": "distance along the line", **length},
-            ),
-            "x": ("distance", x, {"long_name": "x coordinate", **length}),
-            "y": ("distance", y, {"long_name": "y coordinate", **length}),
+            name: ("distance", values, {"long_name": long_name, "units": "m"})
+            for name, (values, long_name) in places.items()
         },
         attrs=attributes,
     )

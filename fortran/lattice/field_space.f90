@@ -1,0 +1,271 @@
+!> The space of the fields over a window: who shares the work on them, and what combines the values of many nodes.
+!>
+!> Fields are plain arrays: windows (n_col, n_row), or vectors of nodes. Sums are taken in fixed blocks or row by row,
+!> so that they do not depend on the number of threads.
+module hc_field_space
+  use hc_precision, only: wp, sp
+  !$ use omp_lib, only: omp_get_max_threads
+  implicit none
+  private
+
+  public :: field_space_t, space_over, sum_block, most_threads
+
+  !> Terms that one thread adds up.
+  integer, parameter :: sum_block = 4096
+  !> Threads that may be asked for: more than any machine has, fewer than the system refuses to start.
+  integer, parameter :: most_threads = 1024
+  !> Smaller fields are left to one thread: starting the others takes longer than they save.
+  integer, parameter :: worth_sharing = 16384
+
+  !> Who shares the work on the fields.
+  type :: field_space_t
+    !> Number of threads
+    integer :: threads = 1
+  contains
+    !> Assign and combine vectors
+    procedure :: fill, copy, add, add_columns
+    !> Scalar product of two vectors, and of several with one
+    procedure :: dot, dots
+    !> Sum and largest element of a vector or of a field over the window; of nothing, zero and the least number there is
+    generic :: sum => vector_sum, window_sum, window_sum_single
+    generic :: max => vector_max, window_max
+    !> Number of nodes of a set
+    procedure :: count => count_nodes
+    !> Threads for a field of some nodes, one for a small field
+    procedure :: threads_for
+    procedure, private :: vector_sum, window_sum, window_sum_single, vector_max, window_max
+  end type field_space_t
+
+  interface
+    !> Scalar product (BLAS)
+    pure real(wp) function ddot(n, dx, incx, dy, incy)
+      import :: wp
+      implicit none
+      integer, intent(in) :: n, incx, incy
+      real(wp), intent(in) :: dx(1 + (n - 1)*abs(incx)), dy(1 + (n - 1)*abs(incy))
+    end function ddot
+  end interface
+
+contains
+
+  !> The space of a window.
+  type(field_space_t) function space_over(extent, n_threads) result(space)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use; absent or 0: as many as OpenMP would take, one for a small window
+    integer, intent(in), optional :: n_threads
+
+    space%threads = 1
+    !$ if (product(extent) >= worth_sharing) space%threads = min(omp_get_max_threads(), most_threads)
+    if (present(n_threads)) then
+      !$ if (n_threads > 0) space%threads = n_threads
+    end if
+  end function space_over
+
+  !> Threads for a field of some nodes.
+  pure integer function threads_for(self, n)
+    class(field_space_t), intent(in) :: self
+    !> Number of nodes
+    integer, intent(in) :: n
+
+    threads_for = merge(self%threads, 1, n >= worth_sharing)
+  end function threads_for
+
+  !> x <- value
+  subroutine fill(self, x, value)
+    class(field_space_t), intent(in) :: self
+    !> Vector
+    real(wp), intent(out), contiguous :: x(:)
+    real(wp), intent(in) :: value
+    integer :: i
+
+    !$omp parallel do simd schedule(static) num_threads(self%threads)
+    do i = 1, size(x)
+      x(i) = value
+    end do
+    !$omp end parallel do simd
+  end subroutine fill
+
+  !> y <- x
+  subroutine copy(self, x, y)
+    class(field_space_t), intent(in) :: self
+    !> Vectors of equal length
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp), intent(out), contiguous :: y(:)
+    integer :: i
+
+    !$omp parallel do simd schedule(static) num_threads(self%threads)
+    do i = 1, size(x)
+      y(i) = x(i)
+    end do
+    !$omp end parallel do simd
+  end subroutine copy
+
+  !> y <- y + x
+  subroutine add(self, x, y)
+    class(field_space_t), intent(in) :: self
+    !> Vectors of equal length
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp), intent(inout), contiguous :: y(:)
+    integer :: i
+
+    !$omp parallel do simd schedule(static) num_threads(self%threads)
+    do i = 1, size(x)
+      y(i) = y(i) + x(i)
+    end do
+    !$omp end parallel do simd
+  end subroutine add
+
+  !> The largest element.
+  real(wp) function vector_max(self, x)
+    class(field_space_t), intent(in) :: self
+    !> Vector
+    real(wp), intent(in), contiguous :: x(:)
+    integer :: i
+
+    vector_max = -huge(1.0_wp)
+    !$omp parallel do simd schedule(static) num_threads(self%threads) reduction(max: vector_max)
+    do i = 1, size(x)
+      vector_max = max(vector_max, x(i))
+    end do
+    !$omp end parallel do simd
+  end function vector_max
+
+  !> The largest element of a field over the window.
+  real(wp) function window_max(self, x)
+    class(field_space_t), intent(in) :: self
+    !> Field (n_col, n_row)
+    real(wp), intent(in), contiguous :: x(:, :)
+    integer :: col, row
+
+    window_max = -huge(1.0_wp)
+    !$omp parallel do schedule(static) num_threads(self%threads) private(col) reduction(max: window_max)
+    do row = 1, size(x, 2)
+      !$omp simd reduction(max: window_max)
+      do col = 1, size(x, 1)
+        window_max = max(window_max, x(col, row))
+      end do
+    end do
+    !$omp end parallel do
+  end function window_max
+
+  !> Number of nodes of a set.
+  integer function count_nodes(self, nodes)
+    class(field_space_t), intent(in) :: self
+    !> Vector, true on the nodes of the set
+    logical, intent(in), contiguous :: nodes(:)
+    integer :: i
+
+    count_nodes = 0
+    !$omp parallel do simd schedule(static) num_threads(self%threads) reduction(+: count_nodes)
+    do i = 1, size(nodes)
+      count_nodes = count_nodes + merge(1, 0, nodes(i))
+    end do
+    !$omp end parallel do simd
+  end function count_nodes
+
+  !> Sum of the elements.
+  real(wp) function vector_sum(self, x)
+    class(field_space_t), intent(in) :: self
+    !> Vector
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp) :: part((size(x) + sum_block - 1)/sum_block)
+    integer :: k
+
+    !$omp parallel do schedule(static) num_threads(self%threads)
+    do k = 1, size(part)
+      part(k) = sum(x((k - 1)*sum_block + 1:min(k*sum_block, size(x))))
+    end do
+    !$omp end parallel do
+    vector_sum = sum(part)
+  end function vector_sum
+
+  !> Sum of a field over the window, row by row.
+  real(wp) function window_sum(self, x)
+    class(field_space_t), intent(in) :: self
+    !> Field (n_col, n_row)
+    real(wp), intent(in), contiguous :: x(:, :)
+    real(wp) :: part(size(x, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(self%threads)
+    do row = 1, size(x, 2)
+      part(row) = sum(x(:, row))
+    end do
+    !$omp end parallel do
+    window_sum = sum(part)
+  end function window_sum
+
+  !> The same of a field in single precision: the sum is taken in double precision.
+  real(wp) function window_sum_single(self, x)
+    class(field_space_t), intent(in) :: self
+    !> Field (n_col, n_row)
+    real(sp), intent(in), contiguous :: x(:, :)
+    real(wp) :: part(size(x, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(self%threads)
+    do row = 1, size(x, 2)
+      part(row) = sum(real(x(:, row), wp))
+    end do
+    !$omp end parallel do
+    window_sum_single = sum(part)
+  end function window_sum_single
+
+  !> x <- x + B share
+  subroutine add_columns(self, b, share, x)
+    class(field_space_t), intent(in) :: self
+    !> Vectors to be added
+    real(wp), intent(in), contiguous :: b(:, :)
+    !> Their factors
+    real(wp), intent(in) :: share(:)
+    !> What they are added to
+    real(wp), intent(inout), contiguous :: x(:)
+    integer :: i, m, from, to
+
+    !$omp parallel do schedule(static) num_threads(self%threads) private(i, m, to)
+    do from = 1, size(x), sum_block
+      to = min(from + sum_block - 1, size(x))
+      do m = 1, size(share)
+        do i = from, to
+          x(i) = x(i) + share(m)*b(i, m)
+        end do
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine add_columns
+
+  !> Scalar products of several vectors with one.
+  function dots(self, b, x)
+    class(field_space_t), intent(in) :: self
+    !> The several
+    real(wp), intent(in), contiguous :: b(:, :)
+    !> The one
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp) :: dots(size(b, 2))
+    integer :: m
+
+    do m = 1, size(b, 2)
+      dots(m) = self%dot(b(:, m), x)
+    end do
+  end function dots
+
+  !> Scalar product, summed in fixed blocks.
+  real(wp) function dot(self, a, b)
+    class(field_space_t), intent(in) :: self
+    !> Vectors of equal length
+    real(wp), intent(in), contiguous :: a(:), b(:)
+    real(wp) :: part((size(a) + sum_block - 1)/sum_block)
+    integer :: k, from, to
+
+    !$omp parallel do schedule(static) num_threads(self%threads) private(from, to)
+    do k = 1, size(part)
+      from = (k - 1)*sum_block + 1
+      to = min(k*sum_block, size(a))
+      part(k) = ddot(to - from + 1, a(from:to), 1, b(from:to), 1)
+    end do
+    !$omp end parallel do
+    dot = sum(part)
+  end function dot
+
+end module hc_field_space

@@ -1,0 +1,331 @@
+"""How the load steps of a run are laid out in a data set or a file.
+
+The quantities are those of `hexcontact.variables`. `Layout` turns a run into dimensions, coordinates
+and attributes (CF-1.11); `assemble` fills an `xarray.Dataset` with it, `hexcontact.result.netcdf` a file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._version import __version__
+from ..core.lattice import Lattice
+from ..variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES
+from .step import Step
+
+if TYPE_CHECKING:
+    import xarray
+
+_COORDINATES = ("step", "row", "col", "x", "y")
+_ATTRIBUTES = (  # all but those that describe the case
+    *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
+    *("lattice_spacing", "lattice_basis", "lattice_origin"),
+    *("title", "output_fields", "output_every", "planned_steps", "run", "created", "deck"),
+)
+
+
+def now() -> str:
+    """Return date and time, UTC."""
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """What a result says about the run it comes from.
+
+    Attributes
+    ----------
+    title : str
+        Title of the case.
+    deck : str
+        The whole deck as text; empty for a case that was built in Python.
+    fields : tuple of str
+        Fields the output keeps; empty: all that there are.
+    every : int
+        The output keeps the fields of every so manieth step, and of the last one.
+    planned_steps : int
+        Load steps the whole run has; 0 while adaptive steps leave it open.
+    parameters : mapping of str to number or text
+        What else describes the case: materials, tolerance, ...
+    run : str
+        A name of this run that no other run has.
+    created : str
+        Start of the run, UTC.
+    version : str
+        Version of the program that started it.
+    resumed : tuple of str
+        A line for each time that the run was resumed.
+    deck_file : str
+        The file that the deck was read from, which its relative file names belong to; not in the output.
+    """
+
+    title: str = ""
+    deck: str = ""
+    fields: tuple[str, ...] = ()
+    every: int = 1
+    planned_steps: int = 0
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    run: str = field(default_factory=lambda: uuid.uuid4().hex)
+    created: str = field(default_factory=now)
+    version: str = __version__
+    resumed: tuple[str, ...] = ()
+    deck_file: str = ""
+
+    @property
+    def story(self) -> str:
+        """When the run was started and resumed, a line for each."""
+        return "\n".join([f"{self.created} started by hexcontact {self.version}", *self.resumed])
+
+    def attributes(self) -> dict[str, Any]:
+        """Global attributes of a file."""
+        own = {
+            "title": self.title,
+            "output_fields": " ".join(self.fields),
+            "output_every": np.int32(self.every),
+            "planned_steps": np.int32(self.planned_steps),
+            "run": self.run,
+            "created": self.created,
+            "deck": self.deck,
+        }
+        return {**self.parameters, **own}
+
+    @classmethod
+    def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
+        """Return what `dataclasses.asdict` had, from JSON."""
+        tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
+        return cls(**{**values, **tuples})
+
+    @classmethod
+    def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
+        """Read them back.
+
+        Raises
+        ------
+        KeyError, ValueError
+            If one is missing or not what it should be.
+        """
+        return cls(
+            title=str(attributes["title"]),
+            deck=str(attributes["deck"]),
+            fields=tuple(str(attributes["output_fields"]).split()),
+            every=int(attributes["output_every"]),
+            planned_steps=int(attributes["planned_steps"]),
+            parameters={name: value for name, value in attributes.items() if name not in _ATTRIBUTES},
+            run=str(attributes["run"]),
+            created=str(attributes["created"]),
+            version=str(attributes["hexcontact_version"]),
+            resumed=tuple(str(attributes["history"]).splitlines()[1:]),
+        )
+
+
+class Layout:
+    """Dimensions, coordinates, variables and attributes of a result.
+
+    Parameters
+    ----------
+    metadata : Metadata
+        Where the result comes from, and which fields it keeps.
+    steps : sequence of Step
+        All its steps (heads are enough), in order.
+    trials : mapping of str to sequence, optional
+        What was solved on other lattices, by the names of `hexcontact.variables`: values by trial.
+    """
+
+    def __init__(
+        self, metadata: Metadata, steps: Sequence[Step], trials: Mapping[str, Sequence[Any]] | None = None
+    ) -> None:
+        if not steps:
+            raise ValueError("a result needs at least one finished step")
+        self.metadata = metadata
+        self.steps = steps
+        self.window = _union([step.lattice for step in steps])
+        present = {name for step in steps for name in (*step.fields, *step.history)}
+        if unknown := present - VARIABLES.keys():
+            raise ValueError(f"the result has no quantity named {', '.join(sorted(unknown))}")
+        if metadata.fields:
+            present -= set(FIELDS) - set(metadata.fields)
+        self.variables = {name: VARIABLES[name] for name in VARIABLES if name in present}
+        self.sizes = {"step": len(steps), "row": self.window.n_row, "col": self.window.n_col}
+        self.trials = {name: np.array(v, VARIABLES[name].dtype) for name, v in (trials or {}).items()}
+        if self.trials:
+            self.variables |= {name: VARIABLES[name] for name in self.trials}
+            self.sizes["trial"] = len(next(iter(self.trials.values())))
+
+    def attributes_of(self, name: str) -> dict[str, Any]:
+        """CF attributes of a variable; those with an estimated error name it."""
+        attributes = VARIABLES[name].attributes
+        if (error := f"{name}_error") in self.variables:
+            attributes["ancillary_variables"] = error
+        return attributes
+
+    def coordinates(self) -> dict[str, NDArray[Any]]:
+        """Values of the coordinates."""
+        return {
+            "step": np.array([step.number for step in self.steps], dtype="i4"),
+            "row": np.asarray(self.window.rows, dtype="i4"),
+            "col": np.asarray(self.window.cols, dtype="i4"),
+            "x": np.asarray(self.window.x),
+            "y": np.asarray(self.window.y),
+        }
+
+    def attributes(self, complete: bool) -> dict[str, Any]:
+        """Global attributes; `complete` says whether all planned steps are there."""
+        window = self.window
+        return {
+            "Conventions": CONVENTIONS,
+            "source": f"hexcontact {__version__}",
+            "history": self.metadata.story,
+            "hexcontact_version": __version__,
+            "schema_version": np.int32(SCHEMA_VERSION),
+            "complete": np.int32(complete),
+            "lattice_spacing": float(window.spacing),
+            "lattice_basis": np.asarray(window.basis, dtype=float).ravel(),
+            "lattice_origin": np.asarray(window.origin, dtype=float),
+            **self.metadata.attributes(),
+        }
+
+    def keeps(self, position: int) -> bool:
+        """Whether the fields of the step at `position` are kept."""
+        last = position == len(self.steps) - 1
+        return last or self.steps[position].number % self.metadata.every == 0
+
+    @property
+    def fields(self) -> list[str]:
+        """Names of what has a value at every node."""
+        return [name for name, variable in self.variables.items() if variable.dims[-2:] == ("row", "col")]
+
+    def histories(self) -> dict[str, NDArray[Any]]:
+        """Values of what has one value by step; texts as objects."""
+        return {
+            name: np.array(
+                [step.history.get(name, "" if v.dtype == "str" else v.missing) for step in self.steps],
+                dtype=object if v.dtype == "str" else v.dtype,
+            )
+            for name, v in self.variables.items()
+            if v.dims == ("step",)
+        }
+
+    def field(self, name: str, position: int, step: Step) -> NDArray[Any]:
+        """Values of a field in one step, padded to the whole window."""
+        if self.keeps(position) and name in step.fields:
+            return self.padded(name, step)
+        variable = self.variables[name]
+        return np.full(self.window.shape, variable.missing, dtype=variable.dtype)
+
+    def padded(self, name: str, step: Step) -> NDArray[Any]:
+        """Return a field of `step` on the window of the whole result."""
+        variable = VARIABLES[name]
+        values = np.asarray(step.fields[name], dtype=variable.dtype)
+        if values.shape != step.lattice.shape:
+            raise ValueError(
+                f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
+            )
+        if step.lattice == self.window:
+            return values
+        return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
+
+    def initial_gap(self, known: NDArray[Any] | None, step: Step) -> NDArray[Any]:
+        """Return the initial gap on the whole window: what is `known` so far, completed by `step`."""
+        values = self.padded("initial_gap", step)
+        return values if known is None else np.where(np.isnan(known), values, known)
+
+
+def _union(windows: Sequence[Lattice]) -> Lattice:
+    """Return the smallest window that holds all `windows` of one lattice."""
+    first = windows[0]
+    if any((w.spacing, w.origin) != (first.spacing, first.origin) for w in windows):
+        raise ValueError("the steps of a result share one lattice: spacing and origin must not change")
+    row_first = min(w.row_first for w in windows)
+    col_first = min(w.col_first for w in windows)
+    return dataclasses.replace(
+        first,
+        row_first=row_first,
+        col_first=col_first,
+        n_row=max(w.row_first + w.n_row for w in windows) - row_first,
+        n_col=max(w.col_first + w.n_col for w in windows) - col_first,
+    )
+
+
+def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[Any]) -> Lattice:
+    """Return the lattice window that the attributes and index coordinates of a file describe."""
+    x0, y0 = np.asarray(attributes.get("lattice_origin", (0.0, 0.0)), dtype=float).tolist()
+    spacing = float(attributes["lattice_spacing"])
+    return Lattice(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols), (x0, y0))
+
+
+def lattice_of(dataset: xarray.Dataset) -> Lattice:
+    """Return the lattice window that a result covers."""
+    return window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
+
+
+def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
+    """Return a load step of a result by its number, see `hexcontact.Result.step`."""
+    numbers = dataset["step"].values
+    if -len(numbers) <= number < 0:
+        return dataset.isel(step=number)
+    if number in numbers:
+        return dataset.sel(step=number)
+    raise IndexError(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
+
+
+def history_of(dataset: xarray.Dataset) -> list[str]:
+    """Return the names of all that a result has one value of by step."""
+    return [str(name) for name, values in dataset.data_vars.items() if values.dims == ("step",)]
+
+
+def assemble(
+    metadata: Metadata,
+    steps: Iterable[Step],
+    complete: bool = True,
+    trials: Mapping[str, Sequence[Any]] | None = None,
+) -> xarray.Dataset:
+    """Put the steps of a run together.
+
+    Parameters
+    ----------
+    metadata : Metadata
+        Where the steps come from.
+    steps : iterable of Step
+        The finished steps in order; gone through twice, so not a generator.
+    complete : bool
+        Whether these are all steps of the run.
+    trials : mapping of str to sequence, optional
+        As for `Layout`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``step``, ``row``, ``col``; the layout is described in docs/netcdf.md.
+    """
+    import xarray
+
+    layout = Layout(metadata, [step.head for step in steps], trials)
+    values = {
+        name: np.empty([layout.sizes[dim] for dim in VARIABLES[name].dims], VARIABLES[name].dtype)
+        for name in layout.fields
+        if name != "initial_gap"
+    }
+    gap = None
+    for position, step in enumerate(steps):
+        for name, array in values.items():
+            array[position] = layout.field(name, position, step)
+        if "initial_gap" in step.fields:
+            gap = layout.initial_gap(gap, step)
+    if gap is not None:
+        values["initial_gap"] = gap
+    values |= layout.histories() | layout.coordinates() | layout.trials
+    variables = {
+        name: xarray.Variable(v.dims, values[name], layout.attributes_of(name))
+        for name, v in VARIABLES.items()
+        if name in values
+    }
+    coordinates = {name: variables.pop(name) for name in _COORDINATES}
+    return xarray.Dataset(variables, coords=coordinates, attrs=layout.attributes(complete))

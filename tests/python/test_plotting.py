@@ -12,7 +12,7 @@ import xarray
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
-from hexcontact import analytic, plotting
+from hexcontact import Result, analytic, plotting
 from hexcontact.analytic import EllipticContact
 from hexcontact.core import estimators
 from hexcontact.plotting import maps as plotting_maps
@@ -331,6 +331,21 @@ def test_section_of_a_step_before_the_last(center: tuple[float, float]) -> None:
     result = sphere(center, loads=(0.2, 0.8, 1.1))
     hertz = analytic.hertz_ellipse(2.0, np.eye(2) / 1.5, normal_load=0.8)
     is_section(*plotting.section(result, 2).axes, StepView.of(result, 2), hertz)
+
+
+@pytest.mark.parametrize(("degrees", "through"), [(0.0, None), (17.0, None), (90.0, (0.13, -0.2))])
+def test_a_figure_draws_the_section_of_the_result(
+    degrees: float, through: tuple[float, float] | None
+) -> None:
+    result, angle = Result(cylinders()), np.radians(degrees)
+    line = result.section("pressure", angle=angle, through=through)
+    axes = plotting.section(result, angle=angle, through=through).axes[-1]
+    zero = {0.0: float(line.x[0] - line.distance[0]), 90.0: float(line.y[0] - line.distance[0])}
+    ends = np.array([line.distance[0], line.distance[-1]]) + zero.get(degrees, 0.0)
+    low, high = np.asarray(axes.get_xlim()) * drawn.units(axes.get_xlabel())
+    assert_allclose((low + 0.02 * np.ptp(ends), high - 0.02 * np.ptp(ends)), ends, rtol=0, atol=1e-9)
+    s, p = drawn.si(axes.figure.axes[0], axes.figure.axes[0].lines[0], axes.get_xlabel())
+    assert_allclose(p, np.interp(s - zero.get(degrees, 0.0), line.distance, line.pressure), atol=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [17.0, 30.0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -11,7 +11,9 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, line_of
+from ..result.history import LOADS_AND_MOTIONS, worth_showing
 from ..result.view import dataset_of, scaled, title_of
+from ..variables import PANELS, VARIABLES, spelled
 from .registry import figure
 from .style import COMPUTED, EXACT, GUIDE, new_figure, set_title
 
@@ -23,30 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Panels of the history: quantities of one unit share a panel. A panel whose quantities stay 0 is left out.
-HISTORY = (
-    ("normal_load",),
-    ("tangential_load_x", "tangential_load_y"),
-    ("torque",),
-    ("approach",),
-    ("shift_x", "shift_y"),
-    ("twist",),
-    ("contact_area", "stick_area"),
-    ("max_pressure",),
-    ("max_traction",),
-    ("dissipated_energy",),
-)
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
-# A motion or load is shown if it is not tiny beside this quantity, times this power of the contact radius.
-_BESIDE = {
-    "tangential_load_x": ("normal_load", 0),
-    "tangential_load_y": ("normal_load", 0),
-    "torque": ("normal_load", 1),
-    "shift_x": ("approach", 0),
-    "shift_y": ("approach", 0),
-    "twist": ("approach", -1),
-}
-_TINY = 1e-4
 _MANY = 60  # steps that are too many for a marker each
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as a band around
 
@@ -73,26 +52,51 @@ def _largest(dataset: xarray.Dataset, names: Sequence[str]) -> float:
     return float(np.abs(finite).max()) if finite.size else 0.0
 
 
-def panels_of(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
+def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """Return the quantities that share a panel, and what curves are called there, by the title of the panel.
+
+    Loads and motions that are no more than noise, and quantities that stay 0, have no curve. Areas are those
+    to the edge between the nodes, where the histories have them.
+
+    Parameters
+    ----------
+    histories : sequence of mapping
+        History of each step.
+    """
+    noise = LOADS_AND_MOTIONS.keys() - worth_showing(histories)
+    panels: dict[str, dict[str, str]] = {}
+    for title, names in PANELS.items():
+        shown = [name for name in fitted(histories[0], names) if name in histories[0] and name not in noise]
+        several = len(names) > 1
+        curves = {
+            name: (VARIABLES[name].symbol or _apart(name.removesuffix("_fit"), names)) if several else ""
+            for name in shown
+            if peak(name, histories) > 0.0
+        }
+        if curves:
+            panels[title] = curves
+    return panels
+
+
+def peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
+    """Return the largest magnitude of a quantity."""
+    values = np.abs([float(history[name]) for history in histories])
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def fitted(known: Container[str], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of areas or radii to the edge between the nodes, where all of them are known."""
+    fits = tuple(f"{name}_fit" for name in names)
+    return fits if all(name in known for name in fits) else names
+
+
+def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
     """Return the quantities that a history shows by default, those of a panel together."""
     known = _known(dataset)
-    radius = _largest(dataset, ["contact_radius"]) if "contact_radius" in known else 1.0
-
-    def shown(name: str) -> bool:
-        if name not in known:
-            return False
-        beside, power = _BESIDE.get(name, (name, 0))
-        scale = _largest(dataset, [beside]) * (radius or 1.0) ** power
-        return beside == name or _largest(dataset, [name]) > _TINY * scale
-
-    panels = (tuple(filter(shown, names)) for names in (HISTORY if "stick_area" in known else FRICTIONLESS))
-    return [fitted(dataset, names) for names in panels if names]
-
-
-def fitted(dataset: xarray.Dataset, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of areas or radii to the edge between the nodes, where the result has them all."""
-    fits = tuple(f"{name}_fit" for name in names)
-    return fits if all(name in dataset for name in fits) else names
+    if "stick_area" not in known:
+        return [fitted(known, names) for names in FRICTIONLESS if names[0] in known]
+    histories = dataset[known].reset_coords(drop=True).to_dataframe().to_dict("records")
+    return [tuple(curves) for curves in panels_of(histories).values()]
 
 
 @figure("history", "loads, motions, areas, p_max by step or over a load")
@@ -106,7 +110,7 @@ def history(
     result : Result or xarray.Dataset
         What a run returned, or `open_result` read.
     quantities : sequence of str, optional
-        Names of the history variables, a panel each; by default those of `HISTORY` that are there.
+        Names of the history variables, a panel each; by default those that are more than noise.
     over : str
         What is along the axis: "step", or a history variable such as "tangential_load_x".
 
@@ -120,7 +124,7 @@ def history(
         If a name is not a history variable of the result.
     """
     dataset = dataset_of(result)
-    panels = panels_of(dataset) if quantities is None else [(name,) for name in quantities]
+    panels = _chosen(dataset) if quantities is None else [(name,) for name in quantities]
     known = _known(dataset)
     wanted = [*(name for names in panels for name in names), *([over] if over != "step" else [])]
     if unknown := [name for name in wanted if name not in known]:
@@ -170,7 +174,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
 
 
 def _titled(name: str, unit: str) -> str:
-    return name.removesuffix("_fit").replace("_", " ") + (f" ({unit})" if unit else "")
+    return spelled(name.removesuffix("_fit")) + (f" ({unit})" if unit else "")
 
 
 def _common(names: Sequence[str]) -> str:
@@ -258,7 +262,7 @@ def torsion(result: Result | xarray.Dataset) -> Figure:
         If there is no torque in this result.
     """
     dataset = dataset_of(result)
-    if "twist" not in dataset or not any("torque" in names for names in panels_of(dataset)):
+    if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise ValueError("there is no torque in this result")
     canvas = new_figure(4.6, 3.8)
     axes = canvas.add_subplot()

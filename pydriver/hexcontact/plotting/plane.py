@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -47,15 +47,16 @@ class Part:
     unit: str
 
     @classmethod
-    def around(cls, views: Sequence[StepView], margin: float = 1.25, least_aspect: float = 0.0) -> Part:
+    def around(cls, views: Iterable[StepView], margin: float = 1.25, least_aspect: float = 0.0) -> Part:
         """Return the part with the contact of some steps, at least so wide for its height, and so high."""
-        limits = np.array([view.window(margin) for view in views])
+        windows, spacings = zip(*((view.window(margin), view.spacing) for view in views), strict=True)
+        limits = np.array(windows)
         x_min, _, y_min, _ = limits.min(axis=0)
         _, x_max, _, y_max = limits.max(axis=0)
         more_x = max(0.5 * (least_aspect * (y_max - y_min) - (x_max - x_min)), 0.0)
         more_y = max(0.5 * (least_aspect * (x_max - x_min) - (y_max - y_min)), 0.0)
         shown = [float(v) for v in (x_min - more_x, x_max + more_x, y_min - more_y, y_max + more_y)]
-        factor, unit = scaled(max(abs(shown[0]), abs(shown[1]), views[0].spacing), "m")
+        factor, unit = scaled(max(abs(shown[0]), abs(shown[1]), spacings[0]), "m")
         return cls((shown[0], shown[1], shown[2], shown[3]), factor, unit)
 
     @property

@@ -14,10 +14,13 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
-from ..result.history import LOADS_AND_MOTIONS, RESIDUALS, step_rows, worth_showing
+from ..result.history import step_rows
 from ..result.raster import Plane, png_of
-from ..result.view import StepView, scaled
-from ..variables import VARIABLES
+from ..result.view import StepView, scaled, worded
+from ..variables import LOADS, MAPS, RESIDUALS, VARIABLES, spelled
+from .history import panels_of, peak
+from .plane import Limits, Part
+from .sections import line_of
 
 if TYPE_CHECKING:
     from ..result.result import Result
@@ -30,38 +33,6 @@ _ZONES = 480  # pixels of the longer side of a zone map
 _ARROWS = 15  # along the longer side
 _CUT = 201  # points of a section
 _NOISE = 1e-7  # share of the approach up to which slip is no more than the tolerance leaves
-_CURVES = (  # title, and what is drawn over the step number
-    ("Normal load", ("normal_load",)),
-    ("Approach", ("approach",)),
-    ("Tangential load", ("tangential_load_x", "tangential_load_y")),
-    ("Shift", ("shift_x", "shift_y")),
-    ("Torque", ("torque",)),
-    ("Twist", ("twist",)),
-    ("Contact and stick area", ("contact_area_fit", "stick_area_fit")),
-    ("Largest pressure", ("max_pressure",)),
-    ("Largest shear traction", ("max_traction",)),
-    ("Elastic energy", ("elastic_energy",)),
-    ("Dissipated energy", ("dissipated_energy",)),
-)
-_LOOPS = (  # title, what is drawn over what
-    ("Tangential load over shift, x", "shift_x", "tangential_load_x"),
-    ("Tangential load over shift, y", "shift_y", "tangential_load_y"),
-    ("Torque over twist", "twist", "torque"),
-)
-_SYMBOLS = {
-    "tangential_load_x": "Q_x",
-    "tangential_load_y": "Q_y",
-    "shift_x": "x",
-    "shift_y": "y",
-    "contact_area_fit": "contact",
-    "stick_area_fit": "stick",
-}
-_MAPS = (  # name, title, components, whether the page gives all steps one color scale at first
-    ("pressure", "Pressure", ("pressure",), True),
-    ("traction", "Shear traction", ("traction_x", "traction_y"), True),
-    ("slip", "Slip in the step", ("slip_increment_x", "slip_increment_y"), False),
-    ("accumulated_slip", "Slip path so far", ("accumulated_slip",), True),
-)
 
 
 def rounded(values: Any, digits: int = 4) -> list[float | None]:
@@ -123,84 +94,66 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     dict
         What the page reads as JSON: limits, maps (pictures in base64), arrows, zones, sections.
     """
-    first = StepView.of(result, numbers[-1])
-    limits = _limits(result, numbers, first)
-    known = [entry for entry in _MAPS if set(entry[2]) <= set(first.data)]
-    if first.friction == 0.0:
-        known = [entry for entry in known if entry[0] == "pressure"]
+    last = StepView.of(result, numbers[-1])
+    part = Part.around((StepView.of(result, number) for number in numbers), 1.2, 0.2)
+    known = {title: names for title, names in MAPS.items() if set(names) <= set(last.data)}
+    if last.friction == 0.0:
+        known = {title: names for title, names in known.items() if not VARIABLES[names[0]].frictional}
     pixels = int(np.clip(math.sqrt(_BYTES / (0.45 * len(known) * len(numbers))), 70, 260))
-    plane, fine = Plane(limits, pixels), Plane(limits, _ZONES)
-    to_length, length = scaled(max(map(abs, limits)), "m")
+    plane, fine = Plane(part.limits, pixels), Plane(part.limits, _ZONES)
     shown: dict[str, dict[str, Any]] = {
-        name: {
-            "name": name,
+        title: {
+            "name": names[0].removesuffix("_x"),
             "title": title,
-            "common": common,
-            "unit": VARIABLES[parts[0]].units,
+            "common": "increment" not in names[0],  # all steps have one color scale at first
+            "unit": VARIABLES[names[0]].units,
             "images": [],
             "max": [],
             "arrows": [],
         }
-        for name, title, parts, common in known
+        for title, names in known.items()
     }
-    nearest = fine.nearest(first) if first.friction and "zone" in first.data else None
-    zones, sections = [], []
+    zones: list[str] = []
+    sections = []
     noise = _NOISE * float(np.abs(result.dataset["approach"].values).max())
-    cut = np.linspace(limits[0], limits[1], _CUT), np.full(_CUT, 0.5 * (limits[2] + limits[3]))
+    line = line_of((StepView.of(result, number) for number in numbers), 0.0)
+    place = np.linspace(0.0, line.length, _CUT)
     for number in numbers:
         view = StepView.of(result, number)
         contact = view.at(*plane.points) > 0.0
         weight = np.where(contact, view.at(*plane.points, view.contact.astype(float)), 1.0)
-        for name, _, parts, _ in known:
-            values = [np.nan_to_num(view.data[part].values) for part in parts]
-            size = np.sqrt(sum(view.at(*plane.points, part) ** 2 for part in values))
-            if "slip" in name:  # does not go to zero at the edge: nodes beyond it have no say
+        for title, names in known.items():
+            entry, slip = shown[title], VARIABLES[names[0]].units == "m"
+            values = [np.nan_to_num(view.data[name].values) for name in names]
+            size = np.sqrt(sum(view.at(*plane.points, component) ** 2 for component in values))
+            if slip:  # does not go to zero at the edge: nodes beyond it have no say
                 size = size / weight
-            largest = float(np.sqrt(sum(part**2 for part in values))[view.contact].max(initial=0.0))
-            if "slip" in name and largest < noise:
+            largest = float(np.sqrt(sum(component**2 for component in values))[view.contact].max(initial=0.0))
+            if slip and largest < noise:
                 largest = 0.0
-            shown[name]["images"].append(_gray(size, largest, contact))
-            shown[name]["max"].append(rounded(largest)[0])
-            if len(parts) == 2:
-                shown[name]["arrows"].append(_arrows(view, limits, values, largest) if largest else [])
-        if nearest is not None:
-            row, col, inside = nearest
-            zone = np.where(inside, view.data["zone"].values[row, col], 0).astype("u1")
-            zones.append(png_of(zone))
-        sections.append(_section(view, *cut))
-    shown = {name: entry for name, entry in shown.items() if "slip" not in name or any(entry["max"])}
-    for entry in shown.values():
-        factor, unit = scaled(max((m or 0.0 for m in entry["max"]), default=0.0), entry["unit"])
-        entry |= {"unit": unit, "max": rounded([factor * (m or 0.0) for m in entry["max"]])}
+            entry["images"].append(_gray(size, largest, contact))
+            entry["max"].append(largest)
+            if len(names) == 2:
+                entry["arrows"].append(_arrows(view, part.limits, values, largest) if largest else [])
+        if view.friction and "zone" in view.data:
+            row, col, inside = fine.nearest(view)
+            zones.append(png_of(np.where(inside, view.data["zone"].values[row, col], 0).astype("u1")))
+        sections.append(_section(view, *line.points(place)))
+    for title, entry in list(shown.items()):
+        if entry["unit"] == "m" and not any(entry["max"]):
+            del shown[title]
+            continue
+        factor, entry["unit"] = scaled(max(entry["max"]), entry["unit"])
+        entry["max"] = rounded([factor * largest for largest in entry["max"]])
     return {
         "steps": list(numbers),
-        "limits": rounded([to_length * value for value in limits], 6),
-        "length": length,
+        "limits": rounded([part.factor * value for value in part.limits], 6),
+        "length": part.unit,
         "maps": list(shown.values()),
         "zones": zones,
-        "sections": _scaled_sections(sections, cut[0] * to_length, first),
-        "section_y": f"{cut[1][0] * to_length:.4g} {length}",
+        "sections": _scaled_sections(sections, (line.start[0] + place) * part.factor),
+        "section_y": worded(line.start[1], "m"),
     }
-
-
-def _limits(result: Result, numbers: Sequence[int], view: StepView) -> tuple[float, float, float, float]:
-    """Limits of all maps: around what is in contact in any of the steps."""
-    ever = np.zeros(view.contact.shape, dtype=bool)
-    for number in numbers:
-        ever |= result.step(number)["pressure"].values > 0.0
-    if not ever.any():
-        ever[:] = True
-    x, y, margin = view.x[ever], view.y[ever], 1.08
-    middle_x, middle_y = 0.5 * (x.max() + x.min()), 0.5 * (y.max() + y.min())
-    half_x, half_y = (0.5 * margin * np.ptp(v) + 1.5 * view.spacing for v in (x, y))
-    least = 0.2 * max(half_x, half_y)  # long contacts are not drawn as lines
-    half_x, half_y = max(half_x, least), max(half_y, least)
-    return (
-        float(middle_x - half_x),
-        float(middle_x + half_x),
-        float(middle_y - half_y),
-        float(middle_y + half_y),
-    )
 
 
 def _gray(values: Array, largest: float, contact: NDArray[np.bool_]) -> str:
@@ -208,9 +161,7 @@ def _gray(values: Array, largest: float, contact: NDArray[np.bool_]) -> str:
     return png_of(np.where(contact, 1 + np.round(254 * shades), 0).astype("u1"))
 
 
-def _arrows(
-    view: StepView, limits: tuple[float, float, float, float], components: Sequence[Array], largest: float
-) -> list[int]:
+def _arrows(view: StepView, limits: Limits, components: Sequence[Array], largest: float) -> list[int]:
     """Return arrows on a triangular pattern: four whole numbers for each.
 
     x and y in thousandths of the map, from its upper left corner, and components in percent of the largest.
@@ -247,7 +198,7 @@ def _section(view: StepView, x: Array, y: Array) -> dict[str, Array]:
     return curves
 
 
-def _scaled_sections(sections: Sequence[dict[str, Array]], x: Array, view: StepView) -> dict[str, Any]:
+def _scaled_sections(sections: Sequence[dict[str, Array]], x: Array) -> dict[str, Any]:
     """Bring the curves of all steps to one unit; leave out components that are nothing but noise."""
     names = list(dict.fromkeys(name for section in sections for name in section))
     peak = {name: max(float(np.abs(s[name]).max()) for s in sections if name in s) for name in names}
@@ -273,47 +224,41 @@ def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     Parameters
     ----------
     histories : sequence of mapping
-        History of each step.
+        History of each step, with its number.
     """
     if len(histories) < 2:
         return []
-    telling = {name for name in VARIABLES if name in histories[0] and name not in LOADS_AND_MOTIONS}
-    telling |= set(worth_showing(histories))
+
+    def curves_of(names: Mapping[str, str]) -> dict[str, Any]:
+        """Return the unit of some quantities, and their values by what the curves are called."""
+        largest = max(peak(name, histories) for name in names)
+        factor, unit = scaled(largest, VARIABLES[next(iter(names))].units)
+        values = {
+            word: rounded([factor * float(history[name]) for history in histories], 5)
+            for name, word in names.items()
+        }
+        return {"unit": unit, "curves": values}
+
     steps = [history["step"] for history in histories]
-    charts: list[dict[str, Any]] = []
-    for title, names in _CURVES:
-        shown = [name for name in names if name in telling and _peak(name, histories) > 0.0]
-        if not shown:
-            continue
-        factor, unit = scaled(max(_peak(name, histories) for name in shown), VARIABLES[shown[0]].units)
-        curves = {_SYMBOLS.get(name, ""): _values(name, histories, factor) for name in shown}
-        charts.append({"title": title, "x": steps, "xlabel": "step", "unit": unit, "curves": curves})
-    for title, over, name in _LOOPS:
-        if {over, name} <= telling and min(_peak(over, histories), _peak(name, histories)) > 0.0:
-            to_x, x_unit = scaled(_peak(over, histories), VARIABLES[over].units)
-            factor, unit = scaled(_peak(name, histories), VARIABLES[name].units)
+    panels = panels_of(histories)
+    charts = [
+        {"title": title, "x": steps, "xlabel": "step", **curves_of(names)} for title, names in panels.items()
+    ]
+    shown = {name for names in panels.values() for name in names}
+    for motion, (load, way) in LOADS.items():
+        if motion != "z" and {load, way} <= shown:
+            title = f"{VARIABLES[load].title} over {VARIABLES[way].title.lower()}"
+            over = curves_of({way: ""})
             charts.append(
                 {
-                    "title": title,
-                    "x": _values(over, histories, to_x),
-                    "xlabel": f"{over.replace('_', ' ')} [{x_unit}]",
-                    "unit": unit,
-                    "curves": {"": _values(name, histories, factor)},
+                    "title": title + (f", {motion}" if motion in "xy" else ""),
+                    "x": over["curves"][""],
+                    "xlabel": f"{spelled(way)} [{over['unit']}]",
+                    **curves_of({load: ""}),
                     "points": True,
                 }
             )
-    signs = {sign: name for sign, name in RESIDUALS.items() if name in histories[0]}
-    curves = {sign: _values(name, histories, 1.0) for sign, name in signs.items() if _peak(name, histories)}
-    charts.append(
-        {"title": "Residuals", "x": steps, "xlabel": "step", "unit": "", "curves": curves, "log": True}
-    )
-    return charts
-
-
-def _peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
-    values = np.abs([float(history[name]) for history in histories])
-    return float(values[np.isfinite(values)].max(initial=0.0))
-
-
-def _values(name: str, histories: Sequence[Mapping[str, Any]], factor: float) -> list[float | None]:
-    return rounded([factor * float(history[name]) for history in histories], 5)
+    residuals = {name: sign for sign, name in RESIDUALS.items() if name in histories[0]}
+    residuals = {name: sign for name, sign in residuals.items() if peak(name, histories)}
+    found = curves_of(residuals) if residuals else {"unit": "", "curves": {}}
+    return [*charts, {"title": "Residuals", "x": steps, "xlabel": "step", **found, "log": True}]

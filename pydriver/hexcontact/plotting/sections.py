@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +32,18 @@ Point = tuple[float, float]
 _APART = 100  # nodes along a line that can be told apart
 
 
+def line_of(views: Iterable[StepView], angle: float, through: Point | None = None) -> Line:
+    """Return the line across the contacts of some steps of one result, see `section_line`.
+
+    Without any contact it crosses the whole window.
+    """
+    lattice, loaded = None, np.zeros(())
+    for view in views:
+        lattice, loaded = view.lattice, np.maximum(loaded, view.pressure)
+    assert lattice is not None
+    return section_line(lattice, loaded if loaded.any() else np.ones(loaded.shape), angle, through)
+
+
 @dataclass(frozen=True)
 class Cut:
     """The line of a section, and how values along it are drawn.
@@ -39,7 +51,7 @@ class Cut:
     Attributes
     ----------
     line : Line
-        The line, see `section_line`.
+        The line, see `line_of`.
     angle : float
         Its direction from x, rad.
     place : ndarray
@@ -59,11 +71,8 @@ class Cut:
 
     @classmethod
     def of(cls, views: Sequence[StepView], angle: float, through: Point | None = None) -> Cut:
-        """Cut the contacts of some steps of one result, see `section_line`; the whole window without any."""
-        lattice, loaded = views[0].lattice, np.max([view.pressure for view in views], axis=0)
-        if not loaded.any():
-            loaded = np.ones_like(loaded)
-        line = section_line(lattice, loaded, angle, through)
+        """Cut the contacts of some steps of one result, see `line_of`."""
+        line, lattice = line_of(views, angle, through), views[0].lattice
         corners = line.corners(lattice)
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
         nodes = corners[(abs(index - np.round(index)) < 1e-6).all(axis=1)]
@@ -107,7 +116,7 @@ class Cut:
 
     def show(self, axes: Axes) -> None:
         """Label the axis and end it with the line."""
-        low, high = self.along(np.array([0.0, self.line.length]))
+        low, high = self.along(np.array([-0.02, 1.02]) * self.line.length)
         axes.set(xlim=(low, high), xlabel=self._label(self.lengths[1]))
 
     def _label(self, unit: str) -> str:

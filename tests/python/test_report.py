@@ -302,7 +302,8 @@ def test_sections_hold_pressure_and_bounds(folder: Path) -> None:
     x = 1e-6 * np.array(fields["sections"]["x"])
     line = result.section("pressure", points=201)
     np.testing.assert_allclose(x, line.x, rtol=5e-5, atol=1e-12)
-    assert fields["section_y"] == worded(middle := float(line.y[0]), "m")
+    middle = float(line.y[0])
+    assert fields["section_y"] == worded(middle, "m")
     for panel, name, field, factor in (
         (pressure, "p", "pressure", 1.0),
         (shear, "q_x", "traction_x", 1.0),

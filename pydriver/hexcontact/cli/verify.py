@@ -62,16 +62,6 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Known:
-    """What is known about a quantity, in SI; nan where there is no such value."""
-
-    published: float = math.nan
-    reference: float = math.nan
-    uncertainty: float = math.nan
-    analytic: float = math.nan
-
-
-@dataclass(frozen=True)
 class Row:
     """One compared quantity, SI; nan where there is no such value, tolerance nan: reported, not judged."""
 
@@ -108,55 +98,6 @@ class Comparison:
 
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-
-    def add(
-        self,
-        case: str,
-        quantity: str,
-        unit: str,
-        computed: float,
-        *,
-        row: Known | None = None,
-        analytic: float = math.nan,
-        judge: str = "",
-        relative: float = math.nan,
-        absolute: float = math.nan,
-    ) -> None:
-        """Add a row.
-
-        Parameters
-        ----------
-        case, quantity : str
-            What was computed.
-        unit : str
-            Unit to show it in, a key of `UNITS`.
-        computed : float
-            The value, SI.
-        row : Known, optional
-            What is known about it.
-        analytic : float
-            The analytic value, SI, instead of that of `row`.
-        judge : str
-            "reference" or "analytic": what the difference is taken from; by default the reference, if any.
-        relative, absolute : float
-            Bound on the difference, relative or in SI; without one the row is reported, not judged.
-        """
-        known = row or Known()
-        by_reference = judge == "reference" or (not judge and not math.isnan(known.reference))
-        self.rows.append(
-            Row(
-                case,
-                quantity,
-                unit,
-                computed,
-                published=known.published,
-                reference=known.reference,
-                analytic=known.analytic if math.isnan(analytic) else analytic,
-                judge="reference" if by_reference else "analytic",
-                tolerance=relative if math.isnan(absolute) else absolute,
-                absolute=not math.isnan(absolute),
-            )
-        )
 
     @property
     def passed(self) -> bool:
@@ -342,13 +283,16 @@ def _solve(entry: Mapping[str, Any]) -> Comparison:
         computed = float(step[value["quantity"]])
         if over := value.get("over"):
             computed /= float(step[over])
-        found.add(
+        about = f"{value['quantity']}/{over}" if over else value["quantity"]
+        row = Row(
             f"step {value['step']}",
-            f"{value['quantity']}/{over}" if over else value["quantity"],
+            about,
             value.get("unit", "-"),
             computed,
-            row=Known(**{value["source"]: value["value"]}),
-            relative=value["relative"],
+            judge=value["source"],
+            tolerance=value["relative"],
+            **{value["source"]: value["value"]},
         )
+        found.rows.append(row)
     found.notes.append(entry["note"])
     return found

@@ -84,7 +84,7 @@ def peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
     return float(values[np.isfinite(values)].max(initial=0.0))
 
 
-def fitted(known: Container[str], names: tuple[str, ...]) -> tuple[str, ...]:
+def fitted(known: Container[Any], names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of areas or radii to the edge between the nodes, where all of them are known."""
     fits = tuple(f"{name}_fit" for name in names)
     return fits if all(name in known for name in fits) else names

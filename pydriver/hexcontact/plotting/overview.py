@@ -83,9 +83,7 @@ def _frictional(dataset: xarray.Dataset, view: StepView) -> Figure:
     below = lower.subplots(1, 3 if several else 1)
     draw_shear(below[0] if several else below, view, exact, Cut.of([view], 0.0, None))
     if several:
-        draw_history(
-            below[1], dataset, fitted([str(name) for name in dataset], ("contact_area", "stick_area"))
-        )
+        draw_history(below[1], dataset, fitted(dataset, ("contact_area", "stick_area")))
         draw_history(below[2], dataset, ("max_pressure",))
         for axes in below[1:]:
             axes.axvline(view.number, color="0.8", lw=3.0, zorder=0)

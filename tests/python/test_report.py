@@ -144,7 +144,7 @@ def test_page_is_whole_and_fetches_nothing(folder: Path, name: str) -> None:
 def test_text_of_the_deck_is_text(folder: Path) -> None:
     page = (folder / "sheared.html").read_text(encoding="utf-8")
     assert page.count("<script") == 2 and page.count("</script>") == 2
-    assert "<title>Sheared &lt;script&gt;alert(&#x27;1 &amp; 2&#x27;)&lt;/script&gt; {{data}}</title>" in page
+    assert "<title>Sheared &lt;script&gt;alert(&#39;1 &amp; 2&#39;)&lt;/script&gt; {{data}}</title>" in page
     assert data_of(page)["labels"][-1] == "shear </script>"
     assert "tangential_load_x = &quot;30 N&quot;" in page
 

@@ -9,19 +9,19 @@ from __future__ import annotations
 import datetime
 import hashlib
 import json
-import os
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import jinja2
+
 from .._version import __version__
 from ..errors import DeckError
+from ..files import replacing
 from ..plotting.report_data import drawn_data, kept_steps
 from ..result.history import RESIDUALS, load_or_motion, worth_showing
 from ..solve.overview import case_rows
-from ..text import escaped, quantity
+from ..text import quantity, visible
 from ..variables import label_of
 from . import tables
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ..result.result import Result
 
 History = Mapping[str, Any]
+Table = tuple[Sequence[str], Sequence[Sequence[str]]]  # headers and rows
 
 
 def write_report(result: Result, target: Path) -> Path:
@@ -54,13 +55,8 @@ def write_report(result: Result, target: Path) -> Path:
     """
     if target.suffix.lower() not in (".html", ".htm"):
         raise DeckError(f"--output {target}: expected a page, such as {target.with_suffix('.html')}")
-    text = report(result)
-    temporary = target.with_name(f"{target.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(target) as temporary:
+        temporary.write_text(report(result), encoding="utf-8")
     return target
 
 
@@ -77,29 +73,29 @@ def report(result: Result) -> str:
     numbers = kept_steps(result)
     data = drawn_data(result, histories, numbers)
     title = result.case_title or Path(result.path).stem or "hexcontact result"
-    page = resources.files("hexcontact").joinpath("data/report.html").read_text(encoding="utf-8")
-    parts = dict(
-        title=escaped(title),
-        status=_status(result, summary.remarks),
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("hexcontact", "data"),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
+        finalize=lambda value: visible(value) if type(value) is str else value,  # not of macros
+        trim_blocks=True,
+    )
+    return environment.get_template("report.html").render(
+        title=title,
+        notes=[_unfinished(result), *summary.remarks],
         kept=_kept(len(numbers), len(histories)),
-        inputs=_pairs(_inputs(result, summary.case)),
+        inputs=_inputs(result, summary.case),
         loads=_loads(histories),
-        deck=_deck(result.deck),
-        hertz=_hertz(summary),
-        accuracy=_accuracy(result),
+        deck=result.deck,
+        hertz=(tables.HERTZ_HEADERS, tables.hertz_rows(summary.hertz, histories[-1])),
+        accuracy=(tables.TRIAL_HEADERS, tables.trial_rows(result)),
         residuals=_residuals(histories),
-        provenance=_pairs(_provenance(result, histories)),
+        provenance=_provenance(result, histories),
         data=json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     )
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], page)
 
 
 # --- words ----------------------------------------------------------------------------------------
-
-
-def _status(result: Result, remarks: Sequence[str]) -> str:
-    notes = [_unfinished(result), *remarks]
-    return "".join(f'<p class="warning" role="note">{escaped(note)}</p>' for note in notes if note)
 
 
 def _unfinished(result: Result) -> str:
@@ -166,33 +162,8 @@ def _provenance(result: Result, histories: Sequence[History]) -> list[tuple[str,
     ]
 
 
-def _pairs(rows: Iterable[tuple[str, ...]]) -> str:
-    cells = (f'<tr><th scope="row">{escaped(n)}</th><td>{escaped(v)}</td></tr>' for n, v in rows)
-    return f'<table class="pairs"><tbody>{"".join(cells)}</tbody></table>'
-
-
-def _table(caption: str, headers: Sequence[str], rows: Iterable[Sequence[str]], link: bool = False) -> str:
-    def line(row: Sequence[str]) -> str:
-        cells = zip(kinds[1:], row[1:], strict=True)
-        first, rest = (
-            escaped(row[0]),
-            "".join(f"<td{kind}>{escaped(cell)}</td>" for kind, cell in cells),
-        )
-        mark = f' id="row-{first}"' if link else ""
-        start = f'<a href="#step={first}">{first}</a>' if link else first
-        return f'<tr{mark}><th scope="row">{start}</th>{rest}</tr>'
-
-    kinds = [' class="text"' * (name == "label") for name in headers]
-    names = zip(kinds, headers, strict=True)
-    head = "".join(f'<th scope="col"{kind}>{escaped(name)}</th>' for kind, name in names)
-    return (
-        f'<table class="numbers"><caption>{escaped(caption)}</caption><thead><tr>{head}</tr></thead>'
-        f"<tbody>{''.join(map(line, rows))}</tbody></table>"
-    )
-
-
-def _loads(histories: Sequence[History]) -> str:
-    """Return a table of the load history: where each segment ends."""
+def _loads(histories: Sequence[History]) -> Table:
+    """Return the load history: where each segment ends."""
     ends = {int(history.get("segment", 1)): history for history in histories}
     names = worth_showing(histories)
     rows, before = [], 0
@@ -203,29 +174,10 @@ def _loads(histories: Sequence[History]) -> str:
         )
         before = history["step"]
     symbols = [label_of(name) for name in names]
-    return _table("Load history: the end of each segment", ("segment", "label", "steps", *symbols), rows)
+    return ("segment", "label", "steps", *symbols), rows
 
 
-def _deck(deck: str) -> str:
-    if not deck:
-        return "<p>The case was made in Python, without a deck.</p>"
-    return (
-        "<details><summary>The whole deck</summary>"
-        f'<pre tabindex="0" aria-label="deck">{escaped(deck)}</pre></details>'
-    )
-
-
-def _hertz(summary: tables.Summary) -> str:
-    rows = tables.hertz_rows(summary.hertz, summary.histories[-1])
-    return _table("Last load step against Hertz", tables.HERTZ_HEADERS, rows) if rows else ""
-
-
-def _accuracy(result: Result) -> str:
-    rows = tables.trial_rows(result)
-    return _table("Accuracy", tables.TRIAL_HEADERS, rows) if rows else ""
-
-
-def _residuals(histories: Sequence[History]) -> str:
+def _residuals(histories: Sequence[History]) -> Table:
     signs = [sign for sign, name in RESIDUALS.items() if name in histories[0]]
     rows = [
         (
@@ -240,4 +192,4 @@ def _residuals(histories: Sequence[History]) -> str:
         for h in histories
     ]
     headers = ("step", "label", *signs, "iterations", "halved", "operator applications", "time")
-    return _table("Residuals and work of each load step", headers, rows, link=True)
+    return headers, rows

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 _APART = 100  # nodes along a line that can be told apart
+_FINER = 8  # points between nodes where the line misses them: closed solutions are curved there
 
 
 def line_of(views: Iterable[StepView], angle: float, through: Point | None = None) -> Line:
@@ -56,7 +57,7 @@ class Cut:
         Its direction from x, rad.
     place : ndarray
         Distances (m) from its start at which values are drawn: of the nodes if there are enough on the line,
-        else of its corners, between which fields are linear.
+        else of its corners, between which fields are linear, and points between them.
     at_nodes : bool
         Whether these are nodes.
     through : tuple of float, optional
@@ -77,7 +78,8 @@ class Cut:
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
         nodes = corners[(abs(index - np.round(index)) < 1e-6).all(axis=1)]
         at_nodes = nodes.size > 0.4 * (corners.size - 2)  # at multiples of 30 degrees
-        return cls(line, angle, nodes if at_nodes else corners, at_nodes, through)
+        between = np.arange(0.0, line.length, lattice.spacing / _FINER)
+        return cls(line, angle, nodes if at_nodes else np.union1d(corners, between), at_nodes, through)
 
     def values(self, view: StepView, field: Array | None = None) -> Array:
         """Return the pressure, or a field, where it is drawn."""

@@ -146,7 +146,7 @@ def test_text_of_the_deck_is_text(folder: Path) -> None:
     assert page.count("<script") == 2 and page.count("</script>") == 2
     assert "<title>Sheared &lt;script&gt;alert(&#39;1 &amp; 2&#39;)&lt;/script&gt; {{data}}</title>" in page
     assert data_of(page)["labels"][-1] == "shear </script>"
-    assert "tangential_load_x = &quot;30 N&quot;" in page
+    assert "tangential_load_x = &#34;30 N&#34;" in page
 
 
 def test_page_says_where_it_comes_from(folder: Path) -> None:

@@ -10,41 +10,29 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from hexcontact.deck import series as load_series
-from hexcontact.deck import surfaces
-from hexcontact.deck import tables as deck
-from hexcontact.deck.kinds import (
-    Flag,
-    Kind,
-    Quantity,
-    Several,
-    Table,
-    Text,
-    Whole,
-    Word,
-    WordOr,
-    expectation,
-    kind_of,
-)
-from hexcontact.study import tables as study_deck
+from hexcontact.deck import series, surfaces, tables
+from hexcontact.deck.kinds import Flag, Kind, Quantity, Several, Text, Whole, Word, WordOr
+from hexcontact.deck.model import Table, expectation, kind_of
+from hexcontact.study.backends.dask import Dask
+from hexcontact.study.tables import Parameter, StudyFile
 from hexcontact.text import shown
 
 PAGE = Path(__file__).with_name("deck.md")
 PAGES = (PAGE, PAGE.with_name("studies.md"))
 TABLES: dict[str, type[Table]] = {
-    "deck": deck.Deck,
-    "body": deck.Body,
-    "friction": deck.Friction,
-    "grid": deck.Grid,
-    "solver": deck.Solver,
-    "load": deck.Load,
-    "series": load_series.Series,
-    "columns": load_series.Columns,
-    "accuracy": deck.Accuracy,
-    "output": deck.Output,
-    "study": study_deck.StudyFile,
-    "parameter": study_deck.Parameter,
-    "dask": study_deck.Dask,
+    "deck": tables.Deck,
+    "body": tables.Body,
+    "friction": tables.Friction,
+    "grid": tables.Grid,
+    "solver": tables.Solver,
+    "load": tables.Load,
+    "series": series.Series,
+    "columns": series.Columns,
+    "accuracy": tables.Accuracy,
+    "output": tables.Output,
+    "study": StudyFile,
+    "parameter": Parameter,
+    "dask": Dask,
 }
 BLOCK = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -59,7 +47,7 @@ def row(cells: Iterable[str]) -> str:
 def default_of(info: Any) -> str:
     if info.is_required():
         return "required"
-    if info.default is None or info.default == "" or info.default_factory is not None:
+    if info.default in (None, "", (), {}) or info.default_factory is not None:
         return ""
     return f"`{shown(info.default)}`" if info.default != 0.0 or info.default is False else "0"
 

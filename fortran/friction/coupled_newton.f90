@@ -11,7 +11,7 @@ module hc_coupled_newton
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
   use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
-  use hc_friction_iterate, only: iterate_t
+  use hc_friction_iterate, only: iterate_t, rounding
   use hc_staggered_newton, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
   use hc_friction_systems, only: coupled_system_t
   use hc_krylov, only: projected_gmres, fulfil
@@ -41,7 +41,7 @@ contains
     logical, allocatable :: active(:), shear_active(:), contact(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
-    real(wp) :: missing(4), multiplier(4), goal, residual
+    real(wp) :: missing(4), multiplier(4), goal, residual, drift
     integer :: n, m, k, n_shear, iterations
     logical :: independent
 
@@ -110,7 +110,9 @@ contains
                  final_accuracy*now%tolerance)
       goal = goal*real(system%space%count(active), wp)**0.25_wp
       call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
-                           independent, residual, iterations, now%outcome, error)
+                           independent, residual, iterations, now%outcome, error, drift)
+      if (allocated(error)) return
+      if (drift > rounding) call system%product(x, ax, error)
       if (allocated(error)) return
     end if
     ! where all nodes slip, only their directions resist a load: not beyond reason

@@ -119,8 +119,8 @@ contains
       everywhere = everywhere + 3*half + (4*3 + 2 + 1 + 3*3*n_force)*field
       ! the product; GMRES: vector and image, the products of all directions
       everywhere = everywhere + (2 + 3 + 3 + 3*(2 + n_direction))*field
-      ! packed: directions, residuals, weights, constraints thrice
-      inside = 3*(n_direction + 5 + 3*n_force)*field
+      ! packed: both of all directions, residuals, weights, constraints thrice
+      inside = 3*(2*n_direction + 4 + 3*n_force)*field
     else
       ! unknowns, product, right-hand side, shear; conjugate gradients: vector and image; preconditioned constraints
       everywhere = everywhere + (4*2 + 2*2 + 5)*field

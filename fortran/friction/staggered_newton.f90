@@ -12,7 +12,7 @@ module hc_staggered_newton
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_load_constraints, only: driven_motions_t
   use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
-  use hc_friction_iterate, only: iterate_t, cautious
+  use hc_friction_iterate, only: iterate_t, cautious, rounding
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
   implicit none
   private
@@ -84,7 +84,7 @@ contains
 
     real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
     logical, allocatable :: contact(:)
-    real(wp) :: goal, residual, multiplier(1), missing(1), cell_area, carried, level
+    real(wp) :: goal, scale, residual, drift, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations, outcome
     logical :: changed, independent, searching
 
@@ -132,9 +132,11 @@ contains
       end if
       goal = final_accuracy*now%tolerance
       if (changed .or. now%pressing) goal = max(press_accuracy*min(now%residual_normal, 1.0_wp), goal)
-      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, &
-                        goal*now%problem%normal_compliance*now%pressure%space%max(now%p), max_iterations, &
-                        multiplier(:n_constraint), residual, iterations, outcome, error)
+      scale = now%problem%normal_compliance*now%pressure%space%max(now%p)
+      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, goal*scale, max_iterations, &
+                        multiplier(:n_constraint), residual, iterations, outcome, error, drift)
+      if (allocated(error)) return
+      if (drift > rounding*scale) call now%pressure%product(now%p, now%w, error)
       if (allocated(error)) return
       now%outcome = max(now%outcome, outcome)
       if (n_constraint == 1) now%motion(normal) = multiplier(1)
@@ -152,7 +154,7 @@ contains
     logical, allocatable :: active(:)
     real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
-    real(wp) :: goal, residual, motion(n_motion)
+    real(wp) :: goal, scale, residual, drift, motion(n_motion)
     integer :: n, iterations, outcome
     logical :: independent, holding
 
@@ -186,9 +188,11 @@ contains
         goal = min(now%residual_tangential, 1.0_wp)
         goal = goal*min(inner_accuracy, max(goal, merge(late_accuracy, 1.0e-3_wp, now%pressing)))
         goal = max(goal, final_accuracy*now%tolerance)
-        goal = goal*now%problem%tangential_compliance*now%traction_scale()
-        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal, max_iterations, multiplier, &
-                          residual, iterations, outcome, error)
+        scale = now%problem%tangential_compliance*now%traction_scale()
+        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal*scale, max_iterations, multiplier, &
+                          residual, iterations, outcome, error, drift)
+        if (allocated(error)) return
+        if (drift > rounding*scale) call displace(now, x, ax, error)
         if (allocated(error)) return
         now%outcome = max(now%outcome, outcome)
       end if

@@ -146,7 +146,7 @@ contains
 
   !> Preconditioned conjugate gradients with projection on the constraints.
   subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, &
-                          multiplier, residual, iterations, outcome, error)
+                          multiplier, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
@@ -171,13 +171,16 @@ contains
     integer, intent(out) :: iterations, outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> What rounding errors of the largest residual on the way may have left in A x
+    !> (Greenbaum, SIAM J. Matrix Anal. Appl. 18, 1997, 535-551)
+    real(wp), intent(out), optional :: drift
 
     type(packing_t) :: nodes
     !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
     real(wp), allocatable :: from(:), onto(:)
     !> On the active nodes
     real(wp), allocatable :: r(:), z(:), d(:), ad(:), x_active(:), ax_active(:), rhs_active(:), b(:, :), m_b(:, :)
-    real(wp) :: rz, rz_old, curvature, step
+    real(wp) :: rz, rz_old, curvature, step, largest
     real(wp) :: inverse(size(constraint, 2), size(constraint, 2))
     integer :: i, m
     type(field_space_t) :: space
@@ -197,6 +200,7 @@ contains
     call nodes%pack(rhs, rhs_active)
     call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0
+    largest = 0.0_wp
     outcome = iterations_used_up
     rz_old = 0.0_wp
     multiplier = 0.0_wp
@@ -216,6 +220,7 @@ contains
         multiplier = multiplier - matmul(space%dots(m_b, r), inverse)
         call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       end if
+      largest = max(largest, residual)
       if (residual <= tolerance .or. iterations >= max_iterations) exit
       call nodes%unpack(r, from)
       call system%precondition(from, onto, error)
@@ -266,11 +271,12 @@ contains
     ! the largest of several numbers hides one that is not a number
     if (.not. ieee_is_finite(space%dot(r, r))) outcome = solution_broke_off
     call nodes%unpack(x_active, x)
+    if (present(drift)) drift = epsilon(1.0_wp)*largest
   end subroutine projected_cg
 
   !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
   subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
-                             multiplier, independent, residual, iterations, outcome, error)
+                             multiplier, independent, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
@@ -299,10 +305,13 @@ contains
     integer, intent(out) :: iterations, outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> What rounding errors of the first residual may have left in A x, in that norm
+    real(wp), intent(out), optional :: drift
 
     type :: direction_t
-      !> Weighted residual on the active nodes, and the product A z, over all nodes, that the next one comes from
-      real(wp), allocatable :: v(:), image(:)
+      !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
+      !> nodes; the product A z over all nodes
+      real(wp), allocatable :: v(:), z(:), image(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
@@ -310,15 +319,16 @@ contains
     !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
     real(wp), allocatable :: from(:), onto(:)
     !> On the active nodes
-    real(wp), allocatable :: z(:), combined(:), w(:), packed(:), b(:, :), m_b(:, :), c_rows(:, :)
+    real(wp), allocatable :: w(:), packed(:), b(:, :), m_b(:, :), c_rows(:, :)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
-    real(wp) :: y(max_iterations), share(size(multiplier)), length, rotated
+    real(wp) :: y(max_iterations), share(size(multiplier), max_iterations), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
     integer :: i, k, stat
     type(field_space_t) :: space
 
     iterations = 0
     residual = huge(1.0_wp)
+    if (present(drift)) drift = 0.0_wp
     outcome = solution_broke_off
     space = system%space
     call new_packing(nodes, active, space)
@@ -328,7 +338,7 @@ contains
     call invert_gram(c_rows, m_b, inverse, independent, space)
     if (.not. independent) return
     associate (n => nodes%n_active)
-      allocate (basis(1)%v(n), z(n), w(n), packed(n))
+      allocate (basis(1)%v(n), w(n), packed(n))
     end associate
     allocate (onto(size(x)), from(size(x)), source=0.0_wp)
     call nodes%pack(weight, w)
@@ -339,6 +349,7 @@ contains
     basis(1)%v = w*basis(1)%v
     length = sqrt(space%dot(basis(1)%v, basis(1)%v))
     residual = length
+    if (present(drift)) drift = epsilon(1.0_wp)*length
     if (length <= 0.0_wp) outcome = solution_accurate
     if (.not. length > 0.0_wp) return
     outcome = iterations_used_up
@@ -348,18 +359,23 @@ contains
     h = 0.0_wp
 
     do k = 1, max_iterations
-      call expand(basis(k)%v, error)
-      if (allocated(error)) return
-      allocate (basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
+      allocate (basis(k)%z(nodes%n_active), basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
       if (stat /= 0) then
         call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
         return
       end if
-      call nodes%unpack(z, from)
+      packed = basis(k)%v/w
+      call nodes%unpack(packed, from)
+      call system%precondition(from, onto, error)
+      if (allocated(error)) return
+      call nodes%pack(onto, basis(k)%z)
+      share(:, k) = -matmul(inverse, space%dots(c_rows, basis(k)%z))
+      call space%add_columns(m_b, share(:, k), basis(k)%z)
+      call nodes%unpack(basis(k)%z, from)
       call system%product(from, basis(k)%image, error)
       if (allocated(error)) return
       call nodes%pack(basis(k)%image, basis(k + 1)%v)
-      call space%add_columns(b, -share, basis(k + 1)%v)
+      call space%add_columns(b, -share(:, k), basis(k + 1)%v)
       basis(k + 1)%v = w*basis(k + 1)%v
       do i = 1, k
         h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
@@ -389,34 +405,15 @@ contains
     do i = iterations, 1, -1
       y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
     end do
-    allocate (combined(nodes%n_active), source=0.0_wp)
+    ! solution and product from the same directions: the preconditioner is of single precision, and where a node
+    ! slips far the matrix would make displacements of its rounding errors
+    call nodes%pack(x, packed)
     do i = 1, iterations
-      combined = combined + y(i)*basis(i)%v
+      packed = packed + y(i)*basis(i)%z
       ax = ax + y(i)*basis(i)%image
     end do
-    call expand(combined, error)
-    if (allocated(error)) return
-    call nodes%pack(x, packed)
-    packed = packed + z
+    multiplier = multiplier + matmul(share(:, :iterations), y(:iterations))
     call nodes%unpack(packed, x)
-    multiplier = multiplier + share
-
-  contains
-
-    !> z = M (r + B share) with C^T z = 0, r the unweighted residual of a basis vector.
-    subroutine expand(vector, error)
-      real(wp), intent(in) :: vector(:)
-      type(error_t), allocatable, intent(out) :: error
-
-      packed = vector/w
-      call nodes%unpack(packed, from)
-      call system%precondition(from, onto, error)
-      if (allocated(error)) return
-      call nodes%pack(onto, z)
-      share = -matmul(inverse, space%dots(c_rows, z))
-      call space%add_columns(m_b, share, z)
-    end subroutine expand
-
   end subroutine projected_gmres
 
   !> r = rhs - A x + B m and its largest element.

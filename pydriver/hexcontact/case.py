@@ -12,11 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from .core.lattice import Lattice
 from .deck.faults import Source
 from .deck.read import assemble
+from .deck.toml import refuse_deep
+from .deck.write import plain
 from .errors import DeckError
-from .problem.arguments import body_keys, gap_given, given, middle_of, segments
+from .problem.arguments import Body, middle_of, with_radians
+from .problem.gap import given_gap
 from .problem.loads import LoadStep, Target
 from .problem.problem import Problem
-from .problem.settings import Body, OutputSettings, SolverSettings
 
 if TYPE_CHECKING:
     from .result.result import Result
@@ -24,9 +26,10 @@ if TYPE_CHECKING:
     from .solve.progress import Reporter
     from .solve.session import Session
 
-__all__ = ["Body", "Case", "LoadStep", "OutputSettings", "SolverSettings", "Target"]
+__all__ = ["Body", "Case", "LoadStep", "Target"]
 
 Array = NDArray[np.float64]
+_LEFT_OUT = ("friction", "solver", "output")  # tables of which nothing is said
 
 
 class Case(Problem):
@@ -117,45 +120,47 @@ class Case(Problem):
         every: int | None = None,
         title: str = "",
     ) -> None:
-        given_gap = gap_given(gap, lattice)
+        own_gap = given_gap(gap, lattice)
         if lattice is not None:
             for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
                 if value is not None:
                     raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
-            if not callable(given_gap):  # so that the deck of the case finds the same window again
+            if not callable(own_gap):  # so that the deck of the case finds the same window again
                 center = middle_of(lattice)
         if loads is None:
-            loads = [given(normal_load=normal_load, approach=approach, steps=steps)]
+            loads = {"normal_load": normal_load, "approach": approach, "steps": steps}
         elif normal_load is not None or approach is not None or steps is not None:
             raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
-        data = given(
-            title=title or None,
-            body={"1": body_keys(body_1), "2": body_keys(body_2)},
-            friction=given(coefficient=friction_coefficient) or None,
-            grid=given(
-                spacing=spacing,
-                nodes_across=nodes_across,
-                nodes_in_radius=nodes_in_radius,
-                extent=extent,
-                window=window,
-                center=center,
-                origin=origin,
-            ),
-            solver=given(
-                algorithm=algorithm,
-                method=method,
-                tolerance=tolerance,
-                coupling=coupling,
-                entry=entry,
-                step_tolerance=step_tolerance,
-            )
-            or None,
-            accuracy=given(target=accuracy) if isinstance(accuracy, int | float) else accuracy,
-            load=segments(loads),
-            output=given(fields=fields, every=every) or None,
-        )
-        self._set_up(assemble(data, None, Source(), Path()), given_gap, lattice)
+        data = {
+            "title": title or None,
+            "body": {"1": body_1, "2": body_2},
+            "friction": {"coefficient": friction_coefficient},
+            "grid": {
+                "spacing": spacing,
+                "nodes_across": nodes_across,
+                "nodes_in_radius": nodes_in_radius,
+                "extent": extent,
+                "window": window,
+                "center": center,
+                "origin": origin,
+            },
+            "solver": {
+                "algorithm": algorithm,
+                "method": method,
+                "tolerance": tolerance,
+                "coupling": coupling,
+                "entry": entry,
+                "step_tolerance": step_tolerance,
+            },
+            "accuracy": {"target": accuracy} if isinstance(accuracy, int | float) else accuracy,
+            "load": [loads] if isinstance(loads, Mapping) else loads,
+            "output": {"fields": fields, "every": every},
+        }
+        refuse_deep(data, "")
+        data = {key: value for key, value in plain(data).items() if value or key not in _LEFT_OUT}
+        data["load"] = with_radians(data["load"])
+        self._set_up(assemble(data, None, Source(), Path()), own_gap, lattice)
 
     def run(
         self,

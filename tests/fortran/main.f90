@@ -13,6 +13,7 @@ program tester
   use test_spectrum_file, only: collect_spectrum_file
   use test_vectors, only: collect_vectors
   use test_arguments, only: collect_arguments
+  use test_linear_solvers, only: collect_linear_solvers
   use test_contact, only: collect_contact
   use test_normal_contact, only: collect_normal_contact
   use test_friction, only: collect_friction
@@ -35,6 +36,7 @@ program tester
     new_suite('spectrum_file', collect_spectrum_file), &
     new_suite('vectors', collect_vectors), &
     new_suite('arguments', collect_arguments), &
+    new_suite('linear_solvers', collect_linear_solvers), &
     new_suite('contact', collect_contact), &
     new_suite('normal_contact', collect_normal_contact), &
     new_suite('friction', collect_friction), &

@@ -1,14 +1,12 @@
-!> Conjugate gradients, residuals and the two frictionless solvers.
+!> Sums, residuals and the two frictionless solvers.
 module test_contact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control, normal
-  use hc_contact_residuals, only: normal_residual, force_residual
-  use hc_krylov, only: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, solution_accurate, &
-    iterations_used_up, solution_broke_off
   use hc_field_space, only: field_space_t
+  use hc_contact_residuals, only: normal_residual, force_residual
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use testing, only: test_t, new_test, check, check_raised, check_true
@@ -17,14 +15,6 @@ module test_contact
 
   public :: collect_contact
 
-  !> A small dense system, to test the iteration alone.
-  type, extends(linear_system_t) :: dense_system_t
-    real(wp) :: matrix(5, 5)
-  contains
-    procedure :: product => dense_product
-    procedure :: precondition => dense_precondition
-  end type dense_system_t
-
 contains
 
   subroutine collect_contact(tests)
@@ -32,10 +22,6 @@ contains
     type(test_t), allocatable, intent(out) :: tests(:)
 
     tests = [ &
-      new_test('projected_cg', test_projected_cg), &
-      new_test('three_constraints', test_three_constraints), &
-      new_test('outcomes', test_outcomes), &
-      new_test('norm_of_gmres', test_norm_of_gmres), &
       new_test('residuals', test_residuals), &
       new_test('hertz', test_hertz), &
       new_test('any_approach', test_any_approach), &
@@ -48,162 +34,6 @@ contains
       new_test('bad_input', test_bad_input) &
     ]
   end subroutine collect_contact
-
-  !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
-  subroutine test_projected_cg(error)
-    type(error_t), allocatable, intent(out) :: error
-    type(dense_system_t) :: system
-    real(wp) :: x(5), ax(5), multiplier(1), residual, constraint(5, 1)
-    real(wp), allocatable :: mb(:, :)
-    integer :: iterations, outcome, i
-
-    system%matrix = 1.0_wp
-    do i = 1, 5
-      system%matrix(i, i) = 1.0_wp + i
-    end do
-    x = [6.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    ax = matmul(system%matrix, x)
-    constraint(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp]
-    call precondition_constraints(system, constraint(:, 1) > 0.0_wp, constraint, mb, error)
-    if (allocated(error)) return
-    call projected_cg(system, constraint(:, 1) > 0.0_wp, constraint, mb, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, 9.0_wp], x, ax, &
-                      1.0e-12_wp, 20, multiplier, residual, iterations, outcome, error)
-    if (allocated(error)) return
-    ! i x_i + 6 = b_i + m on the active nodes and sum x = 6: m (1 + 1/2 + 1/4) = 6 + sum (6 - b_i)/i
-    call check(error, multiplier(1), (6.0_wp + 5.0_wp + 2.0_wp + 0.75_wp)/1.75_wp, 1.0e-11_wp, 'multiplier')
-    if (allocated(error)) return
-    call check(error, x(2), (2.0_wp + multiplier(1) - 6.0_wp)/2.0_wp, 1.0e-11_wp, 'second unknown')
-    if (allocated(error)) return
-    call check(error, [sum(x), x(3), x(5)], [6.0_wp, 0.0_wp, 0.0_wp], 1.0e-12_wp, 'constraint and fixed nodes')
-    if (allocated(error)) return
-    call check_true(error, iterations <= 2 .and. residual <= 1.0e-12_wp .and. outcome == solution_accurate, &
-                    'three unknowns, one constraint')
-  end subroutine test_projected_cg
-
-  !> Conjugate gradients say why they stopped: solved, out of iterations, a matrix that is not positive definite.
-  subroutine test_outcomes(error)
-    type(error_t), allocatable, intent(out) :: error
-    type(dense_system_t) :: system
-    real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0)
-    logical, parameter :: active(5) = .true.
-    integer, parameter :: expected(3) = [solution_accurate, iterations_used_up, solution_broke_off], most(3) = [20, 2, 20]
-    integer :: iterations, outcome, i, k
-
-    do k = 1, 3
-      system%matrix = 1.0_wp
-      do i = 1, 5
-        system%matrix(i, i) = 1.0_wp + i
-      end do
-      if (k == 3) system%matrix = -system%matrix
-      x = 0.0_wp
-      ax = 0.0_wp
-      call projected_cg(system, active, none, none, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], x, ax, 1.0e-12_wp, most(k), &
-                        multiplier, residual, iterations, outcome, error)
-      if (allocated(error)) return
-      call check(error, outcome, expected(k), 'outcome')
-      if (allocated(error)) return
-      call check_true(error, (residual <= 1.0e-12_wp) .eqv. outcome == solution_accurate, 'residual')
-      if (allocated(error)) return
-    end do
-  end subroutine test_outcomes
-
-  !> GMRES bounds the Euclidean norm of the weighted residuals, and returns it.
-  subroutine test_norm_of_gmres(error)
-    type(error_t), allocatable, intent(out) :: error
-    type(dense_system_t) :: system
-    real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0), left, first
-    real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = [1.0_wp, 2.0_wp, 1.0_wp, 0.5_wp, 1.0_wp]
-    logical, parameter :: active(5) = .true.
-    logical :: independent
-    integer :: iterations, outcome, i, most
-
-    first = norm2(weight*rhs)
-    system%matrix = 1.0_wp
-    do i = 1, 5
-      system%matrix(i, i) = 1.0_wp + i
-    end do
-    system%matrix(2, 1) = -3.0_wp
-    do most = 1, 5
-      x = 0.0_wp
-      ax = 0.0_wp
-      call projected_gmres(system, active, none, none, none, weight, rhs, x, ax, 1.0e-10_wp, most, multiplier, independent, &
-                           residual, iterations, outcome, error)
-      if (allocated(error)) return
-      left = norm2(weight*(rhs - matmul(system%matrix, x)))
-      call check(error, residual, left, 1.0e-12_wp*first, 'the norm that is left')
-      if (allocated(error)) return
-      call check(error, outcome, merge(solution_accurate, iterations_used_up, left <= 1.0e-10_wp), 'outcome')
-      if (allocated(error)) return
-    end do
-    call check(error, outcome, solution_accurate, 'as many directions as unknowns are enough')
-  end subroutine test_norm_of_gmres
-
-  !> Three constraints on four unknowns: the solution fulfils its own equations; dependent ones are told.
-  subroutine test_three_constraints(error)
-    type(error_t), allocatable, intent(out) :: error
-    type(dense_system_t) :: system
-    real(wp) :: x(5), ax(5), rhs(5), multiplier(3), residual, constraint(5, 3)
-    real(wp), allocatable :: mb(:, :)
-    real(wp), parameter :: wanted(3) = [6.0_wp, -1.0_wp, 2.0_wp]
-    logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
-    logical :: independent
-    integer :: iterations, outcome, i
-
-    system%matrix = 1.0_wp
-    do i = 1, 5
-      system%matrix(i, i) = 1.0_wp + i
-    end do
-    rhs = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp]
-    constraint(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp]
-    constraint(:, 2) = [0.0_wp, 1.0_wp, 0.0_wp, -2.0_wp, 0.0_wp]
-    constraint(:, 3) = [3.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
-    call precondition_constraints(system, active, constraint, mb, error)
-    if (allocated(error)) return
-    call check(error, mb(:, 3), [1.5_wp, 0.0_wp, 0.0_wp, 0.2_wp, -1.0_wp/6.0_wp], 1.0e-15_wp, 'M B')
-    if (allocated(error)) return
-    x = [0.0_wp, 0.0_wp, 7.0_wp, 0.0_wp, 0.0_wp]
-    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
-    call check_true(error, independent, 'independent constraints')
-    if (allocated(error)) return
-    call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
-    if (allocated(error)) return
-    ax = matmul(system%matrix, x)
-    call projected_cg(system, active, constraint, mb, rhs, x, ax, 1.0e-12_wp, 20, multiplier, residual, iterations, outcome, error)
-    if (allocated(error)) return
-    call check(error, matmul(transpose(constraint), x), wanted, 1.0e-12_wp, 'constraints')
-    if (allocated(error)) return
-    call check(error, x(3), 7.0_wp, 0.0_wp, 'an unknown that is fixed')
-    if (allocated(error)) return
-    call check(error, merge(matmul(system%matrix, x) - rhs - matmul(constraint, multiplier), 0.0_wp, active), &
-               [(0.0_wp, i=1, 5)], 1.0e-11_wp, 'equations')
-    if (allocated(error)) return
-
-    constraint(:, 3) = 2.0_wp*constraint(:, 1)
-    call precondition_constraints(system, active, constraint, mb, error)
-    if (allocated(error)) return
-    ax = x
-    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
-    call check_true(error, .not. independent, 'constraints that depend on each other')
-    if (allocated(error)) return
-    call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')
-  end subroutine test_three_constraints
-
-  subroutine dense_product(self, x, y, error)
-    class(dense_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-    y = matmul(self%matrix, x)
-  end subroutine dense_product
-
-  subroutine dense_precondition(self, x, y, error)
-    class(dense_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-    integer :: i
-    y = [(x(i)/self%matrix(i, i), i=1, size(x))]
-  end subroutine dense_precondition
 
   !> Hand-made violations: penetration, tension, pressure across a gap, a node that may not touch.
   subroutine test_residuals(error)

@@ -18,11 +18,10 @@ from hexcontact.analytic import hertz_ellipse
 from hexcontact.case import Body, Case
 from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
 from hexcontact.core.lattice import Lattice
-from hexcontact.deck import starters
-from hexcontact.deck import tables as decks
+from hexcontact.deck import starters, tables
 from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
 from hexcontact.errors import DeckError
-from hexcontact.problem import window as grids
+from hexcontact.problem.window import estimate_contact, rim_sides
 
 CASES = Path(__file__).parents[2] / "cases"
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -82,7 +81,7 @@ def solved(case: Case) -> NormalSolution:
 
 
 def on_rim(field: NDArray[Any]) -> bool:
-    return any(grids.rim_sides(field > 0))
+    return any(rim_sides(field > 0))
 
 
 # --- decks -------------------------------------------------------------------------------------------------
@@ -608,7 +607,7 @@ def test_the_estimate_resolves_the_narrow_side_of_an_ellipse(degrees: float) -> 
     pair = ElasticPair.from_materials(210e9, 0.3, None, None)
     ellipse = hertz_ellipse(pair.effective_modulus, one + two, normal_load=100.0)
     gap = Separation(Cylinder(radius=0.05), Cylinder(radius=0.05, angle=f"{degrees} deg"))
-    estimate = grids.estimate_contact(pair, gap, (0.0, 0.0), (0.0, 0.0), normal_load=100.0)
+    estimate = estimate_contact(pair, gap, (0.0, 0.0), (0.0, 0.0), normal_load=100.0)
     # eight spacings or more in the half-width, whose edge is known to a fraction of one
     assert estimate.cell <= ellipse.semi_minor / 7
     assert estimate.half_width == pytest.approx(ellipse.semi_minor, rel=0.05)
@@ -652,7 +651,7 @@ NASTY = [
     '"1 mm^99"', "'x'", '"frictionless"', "[]", "{}", "[[]]", "[nan, 1]", "[1, 2, 3]", "[41, 41]",
     '["1 mm", 2]', '{ shape = "cone" }', "2026-01-01",
 ]  # fmt: skip
-TABLES = [decks.Body, decks.Grid, decks.Solver, decks.Load, decks.Output, *SHAPES.values()]
+TABLES = [tables.Body, tables.Grid, tables.Solver, tables.Load, tables.Output, *SHAPES.values()]
 KEYS = sorted({key for table in TABLES for key in table.known_keys()})
 TEXTS = [DECK, *(starters.text(name) for name in starters.names())]
 

@@ -9,12 +9,13 @@ from typing import Any, get_args
 
 import pytest
 
-from hexcontact.deck import tables as decks
+from hexcontact.deck import tables
 from hexcontact.deck.faults import Source
-from hexcontact.deck.kinds import Table, kind_of
 from hexcontact.deck.location import places
+from hexcontact.deck.model import Table, kind_of
 from hexcontact.deck.surfaces import SHAPES, Flat, Sphere, Surface
-from hexcontact.deck.tables import Deck, Load, Segment, read_toml, with_overrides
+from hexcontact.deck.tables import Deck, Load, Segment
+from hexcontact.deck.toml import parse_toml, read_toml, with_overrides
 from hexcontact.errors import DeckError
 from hexcontact.problem.loads import LoadStep, Target, load_steps
 from hexcontact.text import shown
@@ -338,7 +339,7 @@ def test_everything_wrong_is_reported_at_once() -> None:
 )
 def test_messages_point_at_the_line(old: str, new: str, start: str) -> None:
     with pytest.raises(DeckError) as error:
-        Deck.parse(decks.parse_toml(changed(old, new), "deck.toml"), Source("deck.toml", changed(old, new)))
+        Deck.parse(parse_toml(changed(old, new), "deck.toml"), Source("deck.toml", changed(old, new)))
     assert str(error.value).startswith(start)
 
 
@@ -704,18 +705,18 @@ def test_the_deck_reference_is_up_to_date(name: str) -> None:
 
 
 def test_the_deck_reference_has_every_key_of_every_table() -> None:
-    def tables(table: type[Table]) -> Iterator[type[Table]]:
+    def within(table: type[Table]) -> Iterator[type[Table]]:
         yield table
         for info in table.known_keys().values():
             for part in (info.annotation, *get_args(info.annotation)):
                 if isinstance(part, type) and issubclass(part, Table):
-                    yield from tables(part)
+                    yield from within(part)
 
     names = reference()
     page = "".join(path.read_text(encoding="utf-8") for path in names["PAGES"])
-    shown_tables = {*names["TABLES"].values(), decks.Bodies, Surface}
-    assert {table for table in tables(Deck) if not issubclass(table, Segment)} <= shown_tables
-    assert decks.Load in shown_tables  # which has all keys of a segment
+    shown_tables = {*names["TABLES"].values(), tables.Bodies, Surface}
+    assert {table for table in within(Deck) if not issubclass(table, Segment)} <= shown_tables
+    assert tables.Load in shown_tables  # which has all keys of a segment
     assert all(f"<!-- table: {name} -->" in page for name in (*names["TABLES"], "shapes"))
     for table in (*names["TABLES"].values(), *SHAPES.values()):
         for key, info in names["documented"](table).items():
@@ -743,6 +744,6 @@ def test_the_blocks_of_the_deck_reference_are_decks() -> None:
 
 
 def test_every_key_says_what_it_means() -> None:
-    for table in (decks.Body, decks.Friction, decks.Grid, decks.Solver, decks.Load, decks.Output):
+    for table in (tables.Body, tables.Friction, tables.Grid, tables.Solver, tables.Load, tables.Output):
         for key, info in table.known_keys().items():
             assert info.description, f"{table.__name__}.{key}"

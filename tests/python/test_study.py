@@ -26,12 +26,12 @@ import hexcontact
 from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
 from hexcontact.deck import starters
-from hexcontact.deck.tables import with_overrides
+from hexcontact.deck.toml import with_overrides
 from hexcontact.result.store import Store
 from hexcontact.solve.progress import Reporter
 from hexcontact.solve.run import metadata_of, record
-from hexcontact.study import pool as study_run
-from hexcontact.study.pool import Job, LocalPool, solve_case
+from hexcontact.study.backends.processes import LocalPool
+from hexcontact.study.job import Job, solve_case
 from hexcontact.study.study import Study, run_study
 
 PACKAGE = Path(hexcontact.__file__).parents[1]
@@ -622,7 +622,7 @@ def test_a_case_that_another_run_is_at_is_no_failure_of_the_case(folder: Path) -
         assert study.missing()[0] == case
         # on a cluster the other attempt may be of a worker that is gone: one more goes its own way
         path = study.folder.path(case)
-        assert study_run.solve_case(Job(case.hash, case.deck, str(path)), apart=True).exit_code == 0
+        assert solve_case(Job(case.hash, case.deck, str(path)), apart=True).exit_code == 0
         assert study.folder.done(case)
 
 
@@ -784,7 +784,7 @@ def test_outcome_of_whatever_goes_wrong_is_told_not_raised(
         raise ZeroDivisionError("by zero")
 
     monkeypatch.setattr(Case, "from_text", broken)
-    outcome = study_run.solve_case(Job("x", DECK, str(folder / "a.nc")))
+    outcome = solve_case(Job("x", DECK, str(folder / "a.nc")))
     assert (outcome.exit_code, outcome.message) == (1, "ZeroDivisionError: by zero")
 
 

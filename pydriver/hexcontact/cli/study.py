@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shlex
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -175,10 +173,8 @@ def _run_case(study: Study, number: int, retry: bool, messages: Messages, contex
 def _run_missing(study: Study, context: typer.Context, **options: Any) -> None:
     """Run the missing cases in a second thread; a signal cancels them unless the study is complete."""
     cancel, over, complete = (threading.Event() for _ in range(3))
-    if (where := study.cluster(options["jobs"], options["dask"])) is not None:
-        from ..study.dask import load
-
-        load(where)
+    kind, settings = study.backend(options["jobs"], options["dask"])
+    kind.load(settings)
 
     def work() -> None:
         try:
@@ -201,54 +197,9 @@ def _run_missing(study: Study, context: typer.Context, **options: Any) -> None:
 
 
 def slurm_script(study: Study, path: Path, retry: bool) -> str:
-    """Return a job array that runs the missing cases; empty if there are none.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    path : Path
-        Its file.
-    retry : bool
-        Also cases that failed by themselves.
-    """
-    from ..study.tables import batch_text
+    """Return a job array that runs the missing cases; empty if there are none."""
+    from ..study.backend import BACKENDS
 
     numbers = sorted(study.folder.number(case) for case in study.missing(retry))
-    if not numbers:
-        return ""
-    files = [str(path.resolve()), os.path.abspath(study.output)]
-    for name in files:
-        if batch_text(name) is None:
-            raise DeckError(f'{name}: a script needs a name on one line, without " and \\')
-    options: dict[str, Any] = {
-        "job-name": study.output.stem,
-        "output": str(study.folder.folder).replace("%", "%%") + "/slurm-%A_%a.log",
-        "signal": "B:USR1@60",  # a minute before a time limit, to the command that takes the shell's place
-    }
-    options |= {key.replace("_", "-"): value for key, value in study.file.slurm.items()}
-    words = ["hexcontact", "study", files[0], "--output", files[1], *(["--retry"] if retry else [])]
-    lines = [
-        "#!/bin/sh",
-        f"# {len(numbers)} of {len(study)} cases. Afterwards: {shlex.join(words)} --collect",
-        f"#SBATCH --array={_ranges(numbers)}",
-        *(
-            f"#SBATCH --{key}" + ("" if value is True else f"={batch_text(str(value))}")
-            for key, value in options.items()
-            if value is not False
-        ),
-        "export OMP_NUM_THREADS=${SLURM_CPUS_PER_TASK:-1}",
-        f"exec {shlex.join(words)} --case $SLURM_ARRAY_TASK_ID",
-    ]
-    return "\n".join(lines)
-
-
-def _ranges(numbers: Sequence[int]) -> str:
-    """Write numbers as Slurm does: 1-4,7."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1][1:] = [number]
-        else:
-            runs.append([number])
-    return ",".join("-".join(map(str, run)) for run in runs)
+    array = BACKENDS["slurm"](study.file.slurm, len(study))
+    return array.script(numbers, path, study.output, retry) if numbers else ""

@@ -1,26 +1,22 @@
-"""What every table of a deck shares: kinds of values, strict keys, a sentence for each thing wrong.
-
-A kind of value knows what it expects, in words, and how to read it. A `Table` is a pydantic model that
-forbids unknown keys and turns whatever pydantic finds into `Mistake` sentences; all of them reach the user at
-once, as one `DeckError`.
-"""
+"""Kinds of values: what each expects, in words and as JSON schema, how to read it, how a deck says it."""
 
 from __future__ import annotations
 
 import math
 import operator
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn, Self, TypeGuard
+from typing import Any, NoReturn, TypeGuard
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
-from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
+from pydantic_core import PydanticCustomError, core_schema
 
 from ..text import did_you_mean, listed, shown
 from ..variables import LARGEST
-from .faults import MISSING, Mistake, Source, deck_error
-from .units import NUMBER, Dimension, UnitError, to_si
+from .units import ANGLE, NUMBER, Dimension, UnitError, to_si
+
+Schema = dict[str, Any]
+"""A JSON schema."""
 
 
 def refuse(sentence: str) -> NoReturn:
@@ -28,19 +24,13 @@ def refuse(sentence: str) -> NoReturn:
     raise PydanticCustomError("deck", "{sentence}", {"sentence": sentence})
 
 
-def refuse_key(key: str, value: object, sentence: str) -> NoReturn:
-    """Reject one key of a table that is being validated as a single value."""
-    raise ValidationError.from_exception_data("", [_details(Mistake((key,), value, sentence))])
-
-
 SMALLEST = 1.0 / LARGEST
-
-# --- kinds of values ----------------------------------------------------------------------------------------
+_DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of value: what it expects in words (`expected`), and how to read it (`parse`)."""
+    """A kind of value, which stands in ``Annotated[float, kind]``."""
 
     @property
     def expected(self) -> str:
@@ -51,17 +41,30 @@ class Kind:
         """Read a value, or `refuse` it."""
         return self._parse(value)
 
+    def written(self, value: Any) -> Any:
+        """Return a value that was read as a deck says it."""
+        return value
+
+    def schema(self) -> Schema:
+        """Return what a JSON schema says about it."""
+        return self._schema()
+
     def _expected(self) -> str:
         raise NotImplementedError
 
     def _parse(self, value: object) -> Any:
         raise NotImplementedError
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        """Let the kind stand in ``Annotated[float, kind]``."""
+    def _schema(self) -> Schema:
+        return {}
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Validate with `parse`."""
         return core_schema.no_info_plain_validator_function(self.parse)
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> Schema:
+        """Describe with `schema`."""
+        return self.schema()
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,25 @@ class Quantity(Kind):
             refuse(f"expected {self.expected}, not below {SMALLEST:g} in SI")
         return number
 
+    def written(self, value: float) -> float | str:
+        """Return a number in SI; with its unit where a bare one is refused."""
+        return f"{value!r} rad" if self.dimension is ANGLE else value
+
+    def _schema(self) -> Schema:
+        bounds = {"exclusiveMinimum": self.above, "minimum": self.at_least, "maximum": self.at_most}
+        number = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
+        least = self.above if self.above is not None else self.at_least
+        sign = r"\+?" if least is not None and least >= 0 else "[+-]?"
+        text = {"type": "string", "pattern": rf"^\s*{sign}{_DIGITS}\s*[^\s\d.+-].*$"}
+        known: Schema = {"description": self.expected[0].upper() + self.expected[1:]}
+        if self.dimension is NUMBER:
+            return {"anyOf": [text, number], **known}
+        known["examples"] = [self.dimension.example.strip('"')]
+        if not self.dimension.bare:
+            return text | known
+        known["description"] += f"; a bare number is in {self.dimension.unit}"
+        return {"anyOf": [text, number], **known}
+
 
 @dataclass(frozen=True)
 class Whole(Kind):
@@ -131,6 +153,9 @@ class Whole(Kind):
             refuse(f"expected {self.expected}")
         return number
 
+    def _schema(self) -> Schema:
+        return {"type": "integer", "minimum": self.at_least, "maximum": self.at_most}
+
 
 @dataclass(frozen=True)
 class Word(Kind):
@@ -146,6 +171,9 @@ class Word(Kind):
             refuse(f"expected {self.expected}{did_you_mean(value, self.words)}")
         return value
 
+    def _schema(self) -> Schema:
+        return {"enum": list(self.words)}
+
 
 @dataclass(frozen=True)
 class Text(Kind):
@@ -159,6 +187,9 @@ class Text(Kind):
             refuse(f"expected {self.expected}")
         return value
 
+    def _schema(self) -> Schema:
+        return {"type": "string"}
+
 
 @dataclass(frozen=True)
 class Flag(Kind):
@@ -171,6 +202,9 @@ class Flag(Kind):
         if not isinstance(value, bool):
             refuse(f"expected {self.expected}")
         return value
+
+    def _schema(self) -> Schema:
+        return {"type": "boolean"}
 
 
 @dataclass(frozen=True)
@@ -203,6 +237,14 @@ class Several(Kind):
                 refuse(f"expected {self.expected}; entry {number}, {shown(entry)}: {error.message()}")
         return tuple(parsed)
 
+    def written(self, value: Any) -> list[Any]:
+        """Return the entries."""
+        return [self.kind.written(entry) for entry in value]
+
+    def _schema(self) -> Schema:
+        most = {"maxItems": self.count} if self.count else {}
+        return {"type": "array", "items": self.kind.schema(), "minItems": self.count or 1, **most}
+
 
 def _is_array(value: object) -> TypeGuard[Iterable[Any]]:
     """Tell whether something has entries in an order: a list, a tuple, an array of numpy."""
@@ -224,105 +266,9 @@ class WordOr(Kind):
             return value if value == self.word else refuse(f"expected {self.expected}")
         return self.kind.parse(value)
 
+    def written(self, value: Any) -> Any:
+        """Return the word, or the value."""
+        return value if value == self.word else self.kind.written(value)
 
-# --- tables -------------------------------------------------------------------------------------------------
-
-
-class Table(BaseModel):
-    """A table of a deck: known keys only, immutable, and every problem in it reported together."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False)
-
-    @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Yield (key, sentence) for keys that do not go together; sees the table as it was written.
-
-        An empty key blames the whole table.
-        """
-        yield from ()
-
-    @classmethod
-    def known_keys(cls) -> dict[str, Any]:
-        """Return the fields of the table by the keys that decks use."""
-        return {info.alias or name: info for name, info in cls.model_fields.items()}
-
-    @classmethod
-    def parse(cls, data: Mapping[str, Any], source: Source) -> Self:
-        """Check a file that was read into dictionaries.
-
-        Raises
-        ------
-        DeckError
-            With a sentence for each thing that is wrong.
-        """
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise deck_error(problems_of(error), source) from None
-
-    @model_validator(mode="wrap")
-    @classmethod
-    def _collect(cls, data: Any, handler: Any) -> Any:
-        found: list[Mistake] = []
-        table = None
-        try:
-            table = handler(data)
-        except ValidationError as error:
-            found += [cls._problem(details) for details in error.errors(include_url=False)]
-        if isinstance(data, Mapping):
-            for key, sentence in cls.conflicts(data):
-                found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
-        if found:
-            raise ValidationError.from_exception_data(cls.__name__, [_details(problem) for problem in found])
-        return table
-
-    @classmethod
-    def _problem(cls, details: Any) -> Mistake:
-        key, value, kind = details["loc"], details["input"], details["type"]
-        if kind == "deck":
-            # The problem may come from a table below, which has marked a missing value already.
-            return Mistake(
-                key, MISSING if details["ctx"].get("missing") else value, details["ctx"]["sentence"]
-            )
-        known = cls.known_keys()
-        if kind == "missing":
-            return Mistake(key, MISSING, f"missing; expected {expectation(known[key[0]])}")
-        if kind == "extra_forbidden":
-            hint = did_you_mean(key[0], known) or f"; known here: {listed(sorted(known), 'and')}"
-            return Mistake(key, MISSING, f"unknown key{hint}")
-        if kind == "list_type":
-            return Mistake(key, MISSING, f"expected an array of tables: write [[{key[-1]}]]")
-        if kind == "too_short":
-            return Mistake(key, MISSING, "expected at least one entry")
-        if kind in ("model_type", "model_attributes_type", "dict_type"):
-            return Mistake(key, value, "expected a table of keys")
-        return Mistake(key, value, details["msg"])
-
-
-def kind_of(info: Any) -> Kind | None:
-    """Return the kind of the values of a field; None if it holds tables."""
-    kinds = [entry for entry in info.metadata if isinstance(entry, Kind)]
-    if not kinds:  # "Annotated[...] | None" keeps its metadata one level down
-        parts = getattr(info.annotation, "__args__", ())
-        kinds = [e for part in parts for e in getattr(part, "__metadata__", ()) if isinstance(e, Kind)]
-    return kinds[0] if kinds else None
-
-
-def expectation(info: Any) -> str:
-    """Say what a field expects, for messages and for the deck reference."""
-    if kind := kind_of(info):
-        return kind.expected
-    return "an array of tables of keys" if "list[" in str(info.annotation) else "a table of keys"
-
-
-def _details(problem: Mistake) -> InitErrorDetails:
-    context = {"sentence": problem.sentence, "missing": problem.value is MISSING}
-    value = None if problem.value is MISSING else problem.value
-    return InitErrorDetails(
-        type=PydanticCustomError("deck", "{sentence}", context), loc=problem.key, input=value
-    )
-
-
-def problems_of(error: ValidationError) -> list[Mistake]:
-    """Return the problems that a `Table` found while it was validated."""
-    return [Table._problem(details) for details in error.errors(include_url=False)]
+    def _schema(self) -> Schema:
+        return {"anyOf": [{"const": self.word}, self.kind.schema()]}

@@ -17,7 +17,7 @@ from ..files import LARGEST_TEXT
 from ..text import listed, visible
 from .faults import MISSING, Mistake, Source
 from .series import Columns, read_series
-from .tables import read_toml, refuse_deep, with_overrides
+from .toml import read_toml, refuse_deep, with_overrides
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time
 MOST_SERIES = 1000  # files of series

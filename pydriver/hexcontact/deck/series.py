@@ -11,15 +11,15 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field
 from pydantic_core import PydanticCustomError
 
 from ..errors import DeckError
 from ..files import require_ordinary, text_of
 from ..text import did_you_mean, listed, shown
-from .kinds import Kind, Quantity, Several, Table, Text, refuse
+from .kinds import Kind, Quantity, Schema, Several, Text, refuse
+from .model import Table, extended, meaning
 from .units import ANGLE, FORCE, LENGTH, TORQUE
 
 LOADS = {
@@ -30,17 +30,57 @@ LOADS = {
 }
 """The two keys that drive each rigid motion: by force, by displacement."""
 
-QUANTITIES: dict[str, Quantity] = {
-    "normal_load": Quantity(FORCE, at_least=0),
-    "tangential_load_x": Quantity(FORCE),
-    "tangential_load_y": Quantity(FORCE),
-    "torque": Quantity(TORQUE),
-    "approach": Quantity(LENGTH),
-    "shift_x": Quantity(LENGTH),
-    "shift_y": Quantity(LENGTH),
-    "twist": Quantity(ANGLE),
+
+class Driven(NamedTuple):
+    """A load or motion of which decks and files of series speak, each by its own key.
+
+    Attributes
+    ----------
+    kind : Quantity
+        What its values are.
+    of_segment, of_row : str
+        What the key means in [[load]] and in a series.
+    header, rows : str
+        The header of a column, and an array of values, as a deck may have them.
+    example : str
+        A value, where that of its dimension does not do.
+    """
+
+    kind: Quantity
+    of_segment: str
+    of_row: str
+    header: str
+    rows: str
+    example: str = ""
+
+
+_FORCES, _LENGTHS, _UM = '["1 N", "2 N"]', '["1 um", "2 um"]', '"1 um"'
+_TORQUES, _ANGLES = '["1 N mm", "2 N mm"]', '["0 deg", "1 deg"]'
+_LOAD, _SHIFT = "tangential load on body 1 along", "tangential motion of body 2, instead of tangential_load"
+_FIRST_ROWS = "normal load of each row, instead of a file; so are the other arrays"
+_APPROACH = "approach of the bodies, instead of normal_load"
+_TORQUE = "moment about z through x = y = 0; frees the twist"
+DRIVEN: dict[str, Driven] = {
+    "normal_load": Driven(Quantity(FORCE, at_least=0), "normal load P", _FIRST_ROWS, '"P [N]"', _FORCES),
+    "tangential_load_x": Driven(
+        Quantity(FORCE), f"{_LOAD} x", "tangential load along x of each row", '"Qx [N]"', _FORCES
+    ),
+    "tangential_load_y": Driven(
+        Quantity(FORCE), f"{_LOAD} y", "tangential load along y of each row", '"Qy [N]"', _FORCES
+    ),
+    "torque": Driven(Quantity(TORQUE), _TORQUE, "torque of each row", '"M [N mm]"', _TORQUES),
+    "approach": Driven(Quantity(LENGTH), _APPROACH, "approach of each row", '"depth [um]"', _LENGTHS, _UM),
+    "shift_x": Driven(
+        Quantity(LENGTH), f"{_SHIFT}_x", "shift along x of each row", '"ux [um]"', _LENGTHS, _UM
+    ),
+    "shift_y": Driven(
+        Quantity(LENGTH), f"{_SHIFT}_y", "shift along y of each row", '"uy [um]"', _LENGTHS, _UM
+    ),
+    "twist": Driven(
+        Quantity(ANGLE), "rotation about z, instead of torque", "twist of each row", '"angle [deg]"', _ANGLES
+    ),
 }
-"""What each load or motion is."""
+"""All of them, by the key."""
 
 _PASSED_OVER = ("time", "step")  # columns of files that need not be deck keys
 _MOST_COMPLAINTS = 10
@@ -66,91 +106,69 @@ class OrEmpty(Kind):
     def _parse(self, value: object) -> Any:
         return None if value is None or value == "" else self.kind.parse(value)
 
+    def written(self, value: Any) -> Any:
+        """Return the value, or ""."""
+        return "" if value is None else self.kind.written(value)
 
-def _rows_of(kind: Quantity, example: str) -> Several:
-    return Several(OrEmpty(kind), f"values, each {kind.expected} or empty text", example)
-
-
-_Header = Annotated[str, Text()]
-_FORCES, _LENGTHS = '["1 N", "2 N"]', '["1 um", "2 um"]'
-_Forces = Annotated[tuple[float | None, ...], _rows_of(Quantity(FORCE), _FORCES)]
-_Lengths = Annotated[tuple[float | None, ...], _rows_of(Quantity(LENGTH), _LENGTHS)]
+    def _schema(self) -> Schema:
+        return {"anyOf": [{"const": ""}, self.kind.schema()]}
 
 
-class Columns(Table):
+_Header = Annotated[str, Text()] | None
+_Headers: Any = extended(
+    Table,
+    {
+        name: (_Header, meaning(None, f"header of the column of {name}", load.header))
+        for name, load in DRIVEN.items()
+    },
+)
+
+
+class Columns(_Headers):
     """Which column of a file holds what."""
 
-    normal_load: _Header | None = Field(
-        None, description="header of the column of normal loads", examples=['"P [N]"']
-    )
-    tangential_load_x: _Header | None = Field(
-        None, description="header of the column of tangential_load_x", examples=['"Qx [N]"']
-    )
-    tangential_load_y: _Header | None = Field(
-        None, description="header of the column of tangential_load_y", examples=['"Qy [N]"']
-    )
-    torque: _Header | None = Field(
-        None, description="header of the column of torques", examples=['"M [N mm]"']
-    )
-    approach: _Header | None = Field(
-        None, description="header of the column of approaches", examples=['"depth [um]"']
-    )
-    shift_x: _Header | None = Field(
-        None, description="header of the column of shift_x", examples=['"ux [um]"']
-    )
-    shift_y: _Header | None = Field(
-        None, description="header of the column of shift_y", examples=['"uy [um]"']
-    )
-    twist: _Header | None = Field(
-        None, description="header of the column of twists", examples=['"angle [deg]"']
-    )
-    label: _Header | None = Field(None, description="header of the column of labels", examples=['"phase"'])
+    label: _Header = meaning(None, "header of the column of labels", '"phase"')
 
 
-class Series(Table):
+class _File(Table):
+    file: Annotated[str, Text()] | None = meaning(
+        None, "CSV or netCDF (`.nc`) file of the rows, relative to the deck", '"history.csv"'
+    )
+    columns: Columns | None = meaning(
+        None, "header of the column for each key, where it is not the key itself", '{ normal_load = "P [N]" }'
+    )
+
+
+def _rows(load: Driven) -> Any:
+    kind = Several(OrEmpty(load.kind), f"values, each {load.kind.expected} or empty text", load.rows)
+    return Annotated[tuple[float | None, ...], kind] | None
+
+
+_Rows: Any = extended(
+    _File, {name: (_rows(load), meaning(None, load.of_row)) for name, load in DRIVEN.items()}
+)
+
+
+class Series(_Rows):
     """A series of loads and motions, row by row: in a file, or as arrays."""
 
-    file: Annotated[str, Text()] | None = Field(
-        None,
-        description="CSV or netCDF (`.nc`) file of the rows, relative to the deck",
-        examples=['"history.csv"'],
-    )
-    columns: Columns | None = Field(
-        None,
-        description="header of the column for each key, where it is not the key itself",
-        examples=['{ normal_load = "P [N]" }'],
-    )
-    normal_load: Annotated[tuple[float | None, ...], _rows_of(QUANTITIES["normal_load"], _FORCES)] | None = (
-        Field(None, description="normal load of each row, instead of a file; so are the other arrays")
-    )
-    tangential_load_x: _Forces | None = Field(None, description="tangential load along x of each row")
-    tangential_load_y: _Forces | None = Field(None, description="tangential load along y of each row")
-    torque: Annotated[tuple[float | None, ...], _rows_of(Quantity(TORQUE), '["1 N mm", "2 N mm"]')] | None = (
-        Field(None, description="torque of each row")
-    )
-    approach: _Lengths | None = Field(None, description="approach of each row")
-    shift_x: _Lengths | None = Field(None, description="shift along x of each row")
-    shift_y: _Lengths | None = Field(None, description="shift along y of each row")
-    twist: Annotated[tuple[float | None, ...], _rows_of(Quantity(ANGLE), '["0 deg", "1 deg"]')] | None = (
-        Field(None, description="twist of each row")
-    )
-    label: Annotated[tuple[str, ...], Several(Text(), "texts", '["up", "down"]')] | None = Field(
-        None, description="label of each row; rows in turn with the same are one segment of the result"
+    label: Annotated[tuple[str, ...], Several(Text(), "texts", '["up", "down"]')] | None = meaning(
+        None, "label of each row; rows in turn with the same are one segment of the result"
     )
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Arrays are of one length, no row drives a motion twice, and a file stands alone."""
         data = {key: value for key, value in data.items() if value is not None}  # None comes from Python
-        arrays = {key: data[key] for key in (*QUANTITIES, "label") if isinstance(data.get(key), list | tuple)}
+        arrays = {key: data[key] for key in (*DRIVEN, "label") if isinstance(data.get(key), list | tuple)}
         if "file" in data:
-            for key in (*QUANTITIES, "label"):
+            for key in (*DRIVEN, "label"):
                 if key in data:
                     yield key, "expected in the file, not beside it"
             return
         if "columns" in data:
             yield "columns", "needs a file"
-        if not any(key in data for key in QUANTITIES):
+        if not any(key in data for key in DRIVEN):
             yield "", "expected a file, or arrays such as normal_load = [10, 20, 30]"
         for key, array in arrays.items():
             if len(array) != (count := len(next(iter(arrays.values())))):
@@ -162,11 +180,11 @@ class Series(Table):
     @property
     def count(self) -> int:
         """Number of rows."""
-        return len(next(filled for key in QUANTITIES if (filled := getattr(self, key)) is not None))
+        return len(next(filled for key in DRIVEN if (filled := getattr(self, key)) is not None))
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield what each row names, in SI, and its label."""
-        named = {key: array for key in (*QUANTITIES, "label") if (array := getattr(self, key)) is not None}
+        named = {key: array for key in (*DRIVEN, "label") if (array := getattr(self, key)) is not None}
         for row in zip(*named.values(), strict=True):
             yield {key: value for key, value in zip(named, row, strict=True) if value is not None}
 
@@ -248,7 +266,7 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
 def _unit_fault(key: str, unit: str) -> str:
     """Return what is wrong with the unit of a column, once instead of in each row."""
     try:
-        QUANTITIES[key].parse(f"1 {unit}")
+        DRIVEN[key].kind.parse(f"1 {unit}")
     except PydanticCustomError as error:
         return error.message()
     return ""
@@ -257,7 +275,7 @@ def _unit_fault(key: str, unit: str) -> str:
 def _value(key: str, cell: Any, unit: str) -> Any:
     if cell == "":
         return ""
-    kind = QUANTITIES[key]
+    kind = DRIVEN[key].kind
     if isinstance(cell, str):
         if re.fullmatch(r"[+-]?[\d.]+,\d+", cell):
             refuse("expected a decimal point, not a comma")
@@ -280,7 +298,7 @@ def _number(text: str) -> float | None:
 
 def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None) -> dict[str, _Column]:
     """Return the column of each key."""
-    keys, problems = (*QUANTITIES, "label"), []
+    keys, problems = (*DRIVEN, "label"), []
     chosen: dict[str, _Column] = {}
     headers = [column.header for column in found]
     for twin in dict.fromkeys(header for header in headers if headers.count(header) > 1 and header):
@@ -311,7 +329,7 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
                     f"{path}: column {shown(name)} is in {column.unit}, not in {unit} as columns says"
                 )
             chosen[key] = _Column(column.header, unit or column.unit, column.cells)
-    if not problems and not any(key in QUANTITIES for key in chosen):
+    if not problems and not any(key in DRIVEN for key in chosen):
         problems.append(f"{path}: expected a column of loads or motions, such as normal_load [N]")
     if not problems and not found[0].cells:
         problems.append(f"{path}: expected at least one row below the headers")
@@ -377,7 +395,7 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
                 and ((variable.ndim == 1 and _is_readable(variable.dtype)) or _is_text(variable))
             }
             longest = max(lengths.values(), default=0)
-            count = next((lengths[key] for key in QUANTITIES if key in lengths), longest)
+            count = next((lengths[key] for key in DRIVEN if key in lengths), longest)
             _refuse_many(path, count)
             columns = []
             for name in (name for name, length in lengths.items() if length == count):

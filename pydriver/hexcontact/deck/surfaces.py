@@ -9,22 +9,25 @@ bodies simply add up to the gap.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, ValidationError, ValidationInfo, field_validator
+from pydantic import ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
 
 from ..errors import DeckError
 from ..text import did_you_mean
-from .faults import MISSING, Source, deck_error
-from .kinds import Flag, Kind, Quantity, Several, Table, Word, problems_of, refuse, refuse_key
+from .faults import MISSING
+from .kinds import Flag, Kind, Quantity, Schema, Several, Word, refuse
+from .model import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
 Array = NDArray[np.float64]
+S = TypeVar("S", bound="Surface")
 PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
 LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
 Angle = Annotated[float, Quantity(ANGLE)]
@@ -35,7 +38,7 @@ Point = Annotated[tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0
 _RIM = 1.0 + 1e-12
 
 
-class Surface(Table):
+class Surface(Argument):
     """A surface shape; `offset` moves it in the plane.
 
     Built from SI numbers or from text with units, ``Sphere(radius=1e-3)`` or ``Sphere(radius="1 mm")``; an
@@ -48,16 +51,10 @@ class Surface(Table):
     """
 
     shape: str = ""
-    offset: Point = Field(default=(0.0, 0.0), description="moves the shape in x and y")
+    offset: Point = meaning((0.0, 0.0), "moves the shape in x and y")
 
     formula: ClassVar[str] = ""
     """Height about the shape's own center, for the documentation."""
-
-    def __init__(self, /, **data: Any) -> None:
-        try:
-            super().__init__(**data)
-        except ValidationError as error:
-            raise deck_error(problems_of(error), Source()) from error
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the height (m) at points of the plane.
@@ -91,11 +88,40 @@ class Surface(Table):
     def _height(self, x: Array, y: Array) -> Array:
         raise NotImplementedError
 
+    def written(self, defaults: bool = True) -> dict[str, Any]:
+        """Name the shape in any case."""
+        return {"shape": self.shape, **super().written(defaults)}
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> Schema:
+        """Require the keys, which stand together in any deck."""
+        schema = super().__get_pydantic_json_schema__(core, handler)
+        required = [name for name, info in cls.known_keys().items() if info.is_required()]
+        title = cls.model_fields["shape"].default
+        return schema | {"title": title, "description": cls.formula, "required": ["shape", *required]}
+
+
+SHAPES: dict[str, type[Surface]] = {}
+"""The shapes, by the word of a deck."""
+
+
+def shape(word: str) -> Callable[[type[S]], type[S]]:
+    """Let decks call a surface by a word."""
+    this: Any = Literal[word]
+
+    def known(surface: type[S]) -> type[S]:
+        surface.model_fields["shape"] = FieldInfo.from_annotated_attribute(this, word)
+        surface.model_rebuild(force=True)
+        SHAPES[word] = surface
+        return surface
+
+    return known
+
+
+@shape("flat")
 class Flat(Surface):
     """A plane."""
 
-    shape: Literal["flat"] = "flat"
     formula: ClassVar[str] = "h = 0"
 
     @property
@@ -107,12 +133,12 @@ class Flat(Surface):
         return np.zeros(np.broadcast_shapes(x.shape, y.shape))
 
 
+@shape("sphere")
 class Sphere(Surface):
     """A sphere, as the paraboloid that all of Hertz's theory is about, or as the true arc."""
 
-    shape: Literal["sphere"] = "sphere"
-    radius: PositiveLength = Field(description="radius R")
-    exact: Annotated[bool, Flag()] = Field(default=False, description="take the true arc, not the parabola")
+    radius: PositiveLength = meaning(..., "radius R")
+    exact: Annotated[bool, Flag()] = meaning(False, "take the true arc, not the parabola")
     formula: ClassVar[str] = "h = r²/(2R); exact: h = R − √(R² − r²) for r ≤ R"
 
     @property
@@ -134,15 +160,13 @@ class Sphere(Surface):
         return np.where(inside, square / (self.radius + root), np.inf)
 
 
+@shape("paraboloid")
 class Paraboloid(Surface):
     """A surface with two principal radii of curvature."""
 
-    shape: Literal["paraboloid"] = "paraboloid"
-    radius_x: PositiveLength = Field(
-        description="radius of curvature R₁ along the first axis (x if angle is 0)"
-    )
-    radius_y: PositiveLength = Field(description="radius of curvature R₂ across it")
-    angle: Angle = Field(default=0.0, description="angle of the first axis, from x towards y")
+    radius_x: PositiveLength = meaning(..., "radius of curvature R₁ along the first axis (x if angle is 0)")
+    radius_y: PositiveLength = meaning(..., "radius of curvature R₂ across it")
+    angle: Angle = meaning(0.0, "angle of the first axis, from x towards y")
     formula: ClassVar[str] = "h = s²/(2R₁) + t²/(2R₂), s along and t across the first axis"
 
     @property
@@ -156,12 +180,12 @@ class Paraboloid(Surface):
         return (a * x + b * y) ** 2 / (2 * self.radius_x) + (a * y - b * x) ** 2 / (2 * self.radius_y)
 
 
+@shape("cylinder")
 class Cylinder(Surface):
     """A (parabolic) cylinder lying on its side."""
 
-    shape: Literal["cylinder"] = "cylinder"
-    radius: PositiveLength = Field(description="radius R")
-    angle: Angle = Field(default=0.0, description="angle of its axis, from x towards y")
+    radius: PositiveLength = meaning(..., "radius R")
+    angle: Angle = meaning(0.0, "angle of its axis, from x towards y")
     formula: ClassVar[str] = "h = t²/(2R), t the distance from the axis"
 
     @property
@@ -175,11 +199,11 @@ class Cylinder(Surface):
         return (a * x + b * y) ** 2 / (2 * self.radius)
 
 
+@shape("cone")
 class Cone(Surface):
     """A cone with its tip towards the other body."""
 
-    shape: Literal["cone"] = "cone"
-    slope: PositiveNumber = Field(description="slope m = tangent of the angle between cone and plane")
+    slope: PositiveNumber = meaning(..., "slope m = tangent of the angle between cone and plane")
     formula: ClassVar[str] = "h = m r"
 
     def _height(self, x: Array, y: Array) -> Array:
@@ -204,13 +228,16 @@ class CoefficientKind(Kind):
     def _parse(self, value: object) -> Any:
         return value
 
+    def _schema(self) -> Schema:
+        return {"type": ["number", "string"], "description": self.expected}
 
+
+@shape("power")
 class Power(Surface):
     """A body of revolution whose profile is a power of the radius."""
 
-    shape: Literal["power"] = "power"
-    exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = Field(description="exponent n")
-    coefficient: Annotated[float, CoefficientKind()] = Field(description="coefficient C")
+    exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = meaning(..., "exponent n")
+    coefficient: Annotated[float, CoefficientKind()] = meaning(..., "coefficient C")
     formula: ClassVar[str] = "h = C rⁿ"
 
     @field_validator("coefficient")
@@ -225,11 +252,11 @@ class Power(Surface):
         return self.coefficient * np.hypot(x, y) ** self.exponent
 
 
+@shape("punch")
 class Punch(Surface):
     """The flat end of a circular punch; nothing can touch outside it."""
 
-    shape: Literal["punch"] = "punch"
-    radius: PositiveLength = Field(description="radius a of the flat end")
+    radius: PositiveLength = meaning(..., "radius a of the flat end")
     formula: ClassVar[str] = "h = 0 for r ≤ a, nothing beyond"
 
     @property
@@ -241,12 +268,12 @@ class Punch(Surface):
         return np.where(np.hypot(x, y) <= self.radius * _RIM, 0.0, np.inf)
 
 
+@shape("rounded_punch")
 class RoundedPunch(Surface):
     """A flat punch whose edge is a parabolic fillet."""
 
-    shape: Literal["rounded_punch"] = "rounded_punch"
-    flat_radius: LengthFromZero = Field(description="radius b of the flat middle")
-    edge_radius: PositiveLength = Field(description="radius of curvature R of the rounded edge")
+    flat_radius: LengthFromZero = meaning(..., "radius b of the flat middle")
+    edge_radius: PositiveLength = meaning(..., "radius of curvature R of the rounded edge")
     formula: ClassVar[str] = "h = (r − b)²/(2R) for r > b, else 0"
 
     def _height(self, x: Array, y: Array) -> Array:
@@ -258,11 +285,6 @@ def _axes(angle: float) -> tuple[Array, Array]:
     along = np.array([math.cos(angle), math.sin(angle)])
     return along, np.array([-along[1], along[0]])
 
-
-SHAPES: dict[str, type[Surface]] = {
-    shape.model_fields["shape"].default: shape
-    for shape in (Flat, Sphere, Paraboloid, Cylinder, Cone, Power, Punch, RoundedPunch)
-}
 
 _REFUSED = {
     "heights": "this version reads no height maps from files; "
@@ -277,6 +299,17 @@ class SurfaceKind(Kind):
 
     def _expected(self) -> str:
         return 'a table such as { shape = "sphere", radius = "1 mm" }'
+
+    def written(self, value: Surface) -> dict[str, Any]:
+        """Return the shape with its keys."""
+        return value.written()
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> Schema:
+        """Describe each of the shapes."""
+        shapes = SHAPES.values()
+        return {
+            "oneOf": [s.__get_pydantic_json_schema__(s.__pydantic_core_schema__, handler) for s in shapes]
+        }
 
     def _parse(self, value: object) -> Surface:
         if isinstance(value, Surface):

@@ -1,14 +1,34 @@
-"""A checked deck as text, every key with its value."""
+"""Decks as text: as they were given, or checked, with every key."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, get_args
+from typing import Any
 
-from .kinds import Quantity, Table
-from .surfaces import Surface
-from .tables import Deck, Load, Segment
-from .units import ANGLE
+import numpy as np
+
+from .model import Table
+from .tables import Deck
+
+
+def plain(value: Any) -> Any:
+    """Return what a deck can hold of values from Python: without numpy, None and tables that were made."""
+    if isinstance(value, Table):
+        return value.written(defaults=False)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items() if entry is not None}
+    if isinstance(value, list | tuple):
+        return ["" if entry is None else plain(entry) for entry in value]
+    return value
+
+
+def as_toml(data: Mapping[str, Any]) -> str:
+    """Write the tables of a deck as they were given."""
+    import tomli_w
+
+    return tomli_w.dumps(plain(data))
 
 
 def written(deck: Deck) -> str:
@@ -17,44 +37,4 @@ def written(deck: Deck) -> str:
     Reading the text again gives an equal deck. Keys that cannot stand beside others (`ramp` beside `values`,
     all but the label beside a `path`) are left out where they have no say.
     """
-    import tomli_w
-
-    return tomli_w.dumps(_table(deck))
-
-
-def _table(table: Table) -> dict[str, Any]:
-    fields = type(table).model_fields
-    values = {info.alias or name: (getattr(table, name), info) for name, info in fields.items()}
-    entries = {key: _entry(value, info) for key, (value, info) in values.items() if value is not None}
-    if isinstance(table, Load) and (table.path or table.series):
-        beside = {"label"} if table.path else {"label", "steps"}
-        entries = {key: v for key, v in entries.items() if key in beside or key not in Segment.model_fields}
-    elif isinstance(table, Segment) and table.values:
-        del entries["ramp"]
-    return entries
-
-
-def _entry(value: Any, info: Any) -> Any:
-    if isinstance(value, Surface):
-        return {"shape": value.shape, **_table(value)}
-    if isinstance(value, Table):
-        return _table(value)
-    if isinstance(value, list | tuple):
-        return ["" if entry is None else _entry(entry, info) for entry in value]
-    if isinstance(value, Mapping):
-        return {str(key): _entry(entry, info) for key, entry in value.items()}
-    # a bare angle is refused
-    return f"{value!r} rad" if isinstance(value, float) and _is_angle(info) else value
-
-
-def _is_angle(info: Any) -> bool:
-    found = [*info.metadata]
-    for part in get_args(info.annotation):
-        found += getattr(part, "__metadata__", ())
-    return "rad" in {_dimension(kind) for kind in found}
-
-
-def _dimension(kind: Any) -> str:
-    while hasattr(kind, "kind"):
-        kind = kind.kind
-    return kind.dimension.unit if isinstance(kind, Quantity) and kind.dimension is ANGLE else ""
+    return as_toml(deck.written())

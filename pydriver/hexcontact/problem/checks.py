@@ -2,66 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..deck.faults import MISSING, Mistake
+from ..deck.faults import MISSING, Mistake, deck_error
+from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
 from ..deck.tables import Deck, Friction, Output, Solver
 from ..errors import DeckError
 from ..variables import FIELDS
 from ..variables import FRICTIONLESS_FIELDS as FRICTIONLESS_FIELDS
-from .loads import load_steps
+from .loads import LoadStep, load_steps
 
 
-def checked_deck(
-    data: Mapping[str, Any], problems: Sequence[Mistake], gap_given: bool
-) -> tuple[Deck | None, list[Mistake]]:
+def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, tuple[LoadStep, ...]]:
     """Check a deck, table by table and as a whole.
 
     Parameters
     ----------
-    data : mapping
-        The deck as dictionaries, without files to include.
-    problems : sequence of Mistake
-        What is known to be wrong with it.
+    given : Assembled
+        The deck as dictionaries, and what is known to be wrong with it.
     gap_given : bool
         Whether the gap is given instead of the surfaces.
 
     Returns
     -------
-    deck : Deck or None
-        The deck; None if a table is wrong.
-    problems : list of Mistake
-        Everything that is wrong. Checks that need several tables are made wherever these are right.
+    deck : Deck
+        The deck.
+    solver : Solver
+        Its solver, with the algorithm that follows from it.
+    load_steps : tuple of LoadStep
+        Its history.
+
+    Raises
+    ------
+    DeckError
+        With everything that is wrong. Checks that need several tables are made wherever these are right.
     """
-    found = list(problems)
-    tables, of_tables = Deck.checked(data)
+    found = list(given.problems)
+    tables, of_tables = Deck.checked(given.data)
     blamed = {problem.key for problem in found}
     found += [problem for problem in of_tables if problem.key not in blamed]
-    for problem in problems:
+    for problem in given.problems:
         tables.pop(str(problem.key[0]), None)
-    algorithm = None
+    solver: Any = tables.get("solver")
+    steps: tuple[LoadStep, ...] = ()
     if {"friction", "solver"} <= tables.keys():
-        friction, solver = tables["friction"], tables["solver"]
-        algorithm, against = algorithm_of(friction, solver)
+        friction = tables["friction"]
+        algorithm, against = _algorithm(friction, solver)
+        solver = solver.model_copy(update={"algorithm": algorithm})
         found += against
         if "load" in tables:
             mu = None if algorithm == "frictionless" else friction.coefficient if friction else 0.0
-            found += load_steps(tables["load"], mu)[1]
+            steps, against = load_steps(tables["load"], mu)
+            found += against
         if "output" in tables:
-            found += field_problems(tables["output"], algorithm)
+            found += _field_problems(tables["output"], algorithm)
     if "body" in tables:
         one, two = (body.surface for body in (tables["body"].body_1, tables["body"].body_2))
         if not gap_given:
-            found += touching_problems(Separation(one, two))
+            found += _touching_problems(Separation(one, two))
         elif one.shape != "flat" or two.shape != "flat":
             sentence = "expected either a gap or surfaces of the bodies, not both"
             found.append(Mistake(("gap",), MISSING, sentence))
-    return (Deck.model_construct(**tables) if not found else None), found
+    if found:
+        raise deck_error(found, given.source)
+    return Deck.model_construct(**tables), solver, steps
 
 
-def algorithm_of(friction: Friction | None, solver: Solver) -> tuple[str, list[Mistake]]:
+def _algorithm(friction: Friction | None, solver: Solver) -> tuple[str, list[Mistake]]:
     """Return the algorithm that a deck asks for, and what stands against it."""
     mu = friction.coefficient if friction else None
     algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
@@ -77,7 +85,7 @@ def algorithm_of(friction: Friction | None, solver: Solver) -> tuple[str, list[M
     return algorithm, problems
 
 
-def field_problems(output: Output, algorithm: str) -> list[Mistake]:
+def _field_problems(output: Output, algorithm: str) -> list[Mistake]:
     """Complain about fields that a frictionless run does not yield."""
     known = FRICTIONLESS_FIELDS if algorithm == "frictionless" else FIELDS
     missing = [name for name in output.fields or () if name not in known]
@@ -87,7 +95,7 @@ def field_problems(output: Output, algorithm: str) -> list[Mistake]:
     return [Mistake(("output", "fields"), output.fields, sentence)]
 
 
-def touching_problems(gap: Separation) -> list[Mistake]:
+def _touching_problems(gap: Separation) -> list[Mistake]:
     """Complain about surfaces that never touch, or that touch along a line or all over, without end."""
     try:
         gap.first_touch  # noqa: B018 (worked out here, kept for later)

@@ -154,97 +154,105 @@ START: dict[Motion, Target] = {
 }
 
 
-def load_steps(
-    loads: Sequence[Load], friction_coefficient: float | None
-) -> tuple[tuple[LoadStep, ...], list[Mistake]]:
-    """Unroll the [[load]] segments.
+class History:
+    """Load steps, unrolled from entries of [[load]] as they are appended.
 
     Parameters
     ----------
-    loads : sequence of Load
-        The segments, each valid on its own.
     friction_coefficient : float or None
         Coefficient of friction; inf allowed. None: tangential loads and motions are not solved for at all.
 
-    Returns
-    -------
-    steps : tuple of LoadStep
-        The history; empty if it would be longer than `MOST_STEPS`.
-    problems : list of Mistake
-        What is wrong with the history as a whole: loads that never press, that no friction carries, or a ramp
-        whose start is not known.
+    Attributes
+    ----------
+    steps : list of LoadStep
+        The history; incomplete if it is longer than `MOST_STEPS`.
     """
-    count = sum(_count_of(load) for load in loads)
-    if count > MOST_STEPS:
-        sentence = f"expected at most {MOST_STEPS} load steps in all, not {count}"
-        return (), [Mistake(("load",), MISSING, sentence)]
 
-    steps: list[LoadStep] = []
-    problems: list[Mistake] = []
-    now = dict(START)
-    number = -1
-    for key, segment, label, carries_on in _in_turn(loads):
-        start, virgin = now, number < 0
-        number += not carries_on
+    def __init__(self, friction_coefficient: float | None) -> None:
+        self.steps: list[LoadStep] = []
+        self._mu = friction_coefficient
+        self._entries: list[Load] = []
+        self._count = 0
+        self._segments = 0
+        self._now = START
+        self._problems: dict[tuple[str | int, ...], Mistake] = {}
+
+    def append(self, load: Load) -> None:
+        """Append the load steps of an entry, valid on its own; see `problems` for what is wrong then."""
+        turns, path = load.repeat or 1, list(_turn(("load", len(self._entries)), load))
+        self._entries.append(load)
+        self._count += turns * sum(_count(stretch.segment) for stretch in path)
+        if self._count <= MOST_STEPS:
+            for _ in range(turns):
+                for stretch in path:
+                    self._run(stretch)
+
+    def _run(self, stretch: _Stretch) -> None:
+        """Append the load steps of a segment."""
+        key, segment, label, carries_on = stretch
+        start, virgin = self._now, not self._segments
+        self._segments += not carries_on
         if segment.ramp == "cubic" and start["z"].control != "force":
             sentence = "expected linear, since the segment before was driven by approach"
-            problems.append(Mistake((*key, "ramp"), "cubic", sentence))
+            self._complain(Mistake((*key, "ramp"), "cubic", sentence))
         ramp = Ramp(segment, start, virgin) if segment.steps == AUTO else None
         for fraction in _fractions(segment):
             now = {motion: _ramp(segment, motion, start[motion], fraction, virgin) for motion in MOTIONS}
-            steps.append(LoadStep(len(steps), number, label, **now, fraction=fraction, ramp=ramp))
+            number = self._segments - 1
+            step = LoadStep(len(self.steps), number, label, **now, fraction=fraction, ramp=ramp)
+            self.steps.append(step)
+            self._now = now
             for part in _WATCHED if ramp else (1.0,):
-                problems += _overload(key, segment, steps[-1].until(part), friction_coefficient)
+                for problem in _overload(key, segment, step.until(part), self._mu):
+                    self._complain(problem)
 
-    if all(step.z.value < SMALLEST for step in steps):
-        first = loads[0].normal_load
-        key, value = (("load", 0, "normal_load"), first) if first is not None else (("load",), MISSING)
-        sentence = "expected a normal load or an approach above zero somewhere in the history"
-        problems.append(Mistake(key, value, sentence))
-    # The first complaint about a key is enough: its segment has many steps, and may be repeated.
-    return tuple(steps), list({problem.key: problem for problem in reversed(problems)}.values())[::-1]
+    def _complain(self, problem: Mistake) -> None:
+        # The first complaint about a key is enough: its segment has many steps, and may be repeated.
+        self._problems[problem.key] = self._problems.pop(problem.key, problem)
 
+    @property
+    def problems(self) -> list[Mistake]:
+        """What is wrong with the history as a whole.
 
-def _paths(loads: Sequence[Load]) -> Iterator[tuple[int, list[_Stretch]]]:
-    """Yield, for each entry of [[load]], how often it is run and the segments of one turn."""
-    for number, load in enumerate(loads):
-        if load.series is not None:
-            yield load.repeat or 1, list(_rows(("load", number, "series"), load))
-        elif load.path is None:
-            yield 1, [_Stretch(("load", number), load, load.label)]
-        else:
-            yield (
-                load.repeat or 1,
-                [
-                    _Stretch(("load", number, "path", place), segment, segment.label or load.label)
-                    for place, segment in enumerate(load.path)
-                ],
-            )
+        Loads that never press, that no friction carries, or a ramp whose start is not known.
+        """
+        if self._count > MOST_STEPS:
+            sentence = f"expected at most {MOST_STEPS} load steps in all, not {self._count}"
+            return [Mistake(("load",), MISSING, sentence)]
+        problems = list(self._problems.values())
+        if all(step.z.value < SMALLEST for step in self.steps):
+            first = self._entries[0].normal_load
+            key, value = (("load", 0, "normal_load"), first) if first is not None else (("load",), MISSING)
+            sentence = "expected a normal load or an approach above zero somewhere in the history"
+            problems.append(Mistake(key, value, sentence))
+        return problems
 
 
-def _rows(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:
-    """Yield the rows of a series; those of one step with the same label are one segment."""
-    assert load.series is not None
+def load_steps(
+    loads: Sequence[Load], friction_coefficient: float | None
+) -> tuple[tuple[LoadStep, ...], list[Mistake]]:
+    """Return the load steps of a whole `History`, and what is wrong with it."""
+    history = History(friction_coefficient)
+    for load in loads:
+        history.append(load)
+    return tuple(history.steps), history.problems
+
+
+def _turn(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:
+    """Yield the segments of one turn of an entry; rows of one step with the same label are one segment."""
+    if load.series is None:
+        for place, segment in enumerate(load.path or ()):
+            yield _Stretch((*key, "path", place), segment, segment.label or load.label)
+        if load.path is None:
+            yield _Stretch(key, load, load.label)
+        return
     before = None
     for row in load.series.rows():
         label = row.pop("label", "") or load.label
         # checked already, and there may be many
         segment = Segment.model_construct(**row, steps=load.steps, largest_step=load.largest_step)
-        yield _Stretch(key, segment, label, carries_on=label == before and load.steps in (None, 1))
+        yield _Stretch((*key, "series"), segment, label, label == before and load.steps in (None, 1))
         before = label
-
-
-def _in_turn(loads: Sequence[Load]) -> Iterator[_Stretch]:
-    for turns, path in _paths(loads):
-        for _ in range(turns):
-            yield from path
-
-
-def _count_of(load: Load) -> int:
-    """Return the number of load steps of an entry of [[load]]."""
-    if load.series is not None:
-        return load.series.count * _count(load) * (load.repeat or 1)
-    return sum(_count(segment) for segment in load.path or [load]) * (load.repeat or 1)
 
 
 def _count(segment: Segment) -> int:
@@ -256,10 +264,8 @@ def _count(segment: Segment) -> int:
 
 def _fractions(segment: Segment) -> Sequence[float]:
     """Return how much of a segment is done after each of its steps; the last is exactly 1."""
-    if segment.values:
-        return segment.values
     count = _count(segment)
-    return [step / count for step in range(1, count + 1)]
+    return segment.values or [step / count for step in range(1, count + 1)]
 
 
 def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virgin: bool) -> Target:

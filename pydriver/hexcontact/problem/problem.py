@@ -5,32 +5,31 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import reals
 from ..core import contact as native
 from ..core import friction as native_friction
 from ..core import memory
 from ..core.contact import ElasticPair, Method
 from ..core.lattice import Lattice
-from ..deck import tables as decks
+from ..deck import toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
 from ..deck.surfaces import Separation
-from ..deck.tables import Deck
+from ..deck.tables import Accuracy, Body, Deck, Grid, Output, Solver
+from ..deck.write import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
-from ..variables import LARGEST
-from . import window as grids
-from .arguments import HeightMap, as_toml
-from .checks import algorithm_of, checked_deck
-from .loads import LoadStep, load_steps
-from .settings import AccuracySettings, Body, OutputSettings, SolverSettings
+from . import window
+from .checks import checked
+from .gap import Gap
+from .loads import LoadStep
 from .window import Estimate, NoContactFound
 
 Array = NDArray[np.float64]
@@ -63,8 +62,6 @@ class Problem:
         What is kept.
     deck : Deck
         The deck, checked and in SI.
-    deck_text : str
-        The case as a deck, whole: with what it includes, what was set, and the series of loads from files.
     deck_file : Path or None
         The file it was read from.
     lattice : Lattice
@@ -79,12 +76,11 @@ class Problem:
     body_2: Body
     pair: ElasticPair
     friction_coefficient: float
-    solver: SolverSettings
-    accuracy: AccuracySettings | None
+    solver: Solver
+    accuracy: Accuracy | None
     load_steps: tuple[LoadStep, ...]
-    output: OutputSettings
+    output: Output
     deck: Deck
-    deck_text: str
     deck_file: Path | None = None
     lattice: Lattice
     window_fixed: bool
@@ -106,7 +102,7 @@ class Problem:
         DeckError
             If it cannot be read, or with a sentence for each thing that is wrong with it.
         """
-        data, text = decks.read_toml(path)
+        data, text = toml.read_toml(path)
         case = cls._made(data, text, Source(str(path), text), Path(path).parent, overrides)
         case.deck_file = Path(path).absolute()
         return case
@@ -114,12 +110,15 @@ class Problem:
     @classmethod
     def from_text(cls, text: str, name: str = "deck", overrides: Mapping[str, Any] | None = None) -> Self:
         """Read a deck from its text (as a result file keeps it); `name` is what messages call it."""
-        return cls._made(decks.parse_toml(text, name), text, Source(name, text), overrides=overrides)
+        return cls._made(toml.parse_toml(text, name), text, Source(name, text), overrides=overrides)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Make a case from the tables of a deck: ``{"body": {"1": {...}, ...}, "grid": {...}, ...}``."""
-        return cls._made(data, None, Source())
+        if not isinstance(data, Mapping):
+            raise DeckError("a deck: expected tables of keys")
+        toml.refuse_deep(data, "")
+        return cls._made(plain(data), None, Source())
 
     @classmethod
     def _made(
@@ -130,8 +129,6 @@ class Problem:
         folder: Path = Path(),
         overrides: Mapping[str, Any] | None = None,
     ) -> Self:
-        if not isinstance(data, Mapping):
-            raise DeckError("a deck: expected tables of keys")
         case = cls.__new__(cls)
         case._set_up(assemble(data, text, source, folder, overrides), None, None)
         return case
@@ -142,49 +139,34 @@ class Problem:
         gap: Callable[[Array, Array], ArrayLike] | Array | None,
         lattice: Lattice | None,
     ) -> None:
-        source = given.source
-        deck, problems = checked_deck(given.data, given.problems, gap is not None)
-        if deck is None or problems:
-            raise deck_error(problems, source)
-        self.deck = deck
-        self.deck_text = given.text or given.remark + as_toml(given.data, gap is not None)
-        self.title = deck.title
-        self.body_1, self.body_2 = _body(deck.body.body_1), _body(deck.body.body_2)
+        self._given = given
+        self.deck, self.solver, self.load_steps = checked(given, gap is not None)
+        deck = self.deck
+        self.title, self.accuracy, self.output = deck.title, deck.accuracy, deck.output
+        self.body_1, self.body_2 = one, two = deck.body.body_1, deck.body.body_2
         self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
-        algorithm, _ = algorithm_of(deck.friction, deck.solver)
-        given_solver = deck.solver
-        self.solver = SolverSettings(
-            algorithm,
-            given_solver.method,
-            given_solver.tolerance,
-            given_solver.coupling,
-            given_solver.entry,
-            given_solver.step_tolerance,
-        )
-        wanted = deck.accuracy
-        self.accuracy = AccuracySettings(wanted.target, wanted.max_nodes) if wanted else None
-        self.output = OutputSettings(
-            Path(deck.output.file) if deck.output.file else None, deck.output.fields or (), deck.output.every
-        )
-        mu = self.friction_coefficient if self.frictional else None
-        self.load_steps, _ = load_steps(deck.load, mu)
-        self._surface_gap = (
-            Separation(deck.body.body_1.surface, deck.body.body_2.surface) if gap is None else None
-        )
-        self._given_gap = gap
-
+        self._gap = Gap(Separation(one.surface, two.surface) if gap is None else gap)
         self.pair = ElasticPair.from_materials(
-            self.body_1.young_modulus,
-            self.body_1.poisson_ratio,
-            self.body_2.young_modulus,
-            self.body_2.poisson_ratio,
+            one.young_modulus, one.poisson_ratio, two.young_modulus, two.poisson_ratio
         )
-        self.window_fixed = grids.is_fixed(deck.grid)
+        self.window_fixed = window.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # where the window follows from it alone
         self._contact_radius = math.inf  # estimated; of an array of gaps nothing is known
-        self.lattice = self._size(deck.grid, source, lattice)
+        self.lattice = self._size(deck.grid, given.source, lattice)
         if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
-            raise deck_error(problems, source)
+            raise deck_error(problems, given.source)
+
+    @cached_property
+    def deck_text(self) -> str:
+        """The case as a deck, whole: with what it includes, what was set, and series of loads from files."""
+        given = self._given
+        if given.text:
+            return given.text
+        data = plain(given.data)
+        if self._gap.given:
+            # Refused when read again, instead of solving something else.
+            data["body"]["1"]["surface"] = {"shape": "python"}
+        return given.remark + as_toml(data)
 
     @property
     def adaptive(self) -> bool:
@@ -229,18 +211,7 @@ class Problem:
         DeckError
             If a gap given in Python does not fit the window or is not a number somewhere.
         """
-        if isinstance(self._given_gap, np.ndarray):
-            gap = self._given_gap
-        else:
-            gap = self._gap_at(lattice.x, lattice.y)
-        if gap.shape != lattice.shape:
-            raise DeckError(
-                f"gap: expected an array of shape {lattice.shape} (n_row, n_col), not {gap.shape}"
-            )
-        if np.isnan(gap).any() or np.isneginf(gap).any():
-            raise DeckError("gap: expected numbers, or inf where nothing can touch, at every node")
-        if (abs(gap[np.isfinite(gap)]) > LARGEST).any():
-            raise DeckError(f"gap: expected lengths of at most {LARGEST:g} m, or inf where nothing can touch")
+        gap = self._gap.over(lattice)
         return gap, np.isfinite(gap)
 
     def check_contact(self, number: int, lattice: Lattice, contact: NDArray[np.bool_]) -> None:
@@ -260,10 +231,7 @@ class Problem:
         DeckError
             If it does.
         """
-        gap = self._given_gap
-        if isinstance(gap, HeightMap) and gap.ends_within(
-            lattice.spacing, lattice.x[contact], lattice.y[contact]
-        ):
+        if self._gap.ends_within(lattice.spacing, lattice.x[contact], lattice.y[contact]):
             raise DeckError(
                 f"gap: the contact of load step {number} reaches the end of the height map; expected heights "
                 "of a larger part, or a function that says what lies beyond"
@@ -280,7 +248,7 @@ class Problem:
             The nodes in contact: only the sides that they reach grow, by a quarter each. All sides without
             it.
         """
-        return grids.grown(lattice) if contact is None else grids.grown(lattice, grids.rim_sides(contact))
+        return window.grown(lattice) if contact is None else window.grown(lattice, window.rim_sides(contact))
 
     def on_lattice(self, spacing: float, origin: tuple[float, float]) -> Self:
         """Return the same problem on another lattice, solved on that one alone.
@@ -294,12 +262,12 @@ class Problem:
         """
         other = copy.copy(self)
         other.accuracy = None
-        moved = np.array(grids.lattice_coordinates(*self.lattice.origin, origin))
+        moved = np.array(window.lattice_coordinates(*self.lattice.origin, origin))
         if self._contact is not None:
             bounds = self._contact.bounds + moved[:, None]
-            other.lattice = grids.enclosing(bounds[:, 0], bounds[:, 1], spacing, grids.MARGIN, origin)
+            other.lattice = window.enclosing(bounds[:, 0], bounds[:, 1], spacing, window.MARGIN, origin)
         else:
-            other.lattice = grids.covering(self.lattice, spacing, origin)
+            other.lattice = window.covering(self.lattice, spacing, origin)
         return other
 
     def method_for(self, lattice: Lattice) -> Method:
@@ -340,13 +308,11 @@ class Problem:
         DeckError
             With a sentence for each thing that is wrong then.
         """
-        data = decks.parse_toml(self.deck_text, "deck")
-        if self._given_gap is not None:
-            del data["body"]["1"]["surface"]  # stands for the gap
         folder = self.deck_file.parent if self.deck_file else Path()
         case = type(self).__new__(type(self))
-        lattice = self.lattice if isinstance(self._given_gap, np.ndarray) else None
-        case._set_up(assemble(data, None, Source(), folder, changes), self._given_gap, lattice)
+        lattice = self.lattice if self._gap.at_nodes else None
+        given = assemble(plain(self._given.data), None, Source(), folder, changes)
+        case._set_up(given, self._gap.source if self._gap.given else None, lattice)
         if lattice is not None and case.deck.grid != self.deck.grid:
             changed = listed([key for key in changes if key.partition(".")[0] == "grid"], "and")
             raise DeckError(
@@ -360,17 +326,8 @@ class Problem:
         """Whether two cases are the same problem, solved and kept in the same way."""
         if not isinstance(other, Problem):
             return NotImplemented
-        mine, other_gap = self._given_gap, other._given_gap
-        same_gap = mine is other_gap or (
-            isinstance(mine, np.ndarray)
-            and isinstance(other_gap, np.ndarray)
-            and np.array_equal(mine, other_gap)
-        )
-        return same_gap and (self.deck, self.load_steps, self.lattice) == (
-            other.deck,
-            other.load_steps,
-            other.lattice,
-        )
+        mine, others = ((one._gap, one.deck, one.load_steps, one.lattice) for one in (self, other))
+        return mine == others
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -386,9 +343,9 @@ class Problem:
 
     # --- the window -----------------------------------------------------------------------------------------
 
-    def _refinement_problems(self, wanted: AccuracySettings) -> list[Mistake]:
+    def _refinement_problems(self, wanted: Accuracy) -> list[Mistake]:
         """Complain about what cannot be refined, or not far enough for errors to be told."""
-        if isinstance(self._given_gap, np.ndarray):
+        if self._gap.at_nodes:
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]
         if self.adaptive:
@@ -402,28 +359,15 @@ class Problem:
         )
         return [Mistake(("accuracy", "max_nodes"), wanted.max_nodes, sentence)]
 
-    def _gap_at(self, x: Array, y: Array) -> Array:
-        if self._surface_gap is not None:
-            return self._surface_gap(x, y)
-        assert callable(self._given_gap)
-        gap = reals(self._given_gap(x, y), "gap")
-        if gap.shape != np.shape(x):
-            raise DeckError(f"gap: expected an array of the shape of x, {np.shape(x)}, not {gap.shape}")
-        if (bad := np.isnan(gap)).any():
-            where = f"x = {x[bad][0]:.4g} m, y = {y[bad][0]:.4g} m"
-            raise DeckError(f"gap: expected numbers, or inf where nothing can touch; it is NaN at {where}")
-        return gap
-
-    def _size(self, grid: decks.Grid, source: Source, lattice: Lattice | None) -> Lattice:
+    def _size(self, grid: Grid, source: Source, lattice: Lattice | None) -> Lattice:
         """Return the window, checked against an estimate of the contact wherever there is one."""
-        if isinstance(self._given_gap, np.ndarray) and lattice is not None:
+        if self._gap.at_nodes and lattice is not None:
             self.initial_gap(lattice)
             return lattice
-        gap = self._surface_gap or self._given_gap
-        touch = gap.first_touch[:2] if isinstance(gap, Separation | HeightMap) else (0.0, 0.0)
+        touch = self._gap.first_touch or (0.0, 0.0)
         center = grid.center or touch
         try:
-            estimate = self._estimate(center if self._surface_gap is None else touch, grid.origin)
+            estimate = self._estimate(center if self._gap.given else touch, grid.origin)
         except NoContactFound as error:
             raise deck_error(
                 [Mistake(("grid",), MISSING, f"no window can be found: {error}")], source
@@ -431,8 +375,8 @@ class Problem:
         self._contact_radius = estimate.radius
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
-        lattice = lattice or grids.window(grid, center, estimate)
-        if problems := grids.check(grid, lattice, estimate):
+        lattice = lattice or window.window(grid, center, estimate)
+        if problems := window.check(grid, lattice, estimate):
             raise deck_error(problems, source)
         return lattice
 
@@ -443,13 +387,8 @@ class Problem:
             for name, control in (("normal_load", "force"), ("approach", "displacement"))
         }
         found = [
-            grids.estimate_contact(self.pair, self._gap_at, center, origin, **{name: value})
+            window.estimate_contact(self.pair, self._gap.at, center, origin, **{name: value})
             for name, value in largest.items()
             if value >= SMALLEST
         ]
         return found[0] if len(found) == 1 else found[0].joined(found[1])
-
-
-def _body(body: decks.Body) -> Body:
-    surface = None if body.surface.shape == "flat" else body.surface
-    return Body(body.young_modulus, body.poisson_ratio, body.rigid, surface)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,6 @@ from . import mesh
 from .interpolate import is_kept
 
 if TYPE_CHECKING:
-    import xarray
-
     from .result import Result
 
 _VTK_TYPES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "i1": "Int8", "u1": "UInt8"}
@@ -56,6 +54,14 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
     return kept
 
 
+def _meshed_steps(result: Result, numbers: Sequence[int] | None) -> list[int]:
+    """Return `kept_steps` of a result whose window has triangles; DeckError for others."""
+    steps = kept_steps(result, numbers)
+    if min(result.lattice.shape) < 2:
+        raise DeckError("a window of one row or one column has no triangles to export")
+    return steps
+
+
 def _fields(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any]]]:
     one = result.step(number)
     return ((name, one[name].values) for name in FIELDS if name in one)
@@ -88,9 +94,7 @@ def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
     DeckError
         If there is nothing to export.
     """
-    steps = kept_steps(result, numbers)
-    if min(result.lattice.shape) < 2:
-        raise DeckError("a window of one row or one column has no triangles to export")
+    steps = _meshed_steps(result, numbers)
     _make(folder)
     width = max(4, len(str(steps[-1])))
     names = []
@@ -206,35 +210,28 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
     """
     import netCDF4
 
-    steps = kept_steps(result, numbers)
-    if min(result.lattice.shape) < 2:
-        raise DeckError("a window of one row or one column has no triangles to export")
+    steps = _meshed_steps(result, numbers)
     _make(target.parent)
     with netCDF4.Dataset(target, "w", format="NETCDF4_CLASSIC") as file:
-        file.setncatts({"Conventions": CONVENTIONS, **_named(result.dataset, ("title", "source", "history"))})
+        known = result.dataset.attrs
+        named = {name: known[name] for name in ("title", "source", "history") if name in known}
+        file.setncatts({"Conventions": CONVENTIONS, **named})
         file.createDimension("step", len(steps))
-        column = file.createVariable("step", "i4", ("step",))
-        column.setncatts(VARIABLES["step"].attributes)
-        column[...] = steps
+        mesh.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
         mesh.write_mesh(file, result.lattice)
         on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
         for name in (name for name in ("initial_gap", *FIELDS) if name in result.dataset):
             variable = VARIABLES[name]
-            column = file.createVariable(
-                name, variable.dtype, (*variable.dims[:-2], mesh.NODE), zlib=True, complevel=1,
-                fill_value=variable.missing if variable.dtype == "f8" else None,
-            )  # fmt: skip
-            column.setncatts(variable.attributes | on_nodes)
+            fill = variable.missing if variable.dtype == "f8" else None
+            packed = {"zlib": True, "complevel": 1, "fill_value": fill}
+            dims, attributes = (*variable.dims[:-2], mesh.NODE), variable.attributes | on_nodes
+            column = mesh.add_column(file, name, variable.dtype, dims, attributes, **packed)
             if name == "initial_gap":
                 column[...] = result.dataset[name].values.ravel()
                 continue
             for position, number in enumerate(steps):
                 column[position] = result.step(number)[name].values.ravel()
     return target
-
-
-def _named(dataset: xarray.Dataset, names: Sequence[str]) -> Mapping[str, Any]:
-    return {name: dataset.attrs[name] for name in names if name in dataset.attrs}
 
 
 # --- CSV ------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from .step import Step
 if TYPE_CHECKING:
     import xarray
 
-_COORDINATES = ("step", "row", "col", "x", "y")
+COORDINATES = ("step", "row", "col", "x", "y")
 _ATTRIBUTES = (  # all but those that describe the case
     *("Conventions", "source", "history", "hexcontact_version", "schema_version", "complete"),
     *("lattice_spacing", "lattice_basis", "lattice_origin"),
@@ -327,5 +327,5 @@ def assemble(
         for name, v in VARIABLES.items()
         if name in values
     }
-    coordinates = {name: variables.pop(name) for name in _COORDINATES}
+    coordinates = {name: variables.pop(name) for name in COORDINATES}
     return xarray.Dataset(variables, coords=coordinates, attrs=layout.attributes(complete))

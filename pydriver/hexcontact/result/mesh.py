@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,38 +55,56 @@ def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
     faces = triangles(lattice.n_row, lattice.n_col)
     for name, size in ((NODE, lattice.size), (FACE, len(faces)), (CORNER, 3)):
         file.createDimension(name, size)
-    topology = file.createVariable(TOPOLOGY, "i4", ())
-    topology.setncatts(
-        {
-            "cf_role": "mesh_topology",
-            "long_name": "triangles of the lattice; node = (row - row[0])*n_col + (col - col[0])",
-            "topology_dimension": np.int32(2),
-            "node_coordinates": "mesh_node_x mesh_node_y",
-            "face_node_connectivity": FACE_NODES,
-            "face_dimension": FACE,
-        }
-    )
-    topology[...] = 0
+    about: dict[str, Any] = {
+        "cf_role": "mesh_topology",
+        "long_name": "triangles of the lattice; node = (row - row[0])*n_col + (col - col[0])",
+        "topology_dimension": np.int32(2),
+        "node_coordinates": "mesh_node_x mesh_node_y",
+        "face_node_connectivity": FACE_NODES,
+        "face_dimension": FACE,
+    }
+    add_column(file, TOPOLOGY, "i4", (), about, np.int32(0))
     packed: dict[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True}
-    for axis, values in (("x", lattice.x), ("y", lattice.y)):
+    for axis, values in (("x", lattice.x.ravel()), ("y", lattice.y.ravel())):
+        standard = {"standard_name": f"projection_{axis}_coordinate"}
+        about = {**standard, "long_name": f"{axis} coordinate of the node", "units": "m"}
         chunks = [min(_CHUNK, lattice.size)]
-        column = file.createVariable(f"mesh_node_{axis}", "f8", (NODE,), chunksizes=chunks, **packed)
-        column.setncatts(
-            {
-                "standard_name": f"projection_{axis}_coordinate",
-                "long_name": f"{axis} coordinate of the node",
-                "units": "m",
-            }
-        )
-        column[...] = values.ravel()
-    column = file.createVariable(
-        FACE_NODES, "i4", (FACE, CORNER), chunksizes=[min(_CHUNK, len(faces)), 3], **packed
-    )
-    column.setncatts(
-        {
-            "cf_role": "face_node_connectivity",
-            "long_name": "nodes at the corners of each triangle, counterclockwise",
-            "start_index": np.int32(0),
-        }
-    )
-    column[...] = faces
+        add_column(file, f"mesh_node_{axis}", "f8", (NODE,), about, values, chunksizes=chunks, **packed)
+    about = {
+        "cf_role": "face_node_connectivity",
+        "long_name": "nodes at the corners of each triangle, counterclockwise",
+        "start_index": np.int32(0),
+    }
+    chunks = [min(_CHUNK, len(faces)), 3]
+    add_column(file, FACE_NODES, "i4", (FACE, CORNER), about, faces, chunksizes=chunks, **packed)
+
+
+def add_column(
+    file: netCDF4.Dataset,
+    name: str,
+    dtype: str,
+    dims: tuple[str, ...],
+    attributes: Mapping[str, Any],
+    values: Any = None,
+    **options: Any,
+) -> netCDF4.Variable:
+    """Add a variable to a file, with its attributes and, if they are given, its values.
+
+    Parameters
+    ----------
+    file : netCDF4.Dataset
+        File open for writing.
+    name, dtype, dims
+        What it is called, its type and its dimensions.
+    attributes : mapping
+        Its attributes.
+    values : array_like, optional
+        Its values.
+    **options
+        How it is stored, see `netCDF4.Dataset.createVariable`.
+    """
+    column = file.createVariable(name, dtype, dims, **options)
+    column.setncatts(attributes)
+    if values is not None:
+        column[...] = values
+    return column

@@ -26,7 +26,7 @@ from ..files import reading, require_ordinary
 from ..variables import SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
-from .layout import Layout, Metadata
+from .layout import COORDINATES, Layout, Metadata
 from .result import Result
 from .step import Step
 
@@ -124,15 +124,15 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     if variable.dims[-2:] == ("row", "col"):
         sizes = [1 if dim == "step" else len(file.dimensions[dim]) for dim in variable.dims]
         options = {"compression": "zlib", "complevel": 1, "chunksizes": [min(_CHUNK, n) for n in sizes]}
-        options["fletcher32"] = True  # damage shows as an error, not as wrong numbers
+        options["fletcher32"] = True  # damage becomes an error, not wrong numbers
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
-    column = file.createVariable(name, variable.dtype, variable.dims, **options)
+    attributes = layout.attributes_of(name)
+    if options and name not in ("x", "y"):
+        attributes["coordinates"] = "x y"
+    column = mesh.add_column(file, name, variable.dtype, variable.dims, attributes, **options)
     if options:
         column.set_var_chunk_cache(size=0)  # chunks are written once; HDF5 kept 64 MB of each variable
-    column.setncatts(layout.attributes_of(name))
-    if variable.dims[-2:] == ("row", "col") and name not in ("x", "y"):
-        column.coordinates = "x y"
     return column
 
 
@@ -144,8 +144,8 @@ def _write_text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> None:
     variable = VARIABLES[name]
     characters = np.array([text.encode() for text in texts]).view("S1").reshape(len(texts), -1)
     file.createDimension(f"{name}_length", characters.shape[1])
-    column = file.createVariable(name, "S1", (*variable.dims, f"{name}_length"))
-    column.setncatts({**variable.attributes, "_Encoding": "utf-8"})
+    attributes = {**variable.attributes, "_Encoding": "utf-8"}
+    column = mesh.add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
     column.set_auto_chartostring(False)
     column[...] = characters
 
@@ -200,7 +200,7 @@ def read_output(path: Path) -> Result:
     with reading(path), _alone(), netCDF4.Dataset(path) as file:
         attributes = _attributes(file)
         _check_ours(attributes, path)
-        for name in ("step", "row", "col", "x", "y"):
+        for name in COORDINATES:
             if 0 in file[name].shape:
                 raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
         for name, column in file.variables.items():

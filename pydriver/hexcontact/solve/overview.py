@@ -9,8 +9,8 @@ from ..text import percent, quantity
 
 if TYPE_CHECKING:
     from ..deck.surfaces import Surface
+    from ..deck.tables import Body
     from ..problem.problem import Problem
-    from ..problem.settings import Body
 
 Row = tuple[str, ...]
 

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import ValidationError
 
 from ..deck.faults import Source, deck_error
-from ..deck.kinds import problems_of
+from ..deck.model import problems_of
 from ..deck.tables import Load
+from ..deck.write import plain
 from ..errors import DeckError
-from ..problem.arguments import given, middle_of, with_radians
+from ..problem.arguments import middle_of, with_radians
 from ..problem.loads import LoadStep, load_steps
 from ..result.result import Result, Step, assemble
 from . import log
@@ -215,17 +216,19 @@ class Session:
         """
         self._check_open()
         entry = with_radians(
-            given(
-                normal_load=normal_load,
-                approach=approach,
-                tangential_load_x=tangential_load_x,
-                shift_x=shift_x,
-                tangential_load_y=tangential_load_y,
-                shift_y=shift_y,
-                torque=torque,
-                twist=twist,
-                steps=steps,
-                label=label or None,
+            plain(
+                dict(
+                    normal_load=normal_load,
+                    approach=approach,
+                    tangential_load_x=tangential_load_x,
+                    shift_x=shift_x,
+                    tangential_load_y=tangential_load_y,
+                    shift_y=shift_y,
+                    torque=torque,
+                    twist=twist,
+                    steps=steps,
+                    label=label or None,
+                )
             )
         )
         before = self._loads if self._by_hand else self._loads_so_far()

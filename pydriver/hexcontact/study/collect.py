@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import DeckError, ResourceError
-from ..files import flush, reading, require_ordinary
+from ..files import reading, replacing, require_ordinary
 from ..result.netcdf import check_seal
 from ..variables import CONVENTIONS, VARIABLES
 from .folder import StudyFolder
@@ -158,14 +157,10 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         If it cannot be written.
     """
     refuse_foreign(path)
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
     # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
     texts = [name for name, variable in dataset.variables.items() if variable.dtype.kind in "UO"]
     try:
-        dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"dtype": "S1"} for name in texts})
-        flush(temporary)
-        os.replace(temporary, path)
-        flush(path.parent)
+        with replacing(path) as temporary:
+            dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"dtype": "S1"} for name in texts})
     except (OSError, RuntimeError) as error:
-        temporary.unlink(missing_ok=True)
         raise ResourceError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from error

@@ -14,42 +14,17 @@ import os
 import re
 import shutil
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import ConvergenceError, DeckError, ResourceError
-from ..files import flush, require_ordinary, text_of
+from ..files import replacing, require_ordinary, text_of
 from ..lock import Lock
+from .job import Outcome
 from .plan import Plan, PlannedCase, hash_of
 
 _INDEX = "index.json"
 _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fails in the same way again
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a case has ended.
-
-    Attributes
-    ----------
-    hash : str
-        Name of the case.
-    exit_code : int
-        0 if it is done, else what ``hexcontact run`` would have exited with.
-    message : str
-        Why it failed.
-    seconds : float
-        Wall time of this attempt.
-    lasting : bool
-        Whether a failure is of the case itself, not of the circumstances.
-    """
-
-    hash: str
-    exit_code: int = 0
-    message: str = ""
-    seconds: float = 0.0
-    lasting: bool = True
 
 
 class StudyFolder:
@@ -118,17 +93,11 @@ class StudyFolder:
         self._write(_INDEX, {"index_version": 1, "cases": self._entries})
 
     def _write(self, name: str, content: Any) -> None:
-        temporary = self.folder / f"{name}.{os.getpid()}.tmp"
+        text = json.dumps(content, indent=1, ensure_ascii=False, default=str)
         try:
-            with temporary.open("w", encoding="utf-8") as file:
-                json.dump(content, file, indent=1, ensure_ascii=False, default=str)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, self.folder / name)
-            flush(self.folder)
+            with replacing(self.folder / name) as path:
+                path.write_text(text, encoding="utf-8")
         except OSError as error:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
             raise ResourceError(f"cannot write {self.folder / name}: {error.strerror or error}") from error
 
     def number(self, case: PlannedCase) -> int:

@@ -13,13 +13,16 @@ import numpy as np
 
 from ..case import Case
 from ..deck.faults import Source
-from ..deck.kinds import Kind, Quantity, Table, Whole, WordOr
-from ..deck.tables import Deck, with_overrides
+from ..deck.kinds import Kind, Quantity, Whole, WordOr
+from ..deck.model import Table, kind_of
+from ..deck.tables import Deck
+from ..deck.toml import with_overrides
 from ..deck.units import ANGLE
+from ..deck.write import as_toml
 from ..errors import DeckError
-from ..problem.arguments import as_toml
 from ..text import shown
-from .tables import MOST_CASES, Parameter, StudyFile
+from .job import MOST_CASES
+from .tables import Parameter, StudyFile
 
 _MOST_TOLD = 20  # sentences about wrong cases
 
@@ -144,7 +147,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     for key in keys:
         if key == "output" or key.startswith("output.file"):
             raise DeckError(f"{study}: parameter {key}: a study names the files of its cases itself")
-    first = {entry.key: (entry.values or entry.range or ())[0] for entry in file.parameter}
+    first = {entry.key: next(iter(entry.values or entry.range or ())) for entry in file.parameter}
     try:
         deck = Deck.parse(with_overrides(base, first), about)
     except DeckError as error:
@@ -158,7 +161,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
             merged = with_overrides(base, values)
             if check:
                 Case._made(merged, None, about)
-            cases.append(PlannedCase(position, values, as_toml(merged, gap_given=False)))
+            cases.append(PlannedCase(position, values, as_toml(merged)))
         except DeckError as error:
             sentences.append(_with_case(str(error), about, position + 1, values))
     if sentences:
@@ -219,19 +222,9 @@ def _field(deck: Table, key: str) -> Any:
     return type(here).known_keys()[parts[-1]] if isinstance(here, Table) else None
 
 
-def _kind(info: Any) -> Kind | None:
-    """Return the kind of value that a field holds."""
-    if info is None:
-        return None
-    found = [entry for entry in info.metadata if isinstance(entry, Kind)]
-    for part in getattr(info.annotation, "__args__", ()):  # "Annotated[...] | None"
-        found += [entry for entry in getattr(part, "__metadata__", ()) if isinstance(entry, Kind)]
-    return found[0] if found else None
-
-
 def _axis(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
     info = _field(deck, entry.key)
-    kind = _kind(info)
+    kind = kind_of(info) if info else None
     values = entry.values or ()
     if isinstance(kind, WordOr) and isinstance(kind.kind, Quantity | Whole) and kind.word not in values:
         kind = kind.kind  # a number like any other

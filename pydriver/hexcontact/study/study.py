@@ -19,20 +19,22 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
-from ..deck.tables import read_toml
+from ..deck.toml import read_toml
 from ..errors import DeckError
 from ..solve import log
 from . import plan as study_plan
-from .folder import Outcome, StudyFolder
+from .backend import BACKENDS, Backend
+from .backends.dask import Dask, DaskPool
+from .backends.processes import LocalPool
+from .folder import StudyFolder
+from .job import Job, Outcome, solve_case
 from .plan import Plan, PlannedCase
-from .tables import Dask, StudyFile
+from .tables import StudyFile
 
 if TYPE_CHECKING:
     import xarray
 
     from ..solve.progress import Reporter
-    from .dask import DaskPool
-    from .pool import Job, LocalPool
 
 __all__ = ["Outcome", "PlannedCase", "Study", "StudyWatcher", "run_study"]
 
@@ -89,7 +91,7 @@ class Study:
         name: str = "study",
         **keys: Any,
     ) -> None:
-        from ..problem.arguments import plain
+        from ..deck.write import plain
 
         if isinstance(parameters, Mapping):
             parameters = [
@@ -210,16 +212,14 @@ class Study:
             If the result cannot be written.
         """
         from .collect import refuse_foreign
-        from .pool import Job
 
         watcher, cancel = watcher or StudyWatcher(), cancel or threading.Event()
         refuse_foreign(self.output)
         lock = self.folder.lock()
         try:
             missing = self.missing(retry)
-            by_hash = {case.hash: case for case in missing}
-            work = [Job(case.hash, case.deck, os.path.realpath(self.folder.path(case))) for case in missing]
-            pool = self._pool(jobs, dask, len(work)) if work else None
+            kind, settings = self.backend(jobs, dask)
+            pool = kind(settings, len(missing)) if missing else None
             log.logger.info(
                 log.words(
                     "study", title=self.title, cases=len(self), missing=len(missing), output=self.output
@@ -227,27 +227,26 @@ class Study:
             )
             with watcher.watching(self, len(missing)):
                 if pool is not None:
-                    self._work(work, by_hash, pool, watcher, cancel)
+                    self._work(pool, missing, watcher, cancel)
             return None if cancel.is_set() else self.collect()
         finally:
             lock.release()
 
     def _work(
-        self,
-        work: Sequence[Job],
-        by_hash: Mapping[str, PlannedCase],
-        pool: LocalPool | DaskPool,
-        watcher: StudyWatcher,
-        cancel: threading.Event,
+        self, pool: Backend, missing: Sequence[PlannedCase], watcher: StudyWatcher, cancel: threading.Event
     ) -> None:
+        by_hash = {case.hash: case for case in missing}
         try:
-            for outcome in pool.outcomes(work, cancel):
+            for outcome in pool.outcomes([self._job(case) for case in missing], cancel):
                 case = by_hash[outcome.hash]
                 self.folder.note(case, outcome)
                 self._log(case, outcome)
                 watcher.finished(case, outcome)
         finally:
             pool.stop()
+
+    def _job(self, case: PlannedCase) -> Job:
+        return Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))
 
     def _log(self, case: PlannedCase, outcome: Outcome) -> None:
         place = f"case={self.folder.number(case)}/{len(self)}"
@@ -257,22 +256,15 @@ class Study:
         else:
             log.logger.info(log.words(place, **about))
 
-    def _pool(self, jobs: int | None, dask: str | None, work: int) -> LocalPool | DaskPool:
-        if (where := self.cluster(jobs, dask)) is not None:
-            from .dask import DaskPool
-
-            return DaskPool(where)
-        from .pool import LocalPool, cores
-
-        if jobs is not None and jobs < 1:
-            raise DeckError(f"jobs = {jobs}: expected at least 1")
-        workers = min(jobs or cores(), work)
-        threads = os.environ.get("OMP_NUM_THREADS", "")
-        return LocalPool(workers, int(threads) if threads.isdecimal() else max(1, cores() // workers))
-
-    def cluster(self, jobs: int | None = None, dask: str | None = None) -> Dask | None:
-        """Return the Dask cluster that `run` would use; None: processes of this machine."""
-        return Dask(address=dask) if dask else self.file.dask if jobs is None else None
+    def backend(self, jobs: int | None = None, dask: str | None = None) -> tuple[type[Backend], Any]:
+        """Return what `run` would run cases with, and its settings."""
+        if dask:
+            return DaskPool, Dask(address=dask)
+        for word, kind in BACKENDS.items():
+            settings = getattr(self.file, word, None)
+            if jobs is None and settings is not None and issubclass(kind, Backend):
+                return kind, settings
+        return LocalPool, jobs
 
     def run_case(self, number: int, retry: bool = False, shown: Reporter | None = None) -> Outcome:
         """Run one case here, unless it is done; for job arrays.
@@ -291,8 +283,6 @@ class Study:
         Outcome
             Of this run, or of the one before.
         """
-        from .pool import Job, solve_case
-
         missing = {self.folder.number(case): case for case in self.missing(retry)}
         known = {self.folder.number(case): case for case in self.cases}
         if number not in known:
@@ -300,8 +290,7 @@ class Study:
         case = known[number]
         if number not in missing:
             return self.folder.failure(case) or Outcome(case.hash)
-        job = Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))
-        outcome = solve_case(job, shown=shown)
+        outcome = solve_case(self._job(case), shown=shown)
         self.folder.note(case, outcome)
         return outcome
 

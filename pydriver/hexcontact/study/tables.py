@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -10,9 +9,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from ..deck.kinds import Kind, Several, Table, Text, Whole, Word, refuse, refuse_key
-
-MOST_CASES = 100_000
+from ..deck.kinds import Kind, Several, Text, Whole, Word, refuse
+from ..deck.model import Table, extended, meaning
+from . import backends  # noqa: F401 (each registers its key)
+from .backend import KEYS
+from .job import MOST_CASES
 
 
 @dataclass(frozen=True)
@@ -38,67 +39,24 @@ class VariableName(Text):
         return name if re.fullmatch(r"\w(?:[\w .+-]*[\w.+-])?", name) else refuse(f"expected {self.expected}")
 
 
-@dataclass(frozen=True)
-class Settings(Kind):
-    """A table whose keys belong to another program."""
-
-    example: str
-
-    def _expected(self) -> str:
-        return f"a table such as {self.example}"
-
-    def _parse(self, value: object) -> dict[str, Any]:
-        if not isinstance(value, Mapping):
-            refuse(f"expected {self.expected}")
-        return dict(value)
-
-
-_BATCH_OPTION = re.compile(r"[a-z][a-z0-9_-]*")
-
-
-def batch_text(value: str) -> str | None:
-    """Return text as it stands in a line of options of sbatch, quoted where needed; None if it cannot."""
-    if not value or not value.isprintable() or '"' in value or "\\" in value:
-        return None
-    return f'"{value}"' if re.search(r"[\s'#]", value) else value
-
-
-@dataclass(frozen=True)
-class BatchOptions(Settings):
-    """Options of sbatch, which become lines of a script."""
-
-    def _parse(self, value: object) -> dict[str, Any]:
-        options = super()._parse(value)
-        for key, entry in options.items():
-            if not _BATCH_OPTION.fullmatch(str(key)) or key == "array":
-                refuse_key(str(key), entry, "expected an option of sbatch other than array, such as time")
-            if isinstance(entry, str) and batch_text(entry) is None:
-                refuse_key(key, entry, 'expected text on one line, without " and \\')
-            if not isinstance(entry, str | int | float | datetime.time):
-                refuse_key(key, entry, "expected text, a number, or true or false")
-        return options
-
-
 class Parameter(Table):
     """An entry of [[parameter]]: a key of the deck and the values it takes."""
 
-    key: Annotated[str, Text()] = Field(description="dotted key of the deck, such as load.1.normal_load")
-    name: Annotated[str, VariableName()] | None = Field(
-        None,
-        description="what the result calls it; the key with _ for . if absent",
-        examples=['"load"'],
+    key: Annotated[str, Text()] = meaning(..., "dotted key of the deck, such as load.1.normal_load")
+    name: Annotated[str, VariableName()] | None = meaning(
+        None, "what the result calls it; the key with _ for . if absent", '"load"'
     )
-    values: Annotated[tuple[Any, ...], Several(Anything(), "values", '["1 N", "2 N"]')] | None = Field(
-        None, description="the values"
+    values: Annotated[tuple[Any, ...], Several(Anything(), "values", '["1 N", "2 N"]')] | None = meaning(
+        None, "the values"
     )
     range: Annotated[tuple[Any, ...], Several(Anything(), "bounds", '["1 N", "5 N"]', count=2)] | None = (
-        Field(None, description="first and last value, instead of `values`")
+        meaning(None, "first and last value, instead of `values`")
     )
-    count: Annotated[int, Whole(2, MOST_CASES)] | None = Field(
-        None, description="number of values in `range` (grid, zip)"
+    count: Annotated[int, Whole(2, MOST_CASES)] | None = meaning(
+        None, "number of values in `range` (grid, zip)"
     )
-    scale: Annotated[str, Word(("linear", "log"))] = Field(
-        "linear", description="log: values in `range` in equal ratios"
+    scale: Annotated[str, Word(("linear", "log"))] = meaning(
+        "linear", "log: values in `range` in equal ratios"
     )
 
     @classmethod
@@ -119,50 +77,24 @@ class Parameter(Table):
         return self.name or self.key.replace(".", "_")
 
 
-class Dask(Table):
-    """Where a Dask cluster is, or how to start one."""
+class _Study(Table):
+    """All of a study file but where its cases are run."""
 
-    address: Annotated[str, Text()] | None = Field(None, description="scheduler, such as tcp://host:8786")
-    cluster: (
-        Annotated[str, Word(("local", "slurm", "pbs", "sge", "lsf", "htcondor", "oar", "moab"))] | None
-    ) = Field(None, description="start a cluster: local, or one of those of dask-jobqueue")
-    workers: Annotated[int, Whole(1, MOST_CASES)] = Field(1, description="workers that `cluster` starts")
-    options: Annotated[dict[str, Any], Settings("{ cores = 4 }")] = Field(
-        default_factory=dict, description="arguments of the cluster, such as cores, memory, walltime"
-    )
-
-    @classmethod
-    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Join a cluster or start one."""
-        if ("address" in data) == ("cluster" in data):
-            yield "address", "expected either address or cluster"
-
-
-class StudyFile(Table):
-    """A whole study file."""
-
-    title: Annotated[str, Text()] = Field("", description="a line about the study")
-    deck: Annotated[str, Text()] = Field(
-        description="the base deck; a relative name starts at the study file"
-    )
-    combine: Annotated[str, Word(("grid", "zip", "lhs"))] = Field(
+    title: Annotated[str, Text()] = meaning("", "a line about the study")
+    deck: Annotated[str, Text()] = meaning(..., "the base deck; a relative name starts at the study file")
+    combine: Annotated[str, Word(("grid", "zip", "lhs"))] = meaning(
         "grid",
-        description="grid: every value with every other; zip: first with first, second with second; "
-        "lhs: Latin hypercube",
+        "grid: every value with every other; zip: first with first, second with second; lhs: Latin hypercube",
     )
-    samples: Annotated[int, Whole(1, MOST_CASES)] | None = Field(None, description="number of cases (lhs)")
-    seed: Annotated[int, Whole(0)] = Field(0, description="seed of the Latin hypercube")
-    steps: Annotated[str, Word(("last", "all"))] = Field(
-        "last", description="load steps whose history the result holds"
+    samples: Annotated[int, Whole(1, MOST_CASES)] | None = meaning(None, "number of cases (lhs)")
+    seed: Annotated[int, Whole(0)] = meaning(0, "seed of the Latin hypercube")
+    steps: Annotated[str, Word(("last", "all"))] = meaning(
+        "last", "load steps whose history the result holds"
     )
-    output: Annotated[str, Text()] | None = Field(
-        None, description="netCDF file of the result; the name of the study file with .nc if absent"
+    output: Annotated[str, Text()] | None = meaning(
+        None, "netCDF file of the result; the name of the study file with .nc if absent"
     )
     parameter: list[Parameter] = Field(min_length=1)
-    dask: Dask | None = None
-    slurm: Annotated[dict[str, Any], BatchOptions('{ time = "1:00:00" }')] = Field(
-        default_factory=dict, description="options of sbatch for --slurm, such as time and cpus-per-task"
-    )
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -195,6 +127,13 @@ class StudyFile(Table):
                     "parameter",
                     f"zip needs as many values of each; they have {', '.join(map(str, lengths))}",
                 )
+
+
+_Extended: Any = extended(_Study, KEYS)
+
+
+class StudyFile(_Extended):
+    """A whole study file."""
 
 
 def _length(values: object) -> int:

@@ -10,14 +10,15 @@ import importlib
 import queue
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from ..errors import DeckError, ResourceError
-from .folder import Outcome
-from .pool import Job, next_of, solve_case
-from .tables import Dask
+from ...deck.kinds import Text, Whole, Word
+from ...deck.model import Table, meaning
+from ...errors import DeckError, ResourceError
+from ..backend import Backend, Settings, arrived, backend
+from ..job import MOST_CASES, Job, Outcome, solve_case
 
 _CLASSES = {
     "slurm": "SLURMCluster",
@@ -30,11 +31,23 @@ _CLASSES = {
 }
 
 
-def load(where: Dask) -> None:
-    """Import what a cluster needs, in the main thread: dask-jobqueue cannot be imported in another one."""
-    _package("distributed", "distributed")
-    if where.cluster not in (None, "local"):
-        _package("dask_jobqueue", "dask-jobqueue")
+class Dask(Table):
+    """Where a Dask cluster is, or how to start one."""
+
+    address: Annotated[str, Text()] | None = meaning(None, "scheduler, such as tcp://host:8786")
+    cluster: Annotated[str, Word(("local", *_CLASSES))] | None = meaning(
+        None, "start a cluster: local, or one of those of dask-jobqueue"
+    )
+    workers: Annotated[int, Whole(1, MOST_CASES)] = meaning(1, "workers that `cluster` starts")
+    options: Annotated[dict[str, Any], Settings("{ cores = 4 }")] = meaning(
+        {}, "arguments of the cluster, such as cores, memory, walltime"
+    )
+
+    @classmethod
+    def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Join a cluster or start one."""
+        if ("address" in data) == ("cluster" in data):
+            yield "address", "expected either address or cluster"
 
 
 def _package(name: str, install: str) -> Any:
@@ -55,13 +68,9 @@ def _package(name: str, install: str) -> Any:
             signal.signal(signal.SIGINT, handler)
 
 
-class DaskPool:
-    """Workers of a Dask cluster.
-
-    Parameters
-    ----------
-    where : Dask
-        The cluster: to join or to start.
+@backend("dask", Dask | None)
+class DaskPool(Backend):
+    """Workers of a Dask cluster, to join or to start.
 
     Raises
     ------
@@ -69,7 +78,8 @@ class DaskPool:
         If Dask is not installed, nobody answers, or the cluster refuses its options.
     """
 
-    def __init__(self, where: Dask) -> None:
+    def __init__(self, settings: Dask, cases: int) -> None:
+        where = settings
         distributed = _package("distributed", "distributed")
         self._cluster: Any = None
         if where.cluster is not None:
@@ -84,6 +94,13 @@ class DaskPool:
             raise DeckError(f"no Dask scheduler answers at {where.address}: {reason}") from None
         self._futures: list[Any] = []
 
+    @staticmethod
+    def load(settings: Dask) -> None:
+        """Import what a cluster needs; dask-jobqueue cannot be imported in a second thread."""
+        _package("distributed", "distributed")
+        if settings.cluster not in (None, "local"):
+            _package("dask_jobqueue", "dask-jobqueue")
+
     def outcomes(self, jobs: Sequence[Job], cancel: threading.Event) -> Iterator[Outcome]:
         """Run the jobs; yield each outcome as it comes, until `cancel` is set."""
         came: queue.Queue[Outcome | BaseException] = queue.Queue()
@@ -91,11 +108,7 @@ class DaskPool:
             future = self._client.submit(solve_case, job, apart=True, pure=False)
             self._futures.append(future)
             future.add_done_callback(lambda done, job=job: came.put(_outcome(done, job)))
-        for _ in jobs:
-            outcome = next_of(came, cancel)
-            if outcome is None:
-                return
-            yield outcome
+        yield from arrived(came, len(jobs), cancel)
 
     def stop(self) -> None:
         """Take back what has not begun, and leave the cluster; end it if it was started here."""

@@ -1,0 +1,7 @@
+"""The places where cases of a study can be run: each module registers one."""
+
+import importlib
+import pkgutil
+
+for _module in pkgutil.iter_modules(__path__):
+    importlib.import_module(f"{__name__}.{_module.name}")

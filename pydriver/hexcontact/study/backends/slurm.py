@@ -1,0 +1,101 @@
+"""A job array of Slurm: a script for sbatch, whose tasks run one case each."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ...deck.model import meaning, refuse_key
+from ...errors import DeckError
+from ..backend import Settings, backend
+
+_BATCH_OPTION = re.compile(r"[a-z][a-z0-9_-]*")
+
+
+def _text(value: str) -> str | None:
+    """Return text as it stands in a line of options of sbatch, quoted where needed; None if it cannot."""
+    if not value or not value.isprintable() or '"' in value or "\\" in value:
+        return None
+    return f'"{value}"' if re.search(r"[\s'#]", value) else value
+
+
+@dataclass(frozen=True)
+class BatchOptions(Settings):
+    """Options of sbatch, which become lines of a script."""
+
+    def _parse(self, value: object) -> dict[str, Any]:
+        options = super()._parse(value)
+        for key, entry in options.items():
+            if not _BATCH_OPTION.fullmatch(str(key)) or key == "array":
+                refuse_key(str(key), entry, "expected an option of sbatch other than array, such as time")
+            if isinstance(entry, str) and _text(entry) is None:
+                refuse_key(key, entry, 'expected text on one line, without " and \\')
+            if not isinstance(entry, str | int | float | datetime.time):
+                refuse_key(key, entry, "expected text, a number, or true or false")
+        return options
+
+
+@backend(
+    "slurm",
+    Annotated[dict[str, Any], BatchOptions('{ time = "1:00:00" }')],
+    meaning({}, "options of sbatch for --slurm, such as time and cpus-per-task"),
+)
+class JobArray:
+    """A job array, which is submitted by hand; settings: options of sbatch."""
+
+    def __init__(self, settings: dict[str, Any], cases: int) -> None:
+        self.options, self.cases = settings, cases
+
+    def script(self, numbers: Sequence[int], path: Path, output: Path, retry: bool) -> str:
+        """Return the script.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            The cases to run.
+        path, output : Path
+            The study file, and the file of its result.
+        retry : bool
+            Also cases that failed by themselves.
+        """
+        files = [str(path.resolve()), os.path.abspath(output)]
+        for name in files:
+            if _text(name) is None:
+                raise DeckError(f'{name}: a script needs a name on one line, without " and \\')
+        options: dict[str, Any] = {
+            "job-name": output.stem,
+            "output": str(output.with_suffix("")).replace("%", "%%") + "/slurm-%A_%a.log",
+            "signal": "B:USR1@60",  # a minute before a time limit, to the command in the shell's place
+        }
+        options |= {key.replace("_", "-"): value for key, value in self.options.items()}
+        words = ["hexcontact", "study", files[0], "--output", files[1], *(["--retry"] if retry else [])]
+        lines = [
+            "#!/bin/sh",
+            f"# {len(numbers)} of {self.cases} cases. Afterwards: {shlex.join(words)} --collect",
+            f"#SBATCH --array={_ranges(numbers)}",
+            *(
+                f"#SBATCH --{key}" + ("" if value is True else f"={_text(str(value))}")
+                for key, value in options.items()
+                if value is not False
+            ),
+            "export OMP_NUM_THREADS=${SLURM_CPUS_PER_TASK:-1}",
+            f"exec {shlex.join(words)} --case $SLURM_ARRAY_TASK_ID",
+        ]
+        return "\n".join(lines)
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Write numbers as Slurm does: 1-4,7."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1][1:] = [number]
+        else:
+            runs.append([number])
+    return ",".join("-".join(map(str, run)) for run in runs)

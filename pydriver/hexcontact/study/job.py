@@ -1,0 +1,151 @@
+"""One case of a study: what is to be run, how it has ended, and running it into its file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import time
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import HexcontactError, ResourceError
+
+if TYPE_CHECKING:
+    from ..case import Case
+    from ..result.step import Step
+    from ..solve.progress import Reporter
+    from ..solve.restart import Restart
+
+MOST_CASES = 100_000  # of a study
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case to be run: its hash, its deck, where its file goes."""
+
+    hash: str
+    deck: str
+    path: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case has ended.
+
+    Attributes
+    ----------
+    hash : str
+        Name of the case.
+    exit_code : int
+        0 if it is done, else what ``hexcontact run`` would have exited with.
+    message : str
+        Why it failed.
+    seconds : float
+        Wall time of this attempt.
+    lasting : bool
+        Whether a failure is of the case itself, not of the circumstances.
+    """
+
+    hash: str
+    exit_code: int = 0
+    message: str = ""
+    seconds: float = 0.0
+    lasting: bool = True
+
+
+def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> Outcome:
+    """Run one case into its file.
+
+    Parameters
+    ----------
+    job : Job
+        The case.
+    apart : bool
+        Write under a name of this attempt's own first, for when another attempt may still be under way.
+    shown : Reporter, optional
+        Who is told about each load step.
+
+    Returns
+    -------
+    Outcome
+        Failures are told, not raised.
+    """
+    from ..case import Case
+    from ..result.store import Store
+    from ..solve.progress import Reporter
+    from ..solve.run import metadata_of, record
+
+    started, shown = time.perf_counter(), shown or Reporter()
+    target = Path(job.path)
+    own = target.with_name(f"{target.stem}.{uuid.uuid4().hex[:8]}.nc") if apart else target
+
+    def ended(error: BaseException, exit_code: int, message: str, lasting: bool = True) -> Outcome:
+        notes = [note for note in getattr(error, "__notes__", ()) if not apart]
+        return Outcome(
+            job.hash, exit_code, "\n".join([message, *notes]), time.perf_counter() - started, lasting
+        )
+
+    began = False
+    try:
+        case = Case.from_text(job.deck, target.name)
+        with contextlib.ExitStack() as stack:
+            restart = _interrupted(job, case, stack)
+            if restart is None:
+                if own.is_file():  # damaged, or of another case, under a name that the index gave to this one
+                    own.unlink()
+                store = stack.enter_context(Store(own, metadata_of(case), overwrite=True))
+                began = True
+                before: Sequence[Step] = ()
+            else:
+                own, began, store, before = restart.store.path, True, restart.store, restart.before
+            with shown.watching(case.title or target.stem, case.planned_steps):
+                record(case, store, shown, before=before)
+        apart = own != target
+        if apart:
+            os.replace(own, target)
+    except HexcontactError as error:
+        _keep(own, target)
+        return ended(error, error.exit_code, str(error), began)
+    except MemoryError as error:
+        return ended(error, ResourceError.exit_code, "the machine has not enough memory for this", False)
+    except OSError as error:
+        return ended(error, ResourceError.exit_code, str(error), False)
+    except Exception as error:  # one case must not end the others
+        return ended(error, HexcontactError.exit_code, f"{type(error).__name__}: {error}", False)
+    return Outcome(job.hash, seconds=time.perf_counter() - started)
+
+
+def _interrupted(job: Job, case: Case, stack: contextlib.ExitStack) -> Restart | None:
+    """Open what an interrupted attempt has left, to go on with it; None if there is no such thing."""
+    from ..result.store import journal_of
+    from ..solve.restart import reopened
+
+    target = Path(job.path)
+    attempts = target.parent.glob(f"{target.stem}.*.nc.d") if target.parent.is_dir() else ()
+    for journal in (journal_of(target), *sorted(attempts)):
+        if not journal.is_dir():
+            continue
+        with contextlib.ExitStack() as attempt:
+            try:
+                restart = attempt.enter_context(reopened(journal, case))
+            except (HexcontactError, OSError):
+                continue  # damaged, of another deck, or another attempt is at it right now
+            if restart is None or restart.warning:  # finished, or of another version: then all of it anew
+                continue
+            stack.push(attempt.pop_all())
+            return restart
+    return None
+
+
+def _keep(own: Path, target: Path) -> None:
+    """Give the finished steps of a failed attempt the name of the case."""
+    from ..result.store import journal_of
+
+    if own != target and journal_of(own).is_dir():
+        with contextlib.suppress(OSError):
+            shutil.rmtree(journal_of(target), ignore_errors=True)
+            os.replace(journal_of(own), journal_of(target))

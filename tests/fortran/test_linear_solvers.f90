@@ -1,0 +1,274 @@
+!> Conjugate gradients and GMRES with constraints, on dense systems of five unknowns.
+module test_linear_solvers
+  use hc_precision, only: wp, sp
+  use hc_error, only: error_t
+  use hc_field_space, only: field_space_t
+  use hc_krylov, only: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, solution_accurate, &
+    iterations_used_up, solution_broke_off
+  use testing, only: test_t, new_test, check, check_true
+  implicit none
+  private
+
+  public :: collect_linear_solvers
+
+  !> A small dense system, to test the iteration alone.
+  type, extends(linear_system_t) :: dense_system_t
+    real(wp) :: matrix(5, 5)
+    !> Precision of the preconditioner
+    integer :: kind = wp
+  contains
+    procedure :: product => dense_product
+    procedure :: precondition => dense_precondition
+  end type dense_system_t
+
+contains
+
+  subroutine collect_linear_solvers(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('projected_cg', test_projected_cg), &
+      new_test('three_constraints', test_three_constraints), &
+      new_test('outcomes', test_outcomes), &
+      new_test('norm_of_gmres', test_norm_of_gmres), &
+      new_test('products_that_are_carried', test_products_that_are_carried), &
+      new_test('ends_of_gmres', test_ends_of_gmres) &
+    ]
+  end subroutine collect_linear_solvers
+
+  !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
+  subroutine test_projected_cg(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), multiplier(1), residual, constraint(5, 1)
+    real(wp), allocatable :: mb(:, :)
+    integer :: iterations, outcome, i
+
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    x = [6.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    ax = matmul(system%matrix, x)
+    constraint(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp]
+    call precondition_constraints(system, constraint(:, 1) > 0.0_wp, constraint, mb, error)
+    if (allocated(error)) return
+    call projected_cg(system, constraint(:, 1) > 0.0_wp, constraint, mb, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, 9.0_wp], x, ax, &
+                      1.0e-12_wp, 20, multiplier, residual, iterations, outcome, error)
+    if (allocated(error)) return
+    ! i x_i + 6 = b_i + m on the active nodes and sum x = 6: m (1 + 1/2 + 1/4) = 6 + sum (6 - b_i)/i
+    call check(error, multiplier(1), (6.0_wp + 5.0_wp + 2.0_wp + 0.75_wp)/1.75_wp, 1.0e-11_wp, 'multiplier')
+    if (allocated(error)) return
+    call check(error, x(2), (2.0_wp + multiplier(1) - 6.0_wp)/2.0_wp, 1.0e-11_wp, 'second unknown')
+    if (allocated(error)) return
+    call check(error, [sum(x), x(3), x(5)], [6.0_wp, 0.0_wp, 0.0_wp], 1.0e-12_wp, 'constraint and fixed nodes')
+    if (allocated(error)) return
+    call check_true(error, iterations <= 2 .and. residual <= 1.0e-12_wp .and. outcome == solution_accurate, &
+                    'three unknowns, one constraint')
+  end subroutine test_projected_cg
+
+  !> Conjugate gradients say why they stopped: solved, out of iterations, a matrix that is not positive definite.
+  subroutine test_outcomes(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0)
+    logical, parameter :: active(5) = .true.
+    integer, parameter :: expected(3) = [solution_accurate, iterations_used_up, solution_broke_off], most(3) = [20, 2, 20]
+    integer :: iterations, outcome, i, k
+
+    do k = 1, 3
+      system%matrix = 1.0_wp
+      do i = 1, 5
+        system%matrix(i, i) = 1.0_wp + i
+      end do
+      if (k == 3) system%matrix = -system%matrix
+      x = 0.0_wp
+      ax = 0.0_wp
+      call projected_cg(system, active, none, none, [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], x, ax, 1.0e-12_wp, most(k), &
+                        multiplier, residual, iterations, outcome, error)
+      if (allocated(error)) return
+      call check(error, outcome, expected(k), 'outcome')
+      if (allocated(error)) return
+      call check_true(error, (residual <= 1.0e-12_wp) .eqv. outcome == solution_accurate, 'residual')
+      if (allocated(error)) return
+    end do
+  end subroutine test_outcomes
+
+  !> GMRES bounds the Euclidean norm of the weighted residuals, and returns it.
+  subroutine test_norm_of_gmres(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0), left, first
+    real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = [1.0_wp, 2.0_wp, 1.0_wp, 0.5_wp, 1.0_wp]
+    logical, parameter :: active(5) = .true.
+    logical :: independent
+    integer :: iterations, outcome, i, most
+
+    first = norm2(weight*rhs)
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    system%matrix(2, 1) = -3.0_wp
+    do most = 1, 5
+      x = 0.0_wp
+      ax = 0.0_wp
+      call projected_gmres(system, active, none, none, none, weight, rhs, x, ax, 1.0e-10_wp, most, multiplier, independent, &
+                           residual, iterations, outcome, error)
+      if (allocated(error)) return
+      left = norm2(weight*(rhs - matmul(system%matrix, x)))
+      call check(error, residual, left, 1.0e-12_wp*first, 'the norm that is left')
+      if (allocated(error)) return
+      call check(error, outcome, merge(solution_accurate, iterations_used_up, left <= 1.0e-10_wp), 'outcome')
+      if (allocated(error)) return
+    end do
+    call check(error, outcome, solution_accurate, 'as many directions as unknowns are enough')
+  end subroutine test_norm_of_gmres
+
+  !> The product that is carried along is that of the unknowns: with a preconditioner of single precision before a row
+  !> that is a billion times larger, and the rounding errors of a start that is far off are told.
+  subroutine test_products_that_are_carried(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), multiplier(0), residual, none(5, 0), drift
+    real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = 1.0_wp
+    logical, parameter :: active(5) = .true.
+    logical :: independent
+    integer :: iterations, outcome, i, k
+
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    system%matrix(3, 3) = 1.0e9_wp
+    system%kind = sp
+    do k = 1, 2
+      x = merge(1.0e8_wp, 0.0_wp, k == 2)
+      ax = matmul(system%matrix, x)
+      call projected_gmres(system, active, none, none, none, weight, rhs, x, ax, 1.0e-10_wp, 5, multiplier, independent, &
+                           residual, iterations, outcome, error, drift)
+      if (allocated(error)) return
+      if (k == 1) call check(error, ax, matmul(system%matrix, x), 1.0e-13_wp, 'product of GMRES')
+      if (k == 2) call check_true(error, maxval(abs(ax - matmul(system%matrix, x))) < drift, 'drift of GMRES')
+      if (allocated(error)) return
+      x = merge(1.0e8_wp, 0.0_wp, k == 2)
+      ax = matmul(system%matrix, x)
+      call projected_cg(system, active, none, none, rhs, x, ax, 1.0e-10_wp, 9, multiplier, residual, iterations, outcome, &
+                        error, drift)
+      if (allocated(error)) return
+      if (k == 1) call check(error, ax, matmul(system%matrix, x), 1.0e-13_wp, 'product of conjugate gradients')
+      if (k == 2) call check_true(error, maxval(abs(ax - matmul(system%matrix, x))) < drift, 'drift of conjugate gradients')
+      if (allocated(error)) return
+      if (k == 1) call check_true(error, drift < 1.0e-13_wp, 'no drift')
+      if (allocated(error)) return
+    end do
+  end subroutine test_products_that_are_carried
+
+  !> GMRES leaves alone what has constraints that depend on each other, what is solved, and what no direction changes.
+  subroutine test_ends_of_gmres(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), multiplier(2), residual, constraint(5, 2)
+    real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = 1.0_wp
+    logical, parameter :: active(5) = .true.
+    logical :: independent
+    integer :: iterations, outcome
+
+    system%matrix = 1.0_wp
+    multiplier = 0.0_wp
+    constraint(:, 1) = rhs
+    constraint(:, 2) = -2.0_wp*rhs
+    x = 0.0_wp
+    ax = 0.0_wp
+    call projected_gmres(system, active, constraint, constraint, constraint, weight, rhs, x, ax, 1.0e-10_wp, 5, multiplier, &
+                         independent, residual, iterations, outcome, error)
+    if (allocated(error)) return
+    call check_true(error, .not. independent .and. iterations == 0 .and. outcome == solution_broke_off, 'dependent constraints')
+    if (allocated(error)) return
+    call projected_gmres(system, active, constraint(:, :0), constraint(:, :0), constraint(:, :0), weight, 0.0_wp*rhs, x, ax, &
+                         1.0e-10_wp, 5, multiplier(:0), independent, residual, iterations, outcome, error)
+    if (allocated(error)) return
+    call check_true(error, independent .and. iterations == 0 .and. outcome == solution_accurate, 'a start that solves it')
+    if (allocated(error)) return
+    call check(error, residual, 0.0_wp, 0.0_wp, 'its residual')
+    if (allocated(error)) return
+    ! differences have no image
+    call projected_gmres(system, active, constraint(:, :0), constraint(:, :0), constraint(:, :0), weight, &
+                         [1.0_wp, -1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], x, ax, 1.0e-10_wp, 5, multiplier(:0), independent, &
+                         residual, iterations, outcome, error)
+    if (allocated(error)) return
+    call check_true(error, iterations == 0 .and. outcome == solution_broke_off, 'no direction')
+    if (allocated(error)) return
+    call check(error, [x, ax, multiplier], [(0.0_wp, iterations=1, 12)], 0.0_wp, 'what is left alone')
+  end subroutine test_ends_of_gmres
+
+  !> Three constraints on four unknowns: the solution fulfils its own equations; dependent ones are told.
+  subroutine test_three_constraints(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), rhs(5), multiplier(3), residual, constraint(5, 3)
+    real(wp), allocatable :: mb(:, :)
+    real(wp), parameter :: wanted(3) = [6.0_wp, -1.0_wp, 2.0_wp]
+    logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
+    logical :: independent
+    integer :: iterations, outcome, i
+
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    rhs = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp]
+    constraint(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp]
+    constraint(:, 2) = [0.0_wp, 1.0_wp, 0.0_wp, -2.0_wp, 0.0_wp]
+    constraint(:, 3) = [3.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
+    call precondition_constraints(system, active, constraint, mb, error)
+    if (allocated(error)) return
+    call check(error, mb(:, 3), [1.5_wp, 0.0_wp, 0.0_wp, 0.2_wp, -1.0_wp/6.0_wp], 1.0e-15_wp, 'M B')
+    if (allocated(error)) return
+    x = [0.0_wp, 0.0_wp, 7.0_wp, 0.0_wp, 0.0_wp]
+    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
+    call check_true(error, independent, 'independent constraints')
+    if (allocated(error)) return
+    call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
+    if (allocated(error)) return
+    ax = matmul(system%matrix, x)
+    call projected_cg(system, active, constraint, mb, rhs, x, ax, 1.0e-12_wp, 20, multiplier, residual, iterations, outcome, error)
+    if (allocated(error)) return
+    call check(error, matmul(transpose(constraint), x), wanted, 1.0e-12_wp, 'constraints')
+    if (allocated(error)) return
+    call check(error, x(3), 7.0_wp, 0.0_wp, 'an unknown that is fixed')
+    if (allocated(error)) return
+    call check(error, merge(matmul(system%matrix, x) - rhs - matmul(constraint, multiplier), 0.0_wp, active), &
+               [(0.0_wp, i=1, 5)], 1.0e-11_wp, 'equations')
+    if (allocated(error)) return
+
+    constraint(:, 3) = 2.0_wp*constraint(:, 1)
+    call precondition_constraints(system, active, constraint, mb, error)
+    if (allocated(error)) return
+    ax = x
+    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
+    call check_true(error, .not. independent, 'constraints that depend on each other')
+    if (allocated(error)) return
+    call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')
+  end subroutine test_three_constraints
+
+  subroutine dense_product(self, x, y, error)
+    class(dense_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    y = matmul(self%matrix, x)
+  end subroutine dense_product
+
+  subroutine dense_precondition(self, x, y, error)
+    class(dense_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    y = [(x(i)/self%matrix(i, i), i=1, size(x))]
+    if (self%kind == sp) y = real(y, sp)
+  end subroutine dense_precondition
+
+end module test_linear_solvers

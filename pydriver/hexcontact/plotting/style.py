@@ -12,10 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
+from ..result.raster import SLIP as SLIP
+from ..result.raster import STICK as STICK
+
 # the Okabe-Ito palette, which people with any color vision can tell apart
 COMPUTED, EXACT, THIRD, GUIDE = "#0072B2", "#D55E00", "#009E73", "0.55"
 IN_CONTACT = "#56B4E9"
-STICK, SLIP = "#0072B2", "#F0C05A"  # dark and light, so that they differ in black and white too
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .core.lattice import Lattice
-from .deck.faults import Source
 from .deck.read import assemble
+from .deck.tables import Grid, Solver
 from .deck.toml import refuse_deep
 from .deck.write import plain
 from .errors import DeckError
@@ -23,7 +23,7 @@ from .problem.problem import Problem
 if TYPE_CHECKING:
     from .result.result import Result
     from .result.step import Step
-    from .solve.progress import Reporter
+    from .solve.events import Listener
     from .solve.session import Session
 
 __all__ = ["Body", "Case", "LoadStep", "Target"]
@@ -132,42 +132,27 @@ class Case(Problem):
             loads = {"normal_load": normal_load, "approach": approach, "steps": steps}
         elif normal_load is not None or approach is not None or steps is not None:
             raise DeckError("loads: expected either loads, or normal_load or approach with steps, not both")
+        arguments = locals()
         data = {
             "title": title or None,
             "body": {"1": body_1, "2": body_2},
             "friction": {"coefficient": friction_coefficient},
-            "grid": {
-                "spacing": spacing,
-                "nodes_across": nodes_across,
-                "nodes_in_radius": nodes_in_radius,
-                "extent": extent,
-                "window": window,
-                "center": center,
-                "origin": origin,
-            },
-            "solver": {
-                "algorithm": algorithm,
-                "method": method,
-                "tolerance": tolerance,
-                "coupling": coupling,
-                "entry": entry,
-                "step_tolerance": step_tolerance,
-            },
+            "grid": {key: arguments[key] for key in Grid.model_fields},
+            "solver": {key: arguments[key] for key in Solver.model_fields},
             "accuracy": {"target": accuracy} if isinstance(accuracy, int | float) else accuracy,
             "load": [loads] if isinstance(loads, Mapping) else loads,
             "output": {"fields": fields, "every": every},
         }
         refuse_deep(data, "")
         data = {key: value for key, value in plain(data).items() if value or key not in _LEFT_OUT}
-        data["load"] = with_radians(data["load"])
-        self._set_up(assemble(data, None, Source(), Path()), own_gap, lattice)
+        self._set_up(assemble({**data, "load": with_radians(data["load"])}), own_gap, lattice)
 
     def run(
         self,
         output: str | Path | None = None,
         overwrite: bool = False,
         on_step: Callable[[Step], object] | None = None,
-        progress: Reporter | bool | None = None,
+        progress: Listener | bool | None = None,
     ) -> Result:
         """Solve the case.
 
@@ -181,7 +166,7 @@ class Case(Problem):
         on_step : callable, optional
             Called with each finished `Step`. If it returns something true, or raises `hexcontact.StopRun`,
             the run ends there.
-        progress : Reporter or bool, optional
+        progress : Listener or bool, optional
             True: a bar on a terminal, lines otherwise.
 
         Returns
@@ -218,7 +203,8 @@ class Case(Problem):
         return Session(self, output, overwrite)
 
     def _repr_html_(self) -> str:
-        from .solve.overview import case_rows
+        from .problem.overview import case_rows
+        from .solve.frictionless import peak_memory
         from .text import html_table
 
-        return html_table(self.title or "Case", ("", ""), case_rows(self))
+        return html_table(self.title or "Case", ("", ""), case_rows(self, peak_memory))

@@ -86,7 +86,8 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     value : float
         The number, in SI.
     unit : str
-        A unit that takes a prefix; without one, or where no prefix fits, the number is written plainly.
+        A unit that takes a prefix, an area (m2) the square of one; without a unit, or where no prefix fits,
+        the number is written plainly.
     digits : int
         Significant digits.
     """
@@ -95,11 +96,12 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     if value == 0 or math.isinf(value):
         return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
     rounded = float(f"{value:.{digits - 1}e}")
-    power = 3 * math.floor(math.log10(abs(rounded)) / 3)
+    area, size = unit == "m2", math.log10(abs(rounded))
+    power = 3 * math.floor((size + 1) / 6 if area else size / 3)  # areas from 0.1 of a unit on
     if not unit or power not in PREFIXES:
         return f"{rounded:.{digits}g} {unit}".rstrip()
-    scaled = f"{rounded / 10.0**power:#.{digits}g}".rstrip(".")
-    return f"{scaled} {PREFIXES[power]}{unit}"
+    number = f"{rounded / 10.0 ** (2 * power if area else power):#.{digits}g}".rstrip(".")
+    return f"{number} {PREFIXES[power]}{'m²' if area else unit}"
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:

@@ -170,7 +170,7 @@ VARIABLES: dict[str, Variable] = {
     "slip_increment_x": _shear("m", "slip during the step along x", padding=0.0, title=_SLIP),
     "slip_increment_y": _shear("m", "slip during the step along y", padding=0.0, title=_SLIP),
     "accumulated_slip": _shear(
-        "m", "length of the slip path so far", padding=0.0, title="Slip path so far", least=0.0
+        "m", "length of the slip path so far", padding=0.0, title="Accumulated slip", least=0.0
     ),
     "displacement_1_x": _node("m", "surface displacement of body 1 along x"),
     "displacement_1_y": _node("m", "surface displacement of body 1 along y"),
@@ -322,11 +322,13 @@ def grouped(column: Callable[[str, Variable], str]) -> dict[str, tuple[str, ...]
 
 FIELDS = names_where(lambda v: v.is_field)
 FRICTIONLESS_FIELDS = names_where(lambda v: v.is_field and not v.frictional)
-DISPLACEMENTS = names_where(lambda v: v.is_field and not v.core)
-"""Fields that are computed if a deck asks for them; the other ones are the state of a contact."""
+STATE = names_where(lambda v: v.is_field and v.core)
+"""Fields that are the state of a contact; without friction those of them in `FRICTIONLESS_FIELDS`."""
+DISPLACEMENTS = tuple(name for name in FIELDS if name not in STATE)
+"""Fields that are computed if a deck names them."""
 
 LOADS = grouped(lambda name, v: v.motion)
-"""The load and the motion of each rigid motion."""
+"""What drives each rigid motion: a load or a displacement. Decks have keys of the same names."""
 
 SUMMARY = tuple(sorted(names_where(lambda v: v.summary), key=lambda name: VARIABLES[name].summary))
 RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.core == "residuals")}
@@ -338,8 +340,13 @@ CORE = grouped(lambda name, v: v.core)
 VECTORS = grouped(lambda name, v: name[:-2] if v.is_field and name[-2:] in ("_x", "_y", "_z") else "")
 """Components of each vector field by its name, which is theirs without the axis."""
 
-PANELS = grouped(lambda name, v: "" if v.is_field else v.title)
-"""Quantities of the history that share a panel, by its title."""
+PANELS = dict(
+    sorted(
+        grouped(lambda name, v: "" if v.is_field else v.title).items(),
+        key=lambda panel: VARIABLES[panel[1][0]].summary,
+    )
+)
+"""Quantities of the history that share a panel, by its title: loads and motions first, as in a summary."""
 
 MAPS = grouped(lambda name, v: v.title if v.is_field else "")
 """Fields that have a map by its title: one, or the components of a vector whose length the map shows."""

@@ -20,10 +20,10 @@ from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError
 from hexcontact.cli.app import app
 from hexcontact.cli.report import report
 from hexcontact.deck.surfaces import Sphere
+from hexcontact.problem import refinement
+from hexcontact.problem.refinement import RATIO, SHIFTS
 from hexcontact.result.trials import TrialFolder
 from hexcontact.solve import accuracy
-from hexcontact.solve import lattices as refinement
-from hexcontact.solve.accuracy import RATIO, SHIFTS
 from hexcontact.variables import ESTIMATED, VARIABLES
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -183,7 +183,7 @@ def test_limit_of_memory_keeps_the_finest_result(monkeypatch: pytest.MonkeyPatch
         if lattice.size > limit:
             raise hexcontact.ResourceError("not enough memory")
 
-    monkeypatch.setattr("hexcontact.solve.frictionless.require_memory", require)
+    monkeypatch.setattr("hexcontact.solve.lattices.require_memory", require)
     with pytest.warns(AccuracyWarning, match="not enough memory"):
         assert case.run().trial_level.max() == 2
 

@@ -12,12 +12,12 @@ from rich.console import Console
 from hexcontact import Case, ConvergenceError, DeckError
 from hexcontact.cli import tables as summary
 from hexcontact.deck.schema import deck_schema
+from hexcontact.problem import estimates, overview
 from hexcontact.result import history
 from hexcontact.result.history import describe
 from hexcontact.result.result import Result, Step
 from hexcontact.result.store import Journal, journal_of, open_result
 from hexcontact.solve import adaptive as adaptive_steps
-from hexcontact.solve import estimates, overview
 from hexcontact.solve.progress import Lines
 from hexcontact.solve.restart import resume
 

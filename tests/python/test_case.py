@@ -221,6 +221,27 @@ def test_arguments_and_deck_make_the_same_case() -> None:
     assert repr(case) == "Case(frictionless, 21 x 21 nodes, 2 load steps)"
 
 
+def test_a_body_is_checked_when_it_is_made() -> None:
+    body = Body(210e9, 0.3, surface=Sphere(radius=0.01))
+    assert (body.young_modulus, body.poisson_ratio, body.rigid) == (210e9, 0.3, False)
+    assert sphere_on_flat(nodes_across=21, body_1=body).body_1 == tables.Body(**dict(body))
+    with pytest.raises(DeckError, match=r"^poisson_ratio = 0.6: expected a number above -1 and at most 0.5$"):
+        Body(210e9, 0.6)
+    with pytest.raises(DeckError, match=r"^poisson_ratio: missing; expected a number such as 0.3"):
+        Body(young_modulus=210e9, poisson_ratio=None)
+
+
+def test_a_dictionary_may_change_after_the_case_was_made() -> None:
+    data = {
+        "body": {"1": dict(BALL), "2": dict(STEEL)},
+        "grid": {"spacing": 1e-5},
+        "load": [{"approach": 1e-6}],
+    }
+    case = Case.from_dict(data)
+    data["grid"]["spacing"] = 2e-5  # type: ignore[index]
+    assert Case.from_text(case.deck_text) == case.changed({}) == case
+
+
 def test_a_case_from_python_is_a_deck_too() -> None:
     case = sphere_on_flat(
         title="ellipse",

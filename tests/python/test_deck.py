@@ -17,7 +17,7 @@ from hexcontact.deck.surfaces import SHAPES, Flat, Sphere, Surface
 from hexcontact.deck.tables import Deck, Load, Segment
 from hexcontact.deck.toml import parse_toml, read_toml, with_overrides
 from hexcontact.errors import DeckError
-from hexcontact.problem.loads import LoadStep, Target, load_steps
+from hexcontact.problem.loads import History, LoadStep, Target, load_steps
 from hexcontact.text import shown
 
 ROOT = Path(__file__).parents[2]
@@ -616,6 +616,24 @@ def test_cycles() -> None:
     assert [step.z.value for step in steps] == [10, 7, 4, 10, 7, 4, 10, 1]
     assert [step.segment for step in steps] == [0, 1, 1, 2, 3, 3, 4, 5]
     assert [step.label for step in steps] == ["", "down", "down", "cycle", "down", "down", "cycle", ""]
+
+
+def test_a_history_that_is_appended_to_is_the_whole_one() -> None:
+    loads = [
+        {"normal_load": 10.0, "steps": 3, "label": "press"},
+        {"repeat": 2, "path": [{"shift_x": 1e-6, "steps": "auto"}, {"tangential_load_x": 0.0, "steps": 2}]},
+        {"series": {"normal_load": [8.0, 4.0], "label": ["down", "down"]}},
+        {"approach": 1e-6},
+    ]
+    grown = History(0.3)
+    for count, load in enumerate(loads, start=1):
+        grown.append(Load(**load))
+        assert (tuple(grown.steps), grown.problems) == load_steps(
+            [Load(**load) for load in loads[:count]], 0.3
+        )
+    assert len(grown.steps) == 12
+    grown.append(Load(normal_load=1.0, ramp="cubic"))
+    assert [problem.key for problem in grown.problems] == [("load", 4, "ramp")]
 
 
 def test_a_history_of_too_many_steps_is_refused_before_it_is_unrolled() -> None:

@@ -22,8 +22,8 @@ from hexcontact.deck.series import read_series
 from hexcontact.deck.tables import Deck
 from hexcontact.deck.write import written
 from hexcontact.errors import DeckError
-from hexcontact.solve.estimates import operator_applications, seconds
-from hexcontact.solve.overview import case_rows
+from hexcontact.problem.estimates import operator_applications, seconds
+from hexcontact.problem.overview import case_rows
 
 ROOT = Path(__file__).parents[2]
 
@@ -474,7 +474,7 @@ def test_the_time_is_estimated_to_its_order_of_magnitude(name: str, spacing: str
     program = f"""
         import time
         from hexcontact import Case
-        from hexcontact.solve.estimates import seconds
+        from hexcontact.problem.estimates import seconds
         case = Case.from_toml({str(ROOT / f"cases/{name}.toml")!r}, {{"grid.spacing": {spacing!r}}})
         Case.from_toml({str(ROOT / "cases/hertz_spheres.toml")!r}).run()  # imports
         began = time.process_time()

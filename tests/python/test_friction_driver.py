@@ -28,13 +28,13 @@ from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
+from hexcontact.problem import overview
 from hexcontact.problem.loads import LoadStep, Target
 from hexcontact.result import history
 from hexcontact.result.history import describe
 from hexcontact.result.result import Result, Step
 from hexcontact.result.store import Journal, journal_of, open_result
-from hexcontact.solve import overview
-from hexcontact.solve import run as solve
+from hexcontact.solve import steps as solve
 from hexcontact.solve.frictional import FrictionWindow, state_of
 from hexcontact.solve.frictionless import memory_needed
 from hexcontact.solve.progress import Lines

@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError, Study, open_result
 from hexcontact.cli.app import app
+from hexcontact.core.lattice import Lattice
 from hexcontact.deck.read import MOST_INCLUDED, MOST_SERIES
 from hexcontact.deck.series import MOST_STEPS, read_series
 from hexcontact.files import LARGEST_TEXT, text_of
@@ -160,9 +161,9 @@ def test_a_bar_takes_titles_as_text(
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "200")
     bar = Bar()
-    with bar.watching(HOSTILE, 3):
-        bar.says(FORMULA)
-        bar.lattice("lattice 2", shifted=False)
+    with bar.following(HOSTILE, 3):
+        bar.said("errors", FORMULA)
+        bar.lattice("lattice 2", Lattice(1e-3, 0, 0, 2, 2), shifted=False)
     shown = capsys.readouterr().err
     assert not set(OBEYED.findall(shown)) - {"\x1b", "\r"}  # of the bar itself
     assert r"\u001b]0;x" in shown

@@ -14,8 +14,7 @@ import pytest
 from hexcontact import Case, ConvergenceError
 from hexcontact.core import influence
 from hexcontact.solve import nonconvergence
-from hexcontact.solve import run as solve
-from hexcontact.solve.frictionless import kind_of
+from hexcontact.solve.steps import steps, window_type
 
 SPHERE = {"young_modulus": 210e9, "poisson_ratio": 0.3, "surface": {"shape": "sphere", "radius": 10e-3}}
 PLANE = {"young_modulus": 70e9, "poisson_ratio": 0.33}
@@ -29,8 +28,8 @@ def sphere(**keys: Any) -> Case:
 
 def failed(case: Case, **changed: Any) -> tuple[ConvergenceError, Any, Any]:
     """Change the state at the end of a case, and return what is said of it, the state and the window."""
-    *_, last = solve.steps(case)
-    window = kind_of(case)(case, last.lattice)
+    *_, last = steps(case)
+    window = window_type(case)(case, last.lattice)
     state, target = None, case.load_steps[0]
     for target in case.load_steps:
         state = window.advance(state, target, target.values(dict.fromkeys(_names(), 0.0)))

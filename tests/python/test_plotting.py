@@ -191,6 +191,15 @@ def test_lines_and_areas_are_in_every_kind_of_file(name: str, kind: str) -> None
         assert drawn.added_strokes(figure, kind) > 0.9 * drawn.vertices(figure) > 6
 
 
+@pytest.mark.parametrize(
+    ("beta", "coupling", "holds"), [(0.0, "full", True), (0.2, "goodman", True), (0.2, "full", False)]
+)
+def test_hertz_holds_where_shear_does_not_move_the_pressure(beta: float, coupling: str, holds: bool) -> None:
+    rough = {"algorithm": "incremental", "friction_coefficient": 0.3, "coupling": coupling}
+    assert StepView.of(sphere(dundurs_beta=beta, **rough), -1).hertz_holds is holds
+    assert StepView.of(sphere(dundurs_beta=beta, coupling=coupling), -1).hertz_holds
+
+
 def is_section(upper: Any, lower: Any, view: StepView, hertz: EllipticContact | None) -> None:
     """Check a section along x: the nodes of a row, Hertz, and below the difference of both."""
     bottom = upper if hertz is None else lower

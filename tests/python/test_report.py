@@ -339,8 +339,8 @@ def test_curves_are_the_history(folder: Path) -> None:
         "Contact and stick area": {"contact": "contact_area_fit", "stick": "stick_area_fit"},
         "Largest pressure": {"": "max_pressure"},
         "Largest shear traction": {"": "max_traction"},
-        "Dissipated energy": {"": "dissipated_energy"},
         "Elastic energy": {"": "elastic_energy"},
+        "Dissipated energy": {"": "dissipated_energy"},
         "Tangential load over shift, x": {"": "tangential_load_x"},
         "Residuals": {
             "R_n": "residual_normal",

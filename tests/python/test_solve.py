@@ -1,6 +1,8 @@
 """The step loop: what a step holds, windows that grow, what stops a run, and who is told."""
 
 import io
+import itertools
+import logging
 import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -16,12 +18,14 @@ from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.core import contact as native
 from hexcontact.core import memory
+from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
-from hexcontact.errors import ConvergenceError, DeckError, ResourceError
+from hexcontact.errors import ConvergenceError, DeckError, ResourceError, StopRun
 from hexcontact.result.result import Step
 from hexcontact.result.store import journal_of, open_result
-from hexcontact.solve import run as solve
-from hexcontact.solve.progress import Lines, Reporter, reporter
+from hexcontact.solve.events import Callback, Listener, Stopped
+from hexcontact.solve.progress import Lines, reporter
+from hexcontact.solve.steps import steps
 from hexcontact.text import quantity
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -45,7 +49,7 @@ def windowed(case: Case, n: int, fixed: bool = False) -> Case:
 
 def test_a_step_holds_what_the_solution_says() -> None:
     case = sphere()
-    [step] = solve.steps(case)
+    [step] = steps(case)
     history, fields, lattice = step.history, step.fields, step.lattice
     hertz = hertz_sphere(case.pair.effective_modulus, 10e-3, normal_load=100.0)
     # bounds: discretization at 12 spacings (theory: p_max and approach second order, a_A within 0.2 spacings)
@@ -294,8 +298,74 @@ def test_the_bar_moves_on_a_terminal(
     assert "2/2" in capsys.readouterr().err
 
 
+class Recorder(Listener):
+    """Lists the names of all events."""
+
+    def __init__(self) -> None:
+        self.events: list[str] = []
+
+    def begun(self, title: str, steps: int) -> None:
+        self.events.append(f"begun {title} {steps}")
+
+    def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
+        self.events.append(name)
+
+    def step(self, step: Step) -> None:
+        self.events.append(f"step {step.number}")
+
+    def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
+        self.events.append(event)
+
+    def ended(self, error: BaseException | None) -> None:
+        self.events.append(f"ended {type(error).__name__}")
+
+
+def test_a_listener_follows_a_run_from_beginning_to_end(tmp_path: Path) -> None:
+    recorder = Recorder()
+    case = sphere(loads=[{"normal_load": 10.0, "steps": 2}])
+    case.run(tmp_path / "out.nc", progress=recorder)
+    expected = ["begun sphere 2", "begun", "step 1", "step 2", "finished", "written", "ended NoneType"]
+    assert recorder.events == expected
+    recorder.events.clear()
+    windowed(sphere(), 11).run(progress=recorder)
+    different = [event for event, _ in itertools.groupby(recorder.events)]
+    assert different == ["begun sphere 1", "begun", "window", "step 1", "finished", "ended NoneType"]
+    recorder.events.clear()
+    with pytest.raises(DeckError):
+        windowed(sphere(), 11, fixed=True).run(progress=recorder)
+    assert recorder.events == ["begun sphere 1", "begun", "ended DeckError"]
+
+
+def test_a_listener_follows_every_lattice_and_the_estimate_of_errors() -> None:
+    recorder = Recorder()
+    sphere(nodes_in_radius=6, accuracy=0.05).run(progress=recorder)
+    each = ["begun", "step 1", "finished"]
+    names = [f"lattice {level}" for level in (1, 2, 3)]
+    names += [f"lattice 1, shifted ({copy} of 4)" for copy in (1, 2, 3, 4)]
+    inside = [event for name in names for event in (name, *each)]
+    assert recorder.events == ["begun sphere 1", *inside, "errors", "ended NoneType"]
+
+
+def test_a_callback_ends_a_run_after_each_step_but_the_last() -> None:
+    [*_, last] = steps(sphere(loads=[{"normal_load": 10.0, "steps": 2}]))
+    first = replace(last, index=0, load_fraction=0.5)
+    for answer, reason in (("enough", ": enough"), (True, ""), (StopRun("why"), ": why"), (StopRun(), "")):
+
+        def on_step(step: Step, answer: object = answer) -> object:
+            if isinstance(answer, StopRun):
+                raise answer
+            return answer
+
+        with pytest.raises(Stopped, match=rf"^stopped by on_step after step 1{reason}$"):
+            Callback(on_step).step(first)
+        Callback(on_step).step(last)
+        with pytest.raises(Stopped, match="after step 2"):  # of a lattice, after which others come
+            Callback(on_step, refines=True).step(last)
+    Callback(lambda step: None).step(first)
+
+
 def test_silence() -> None:
-    assert type(reporter(quiet=True)) is Reporter
+    assert type(reporter(quiet=True)) is Listener
 
 
 @pytest.mark.parametrize(
@@ -310,6 +380,8 @@ def test_silence() -> None:
         (0.19, "", "0.19"),
         (1e-20, "m", "1e-20 m"),
         (math.nan, "m", "-"),
+        (1.234e-7, "m2", "0.1234 mm²"),
+        (3.3, "m2", "3.300 m²"),
     ],
 )
 def test_quantities_are_written_with_prefixes(value: float, unit: str, text: str) -> None:

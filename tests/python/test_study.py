@@ -4,6 +4,7 @@ import contextlib
 import importlib
 import json
 import os
+import pkgutil
 import pty
 import re
 import shutil
@@ -13,7 +14,7 @@ import sys
 import time
 import types
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import psutil
@@ -26,13 +27,20 @@ import hexcontact
 from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
 from hexcontact.deck import starters
+from hexcontact.deck.kinds import Whole
+from hexcontact.deck.model import extended, meaning
 from hexcontact.deck.toml import with_overrides
 from hexcontact.result.store import Store
-from hexcontact.solve.progress import Reporter
-from hexcontact.solve.run import metadata_of, record
+from hexcontact.solve.events import Callback
+from hexcontact.solve.run import metadata_of, run_into
+from hexcontact.study import backend as backend_registry
+from hexcontact.study import backends
+from hexcontact.study import study as study_module
+from hexcontact.study.backend import BACKENDS, KEYS, Backend
 from hexcontact.study.backends.processes import LocalPool
 from hexcontact.study.job import Job, solve_case
 from hexcontact.study.study import Study, run_study
+from hexcontact.study.tables import StudyFile
 
 PACKAGE = Path(hexcontact.__file__).parents[1]
 CASES = Path(__file__).parents[2] / "cases"
@@ -539,7 +547,7 @@ def test_a_case_that_was_interrupted_goes_on_after_its_last_step(folder: Path, n
     assert whole.exit_code == 0
     case = Case.from_text(SHEARED, "0001.nc")
     with pytest.raises(KeyboardInterrupt), Store(folder / name, metadata_of(case), overwrite=True) as store:
-        record(case, store, Reporter(), stop_after_third)
+        run_into(case, store, Callback(stop_after_third))
     again = solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=name != "0001.nc")
     assert again.exit_code == 0, again.message
     assert sorted(path.name for path in folder.glob("0001*")) == ["0001.nc"]
@@ -553,7 +561,7 @@ def test_an_attempt_that_is_still_under_way_or_damaged_is_left_alone(folder: Pat
     case = Case.from_text(SHEARED, "0001.nc")
     with Store(folder / "0001.0123abcd.nc", metadata_of(case), overwrite=True) as store:
         with pytest.raises(KeyboardInterrupt):
-            record(case, store, Reporter(), stop_after_third)
+            run_into(case, store, Callback(stop_after_third))
         (folder / "0001.ffffffff.nc.d").mkdir()
         assert solve_case(Job("h", SHEARED, str(folder / "0001.nc")), apart=True).exit_code == 0
         assert len(store.heads) == 3
@@ -624,6 +632,44 @@ def test_a_case_that_another_run_is_at_is_no_failure_of_the_case(folder: Path) -
         path = study.folder.path(case)
         assert solve_case(Job(case.hash, case.deck, str(path)), apart=True).exit_code == 0
         assert study.folder.done(case)
+
+
+# --- backends -----------------------------------------------------------------------------------------------
+
+
+def test_each_module_of_the_backends_registers_one() -> None:
+    modules = {module.name for module in pkgutil.iter_modules(backends.__path__)}
+    assert set(BACKENDS) == modules == {kind.__module__.rpartition(".")[2] for kind in BACKENDS.values()}
+    assert set(KEYS) == {"dask", "slurm"} <= set(StudyFile.known_keys())
+
+
+def test_a_new_backend_has_its_key_and_runs_the_cases(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for registry in (BACKENDS, KEYS):
+        monkeypatch.setattr(backend_registry, "BACKENDS" if registry is BACKENDS else "KEYS", dict(registry))
+
+    @backend_registry.backend("here", Annotated[int, Whole(1)], meaning(None, "cases at a time"))
+    class Here(Backend):
+        def __init__(self, settings: int, cases: int) -> None:
+            self.said = settings, cases
+
+        def outcomes(self, jobs: Any, cancel: Any) -> Any:
+            assert self.said == (3, len(jobs))
+            yield from map(solve_case, jobs)
+
+        def stop(self) -> None:
+            pass
+
+    file = extended(StudyFile, {"here": backend_registry.KEYS["here"]})
+    monkeypatch.setattr(study_module, "StudyFile", file)
+    monkeypatch.setattr(study_module, "BACKENDS", backend_registry.BACKENDS)
+    study = Study("deck.toml", {"load.1.normal_load": [10.0, 20.0]}, here=3)
+    assert study.backend() == (Here, 3)
+    assert study.backend(jobs=2) == (LocalPool, 2)
+    dataset = study.run()
+    assert dataset is not None
+    assert dataset.status.values.tolist() == [0, 0]
+    with pytest.raises(DeckError, match="here = 0: expected a whole number of at least 1"):
+        Study("deck.toml", {"load.1.normal_load": [10.0]}, here=0)
 
 
 # --- Dask ---------------------------------------------------------------------------------------------------

@@ -2,10 +2,14 @@
 
 import math
 import pickle
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pytest
 
+from hexcontact.deck.kinds import Quantity
+from hexcontact.deck.model import meaning
+from hexcontact.deck.schema import deck_schema
 from hexcontact.deck.surfaces import (
     SHAPES,
     Cone,
@@ -19,7 +23,10 @@ from hexcontact.deck.surfaces import (
     Sphere,
     Surface,
     principal_curvatures,
+    shape,
 )
+from hexcontact.deck.tables import Body
+from hexcontact.deck.units import NUMBER
 from hexcontact.errors import DeckError
 
 SOME = [
@@ -251,3 +258,32 @@ def test_principal_direction_is_the_first_axis_of_a_paraboloid(degrees: float) -
     assert (smaller, larger) == pytest.approx((0.2, 1.0), rel=1e-14)
     assert math.sin(angle - math.radians(degrees)) == pytest.approx(0.0, abs=1e-14)
     assert -math.pi / 2 < angle <= math.pi / 2
+
+
+def test_a_new_shape_needs_its_class_and_a_word() -> None:
+    @shape("wedge")
+    class Wedge(Surface):
+        """A wedge."""
+
+        slope: Annotated[float, Quantity(NUMBER, above=0)] = meaning(..., "slope m")
+        formula: ClassVar[str] = "h = m |x|"
+
+        def _height(self, x: Any, y: Any) -> Any:
+            return self.slope * abs(x) + 0 * y
+
+    try:
+        body = Body.model_validate({"rigid": True, "surface": {"shape": "wedge", "slope": 0.1}})
+        assert body.surface == Wedge(slope=0.1)
+        assert body.surface.height(-2.0, 1.0) == 0.2
+        assert body.written(defaults=False)["surface"] == {
+            "shape": "wedge",
+            "offset": [0.0, 0.0],
+            "slope": 0.1,
+        }
+        found = [one["title"] for one in deck_schema()["$defs"]["Body"]["properties"]["surface"]["oneOf"]]
+        assert found == list(SHAPES)
+        assert SHAPES["wedge"] is Wedge
+    finally:
+        del SHAPES["wedge"]
+    with pytest.raises(ValueError, match=r"slope"):
+        Wedge(slope=-1.0)

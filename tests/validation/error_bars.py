@@ -14,8 +14,8 @@ from hexcontact.analytic.friction import MindlinContact
 from hexcontact.case import Case
 from hexcontact.core.contact import ElasticPair
 from hexcontact.deck.surfaces import Cylinder, Sphere
+from hexcontact.solve.events import Listener
 from hexcontact.solve.lattices import InMemory, refine
-from hexcontact.solve.progress import Reporter
 
 from .reference import Comparison
 from .runs import shear_compliance
@@ -153,8 +153,8 @@ def estimates_over_errors(problem: str, count: int, seed: int, target: float = E
         spacing = radius / math.exp(rng.uniform(*np.log(MESHES)))
         origin = tuple((spacing * rng.uniform(0.0, 1.0, 2)).tolist())
         case = Case(**given, spacing=spacing, origin=origin, accuracy=target)
-        solver = InMemory(Reporter(), None)
-        outcome = refine(case, solver, Reporter())
+        solver = InMemory([], Listener())
+        outcome = refine(case, solver)
         history, errors = solver.steps[-1].history, outcome.errors[-1]
         for name, value in exact.items():
             error = abs(float(history[name]) - value)

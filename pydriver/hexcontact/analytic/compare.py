@@ -59,7 +59,7 @@ class Comparison(Sequence[Entry]):
     step : int
         Number of the load step.
     note : str
-        What there is to know about them, or why there are none.
+        A remark on them, or why there are none.
     """
 
     def __init__(self, entries: Sequence[Entry], step: int, note: str = "") -> None:

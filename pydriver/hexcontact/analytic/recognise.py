@@ -1,6 +1,6 @@
 """Which closed solutions hold for a load step of a result, and what they say about it.
 
-Each is recognized from the deck, the attributes and the history, and told only where its assumptions are
+Each is recognized from the deck, the attributes and the history, and holds only where its assumptions are
 those of the case. The pressure is that of a contact without friction where there is none, where the bodies
 are similar (beta = 0), and where shear is not let move it (Goodman's coupling).
 """
@@ -55,7 +55,7 @@ class Exact:
 
 
 def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact], str]:
-    """Return the closed solutions that hold for a load step, and what there is to know about them.
+    """Return the closed solutions that hold for a load step, and a remark on them.
 
     Parameters
     ----------

@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 @command("hexcontact check fretting.toml --set grid.spacing='2 um'")
 def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) -> Content:
     """Read a deck, report everything that is wrong with it, and say what would be run."""
-    from ..solve.frictionless import require_memory
-    from ..solve.lattices import least_and_most
-    from ..solve.overview import case_rows
+    from ..problem.overview import case_rows
+    from ..problem.refinement import least_and_most
+    from ..solve.frictionless import peak_memory, require_memory
     from . import tables
 
     case = case_of(deck, settings)
     if not as_json:
-        tables.console().print(tables.pairs(case.title or deck.stem, case_rows(case)))
+        tables.console().print(tables.pairs(case.title or deck.stem, case_rows(case, peak_memory)))
     first = least_and_most(case)[0][-1] if case.accuracy else case  # the first that may be the result
     require_memory(first, first.lattice)
     target = target_of(case, deck)
@@ -39,9 +39,9 @@ def check(deck: DeckFile, settings: Settings = None, as_json: AsJson = False) ->
 
 def case_content(case: Problem, output: Path) -> dict[str, Any]:
     """Return for programs what would be run."""
-    from ..solve import estimates
+    from ..problem import estimates
+    from ..problem.overview import parameters_of
     from ..solve.frictionless import peak_memory
-    from ..solve.run import parameters_of
 
     lattice = case.lattice
     return {

@@ -118,7 +118,7 @@ class Messages:
 def solved(
     case: Problem,
     store: Store,
-    signals: tuple[int, int],
+    pipe: tuple[int, int],
     name: str,
     messages: Messages,
     before: Sequence[Step] = (),
@@ -134,15 +134,12 @@ def solved(
         store.close(f"interrupted ({signaled.name})")
         return not store.finished
 
-    shown, histories = reporter(messages.silent), [step.history for step in before]
-
-    def work() -> None:
-        solving.record(case, store, shown, lambda step: histories.append(step.history), before)
-
+    histories: list[Any] = [step.history for step in before]
+    listener = solving.listeners(case, reporter(messages.silent), lambda step: histories.append(step.history))
     title = (case.title or name) + (f", after step {len(before)}" if before else "")
     try:
-        with shown.watching(title, case.planned_steps):
-            in_background(work, signals, ends)
+        with listener.following(title, case.planned_steps):
+            in_background(lambda: solving.run_into(case, store, listener, before), pipe, ends)
     except Interrupted as signaled:
         messages.interrupted(signaled, store.kept or "no load step was finished", done=len(store.heads))
     return histories

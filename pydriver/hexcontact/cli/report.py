@@ -19,8 +19,8 @@ from .._version import __version__
 from ..errors import DeckError
 from ..files import replacing
 from ..plotting.report_data import drawn_data, kept_steps
+from ..problem.overview import case_rows
 from ..result.history import RESIDUALS, load_or_motion, worth_showing
-from ..solve.overview import case_rows
 from ..text import quantity, visible
 from ..variables import label_of
 from . import tables

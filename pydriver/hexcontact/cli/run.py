@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..solve.interruption import news
+from ..solve.interruption import signal_pipe
 from .guard import Content, command, complain
 from .options import AsJson, DeckFile, Level, LogFile, Plot, Quiet, Settings, case_of, setting, target_of
 
@@ -41,9 +41,9 @@ def run(
         case = case_of(deck, settings)
         target = target_of(case, deck, output)
         log.refuse_same(log_file, [target])
-        signals = context.with_resource(news())  # up to the end: a complete output stays, whatever comes
+        pipe = context.with_resource(signal_pipe())  # up to the end: a complete output stays, whatever comes
         with Store(target, metadata_of(case), overwrite) as store:
-            histories = solved(case, store, signals, deck.stem, messages)
+            histories = solved(case, store, pipe, deck.stem, messages)
         picture = overview(store.path) if plot else None
     return messages.conclude(case, histories, target, picture)
 
@@ -75,12 +75,12 @@ def resume(
 
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))
-    signals = context.with_resource(news())
+    pipe = context.with_resource(signal_pipe())
     with messages.logging(file), restart.reopened(file, overrides=overrides) as again:
         if again is not None:
             if again.warning:
                 complain(f"warning: {again.warning}")
-            histories = solved(again.case, again.store, signals, file.stem, messages, again.before)
+            histories = solved(again.case, again.store, pipe, file.stem, messages, again.before)
     path = again.store.path if again is not None else file
     picture = overview(path) if plot else None
     if again is None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import DeckError
-from ..solve.interruption import Interrupted, in_background, news
+from ..solve.interruption import Interrupted, in_background, signal_pipe
 from .guard import Content, Failure, command, complain, say
 from .options import AsJson, Level, LogFile, Quiet
 
@@ -161,7 +161,7 @@ def _run_case(study: Study, number: int, retry: bool, messages: Messages, contex
     try:
         in_background(
             lambda: outcomes.append(study.run_case(number, retry, shown)),
-            context.with_resource(news()),
+            context.with_resource(signal_pipe()),
             lambda _: not outcomes,
         )
     except Interrupted as signaled:
@@ -189,7 +189,7 @@ def _run_missing(study: Study, context: typer.Context, **options: Any) -> None:
         return not complete.is_set()
 
     try:
-        in_background(work, context.with_resource(news()), ends)
+        in_background(work, context.with_resource(signal_pipe()), ends)
     except Interrupted as signaled:
         kept = f"{_State.of(study).done} of {len(study)} cases are finished and kept"
         message = f"interrupted; {kept} in {study.folder.folder}/; the same command runs the rest"

@@ -80,7 +80,7 @@ class Summary:
     @classmethod
     def of_run(cls, case: Problem, histories: Sequence[History], refined: Result | None) -> Summary:
         """Summarize a run; of a refined lattice the finest one, with errors, is in its file."""
-        from ..solve.run import parameters_of
+        from ..problem.overview import parameters_of
 
         found = histories_of(refined) if refined is not None else histories
         return cls(case.title, found, parameters_of(case), case, refined)

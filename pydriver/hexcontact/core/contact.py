@@ -195,13 +195,13 @@ class FlexibilityOperator:
     def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
         self.lattice = lattice
         extent = [lattice.n_col, lattice.n_row]
-        kernel_cache.ready()
+        kernel_cache.take_settings()
         self._handle, code, message = _api.create_operator(
             method_code(method), lattice.basis.T, extent, pair.as_array(), thread_count(threads)
         )
         raise_for(code, message)
         weakref.finalize(self, _api.free_handle, self._handle)
-        kernel_cache.told()
+        kernel_cache.warn_of_faults()
 
     def apply(
         self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
@@ -306,7 +306,7 @@ class NormalContact:
         gap = np.where(mask, given, 0.0)
         self._mask = mask
         self._outside = given[~mask]
-        kernel_cache.ready()
+        kernel_cache.take_settings()
         self._handle, code, message = _api.create_normal_contact(
             method_code(method),
             lattice.basis.T,
@@ -319,7 +319,7 @@ class NormalContact:
         )
         raise_for(code, message)
         weakref.finalize(self, _api.free_handle, self._handle)
-        kernel_cache.told()
+        kernel_cache.warn_of_faults()
 
     def solve(
         self,
@@ -368,7 +368,7 @@ class NormalContact:
             self.lattice.size,
         )
         pressure, gap, zone, load, delta, residuals, sweeps, work, flags, code, message = out
-        kernel_cache.told()
+        kernel_cache.warn_of_faults()
         raise_for(code, message)
         shape = self.lattice.shape
         gap = gap.reshape(shape)

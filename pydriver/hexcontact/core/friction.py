@@ -162,7 +162,7 @@ class FrictionalContact:
         # nodes that can never touch may have any gap, also none at all
         self._mask = mask
         self._gap = shaped(initial_gap, lattice, "initial_gap")
-        kernel_cache.ready()
+        kernel_cache.take_settings()
         self._handle, code, message = _api.create_frictional_contact(
             method_code(method),
             lattice.basis.T,
@@ -178,7 +178,7 @@ class FrictionalContact:
         )
         raise_for(code, message)
         weakref.finalize(self, _api_free, self._handle)
-        kernel_cache.told()
+        kernel_cache.warn_of_faults()
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
@@ -260,7 +260,7 @@ class FrictionalContact:
             numbers,
         )
         new_fields, zone, new_numbers, residuals, sweeps, cuts, work, flags, code, message = out
-        kernel_cache.told()
+        kernel_cache.warn_of_faults()
         raise_for(code, message)
         shape = self.lattice.shape
         arrays: dict[str, Any] = {

@@ -68,9 +68,9 @@ class Statistics(NamedTuple):
 
 
 class _Settings:
-    """What this process was told; the environment speaks first."""
+    """Settings of this process: those of the environment, then those of `configure`."""
 
-    bound: int | None = None  # bytes in memory; None: nothing was said yet
+    bound: int | None = None  # bytes in memory; None: not set yet
     folder: Path | None = None
     folder_size = 0
     shared = False  # the folder, with other users
@@ -119,7 +119,7 @@ def configure(
     """
     bound = None if memory is None else _bytes(memory, "memory")
     size = None if folder_size is None else _bytes(folder_size, "folder_size")
-    ready()
+    take_settings()
     if bound is not None:
         _settings.bound = bound
         _cache.limit_kernels(bound)
@@ -137,7 +137,7 @@ def configure(
 
 def clear() -> None:
     """Drop the spectra that are kept in memory; those that a problem uses stay until it is gone."""
-    ready()
+    take_settings()
     _cache.limit_kernels(0)
     _cache.limit_kernels(_settings.bound)
 
@@ -154,13 +154,13 @@ def statistics() -> Statistics:
     return Statistics(*(int(n) for n in _cache.kernel_statistics()))
 
 
-def leave(spare: int) -> None:
-    """Let the cache grow by so many bytes at most, or shrink, until this is said again; its bound stays."""
-    ready()
+def limit_growth(spare: int) -> None:
+    """Let the cache grow by at most `spare` bytes, or shrink, until the next call; its bound stays."""
+    take_settings()
     _cache.limit_kernels(max(0, min(_settings.bound or 0, statistics().memory + spare)))
 
 
-def ready() -> None:
+def take_settings() -> None:
     """Take the settings from the environment, once; give a forked process names of its own."""
     if _settings.bound is None:
         given = {name: os.environ.get(name, "").strip() for name in (MEMORY, FOLDER, FOLDER_SIZE, SHARED)}
@@ -175,8 +175,8 @@ def ready() -> None:
         _open_folder()
 
 
-def told() -> None:
-    """Warn of what was wrong with the folder since this was last called."""
+def warn_of_faults() -> None:
+    """Warn of faults of the folder since the last call."""
     if _settings.folder is None:
         return
     for line in _cache.kernel_complaint().decode(errors="replace").strip().splitlines():

@@ -67,7 +67,9 @@ def require(needed: int, what: str, advice: str) -> None:
     from . import kernel_cache
 
     there = available()
-    kernel_cache.leave(there - needed)  # what is kept for other cases must not be in the way of this one
+    kernel_cache.limit_growth(
+        there - needed
+    )  # what is kept for other cases must not be in the way of this one
     if needed > there:
         there = available()
     if needed > there:

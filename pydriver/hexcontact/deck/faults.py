@@ -47,12 +47,15 @@ class Source:
         Dotted keys whose values did not come from the text.
     included : tuple of (str, str)
         Names and texts of the files that the deck includes, the one that counts most first.
+    of_override : str
+        What stands before the keys of overrides.
     """
 
     name: str = ""
     text: str = ""
     overrides: frozenset[str] = field(default_factory=frozenset)
     included: tuple[tuple[str, str], ...] = ()
+    of_override: str = "override: "
 
     def found(self, key: str) -> tuple[str, Place | None]:
         """Return the file that a dotted key stands in, and where in it; no file for overrides and cases."""
@@ -63,7 +66,7 @@ class Source:
     def locate(self, key: str) -> str:
         """Return "file:line:column: ", "override: " or "" for a dotted key."""
         if self._overridden(key):
-            return "override: "
+            return self.of_override
         if not self.name:
             return ""
         name, place = self._place(key)
@@ -87,6 +90,10 @@ class Source:
     @cached_property
     def _places(self) -> list[tuple[str, dict[tuple[str, ...], Place]]]:
         return [(name, places(text)) for name, text in ((self.name, self.text), *self.included)]
+
+
+NOWHERE = Source()
+"""The source of what was made in Python."""
 
 
 def deck_error(problems: Iterable[Mistake], source: Source) -> DeckError:

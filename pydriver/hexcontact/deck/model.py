@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from ..text import did_you_mean, listed
-from .faults import MISSING, Mistake, Source, deck_error
+from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .kinds import Kind, Schema
 
 
@@ -145,7 +145,7 @@ class Argument(Table):
         try:
             super().__init__(**keys)
         except ValidationError as error:
-            raise deck_error(problems_of(error), Source()) from error
+            raise deck_error(problems_of(error), NOWHERE) from error
 
 
 def _written(value: Any, defaults: bool) -> Any:

@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from ..errors import DeckError
 from ..files import LARGEST_TEXT
 from ..text import listed, visible
-from .faults import MISSING, Mistake, Source
-from .series import Columns, read_series
+from .faults import MISSING, NOWHERE, Mistake, Source
+from .series import Series, read_series
 from .toml import read_toml, refuse_deep, with_overrides
 
 MOST_INCLUDED = 100  # files; one that several others include counts each time
@@ -56,9 +58,9 @@ class Assembled:
 
 def assemble(
     data: Mapping[str, Any],
-    text: str | None,
-    source: Source,
-    folder: Path,
+    text: str | None = None,
+    source: Source = NOWHERE,
+    folder: Path = Path(),
     overrides: Mapping[str, Any] | None = None,
 ) -> Assembled:
     """Merge what a deck includes, replace single keys, and read its series of loads.
@@ -67,8 +69,8 @@ def assemble(
     ----------
     data : mapping
         The deck as dictionaries.
-    text : str or None
-        The deck as text, if there is one.
+    text : str, optional
+        The deck as text.
     source : Source
         Where it came from.
     folder : Path
@@ -157,30 +159,20 @@ def _series_with_files(data: Mapping[str, Any]) -> Iterator[Any]:
 
 def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
     """Put the rows in the place of the names of files, and yield what is wrong with them."""
-    known = {"file", "columns"}
     if sum(1 for _ in _series_with_files(data)) > MOST_SERIES:
         raise DeckError(f"load: expected at most {MOST_SERIES} files of series")
     for number, load in enumerate(data["load"] if isinstance(data.get("load"), list) else ()):
         series = next(_series_with_files({"load": [load]}), None)
         if series is None:
             continue
-        given = {key: value for key, value in series.items() if value is not None}
-        columns = given.get("columns")
-        if isinstance(columns, dict):
-            columns = {key: header for key, header in columns.items() if header is not None}
-        if not set(given) <= known or not (columns is None or _are_columns(columns)):
-            continue  # what is wrong there is found when the tables are checked
         try:
-            load["series"] = read_series(folder / series["file"], columns)
+            asked = Series.model_validate(series)
+        except ValidationError:
+            continue  # what is wrong there is found when the tables are checked
+        columns = asked.columns and asked.columns.written()
+        try:
+            load["series"] = read_series(folder / asked.file, columns)
         except DeckError as error:
             key = ("load", number, "series", "file")
             for sentence in str(error).splitlines():
                 yield Mistake(key, MISSING, sentence)
-
-
-def _are_columns(columns: Any) -> bool:
-    return (
-        isinstance(columns, dict)
-        and set(columns) <= set(Columns.model_fields)
-        and all(isinstance(header, str) for header in columns.values())
-    )

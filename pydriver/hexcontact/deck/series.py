@@ -18,17 +18,10 @@ from pydantic_core import PydanticCustomError
 from ..errors import DeckError
 from ..files import require_ordinary, text_of
 from ..text import did_you_mean, listed, shown
+from ..variables import LOADS as LOADS  # the two keys that drive each rigid motion
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
 from .model import Table, extended, meaning
 from .units import ANGLE, FORCE, LENGTH, TORQUE
-
-LOADS = {
-    "z": ("normal_load", "approach"),
-    "x": ("tangential_load_x", "shift_x"),
-    "y": ("tangential_load_y", "shift_y"),
-    "twist": ("torque", "twist"),
-}
-"""The two keys that drive each rigid motion: by force, by displacement."""
 
 
 class Driven(NamedTuple):
@@ -54,31 +47,37 @@ class Driven(NamedTuple):
     example: str = ""
 
 
-_FORCES, _LENGTHS, _UM = '["1 N", "2 N"]', '["1 um", "2 um"]', '"1 um"'
-_TORQUES, _ANGLES = '["1 N mm", "2 N mm"]', '["0 deg", "1 deg"]'
-_LOAD, _SHIFT = "tangential load on body 1 along", "tangential motion of body 2, instead of tangential_load"
-_FIRST_ROWS = "normal load of each row, instead of a file; so are the other arrays"
-_APPROACH = "approach of the bodies, instead of normal_load"
+_FORCES, _LENGTHS = '["1 N", "2 N"]', '["1 um", "2 um"]'
+_ROWS = "normal load of each row, instead of a file; so are the other arrays"
 _TORQUE = "moment about z through x = y = 0; frees the twist"
+_APPROACH = "approach of the bodies, instead of normal_load"
+_TWIST = "rotation about z, instead of torque"
+
+
+def _tangential(axis: str) -> Driven:
+    meant = f"tangential load on body 1 along {axis}", f"tangential load along {axis} of each row"
+    return Driven(Quantity(FORCE), *meant, f'"Q{axis} [N]"', _FORCES)
+
+
+def _shift(axis: str) -> Driven:
+    meant = (
+        f"tangential motion of body 2, instead of tangential_load_{axis}",
+        f"shift along {axis} of each row",
+    )
+    return Driven(Quantity(LENGTH), *meant, f'"u{axis} [um]"', _LENGTHS, '"1 um"')
+
+
 DRIVEN: dict[str, Driven] = {
-    "normal_load": Driven(Quantity(FORCE, at_least=0), "normal load P", _FIRST_ROWS, '"P [N]"', _FORCES),
-    "tangential_load_x": Driven(
-        Quantity(FORCE), f"{_LOAD} x", "tangential load along x of each row", '"Qx [N]"', _FORCES
+    "normal_load": Driven(Quantity(FORCE, at_least=0), "normal load P", _ROWS, '"P [N]"', _FORCES),
+    "tangential_load_x": _tangential("x"),
+    "tangential_load_y": _tangential("y"),
+    "torque": Driven(Quantity(TORQUE), _TORQUE, "torque of each row", '"M [N mm]"', '["1 N mm", "2 N mm"]'),
+    "approach": Driven(
+        Quantity(LENGTH), _APPROACH, "approach of each row", '"depth [um]"', _LENGTHS, '"1 um"'
     ),
-    "tangential_load_y": Driven(
-        Quantity(FORCE), f"{_LOAD} y", "tangential load along y of each row", '"Qy [N]"', _FORCES
-    ),
-    "torque": Driven(Quantity(TORQUE), _TORQUE, "torque of each row", '"M [N mm]"', _TORQUES),
-    "approach": Driven(Quantity(LENGTH), _APPROACH, "approach of each row", '"depth [um]"', _LENGTHS, _UM),
-    "shift_x": Driven(
-        Quantity(LENGTH), f"{_SHIFT}_x", "shift along x of each row", '"ux [um]"', _LENGTHS, _UM
-    ),
-    "shift_y": Driven(
-        Quantity(LENGTH), f"{_SHIFT}_y", "shift along y of each row", '"uy [um]"', _LENGTHS, _UM
-    ),
-    "twist": Driven(
-        Quantity(ANGLE), "rotation about z, instead of torque", "twist of each row", '"angle [deg]"', _ANGLES
-    ),
+    "shift_x": _shift("x"),
+    "shift_y": _shift("y"),
+    "twist": Driven(Quantity(ANGLE), _TWIST, "twist of each row", '"angle [deg]"', '["0 deg", "1 deg"]'),
 }
 """All of them, by the key."""
 
@@ -314,8 +313,7 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
                 problems.append(f"{path}: unknown column {shown(column.header)}{hint}")
     else:
         for key, header in columns.items():
-            match = _UNIT_IN_HEADER.fullmatch(str(header))
-            name, unit = _split(match) if match else (str(header), "")
+            name, unit = _split(str(header))
             if name not in headers:
                 there = [*map(shown, headers[:_MOST_COMPLAINTS])] + ["others"] * (
                     len(headers) > _MOST_COMPLAINTS
@@ -338,8 +336,10 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
     return chosen
 
 
-def _split(match: re.Match[str]) -> tuple[str, str]:
-    return match["name"], (match["square"] or match["round"] or "").strip()
+def _split(header: str) -> tuple[str, str]:
+    """Return a header without its unit, and the unit."""
+    match = _UNIT_IN_HEADER.fullmatch(header)
+    return (match["name"], (match["square"] or match["round"] or "").strip()) if match else (header, "")
 
 
 def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
@@ -367,9 +367,7 @@ def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
         raise DeckError("\n".join(problems[:_MOST_COMPLAINTS]))
     columns = []
     for place, header in enumerate(rows[0]):
-        match = _UNIT_IN_HEADER.fullmatch(header)
-        name, unit = _split(match) if match else (header, "")
-        columns.append(_Column(name, unit, [row[place] for row in rows[1:]]))
+        columns.append(_Column(*_split(header), [row[place] for row in rows[1:]]))
     return columns, [number for number, _ in lines[1:]]
 
 

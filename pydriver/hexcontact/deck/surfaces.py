@@ -27,7 +27,7 @@ from .model import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
 Array = NDArray[np.float64]
-S = TypeVar("S", bound="Surface")
+_S = TypeVar("_S", bound="Surface")
 PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
 LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
 Angle = Annotated[float, Quantity(ANGLE)]
@@ -105,11 +105,11 @@ SHAPES: dict[str, type[Surface]] = {}
 """The shapes, by the word of a deck."""
 
 
-def shape(word: str) -> Callable[[type[S]], type[S]]:
+def shape(word: str) -> Callable[[type[_S]], type[_S]]:
     """Let decks call a surface by a word."""
     this: Any = Literal[word]
 
-    def known(surface: type[S]) -> type[S]:
+    def known(surface: type[_S]) -> type[_S]:
         surface.model_fields["shape"] = FieldInfo.from_annotated_attribute(this, word)
         surface.model_rebuild(force=True)
         SHAPES[word] = surface

@@ -327,11 +327,9 @@ class Deck(Table):
             Everything that is wrong with the tables one by one.
         """
         try:
-            deck = cls.model_validate(data)
+            return dict(cls.model_validate(data)), []
         except ValidationError as error:
             problems = problems_of(error)
-        else:
-            return {name: getattr(deck, name) for name in cls.model_fields}, []
         faulty = {problem.key[0] for problem in problems if problem.key}
         tables = {}
         for name, info in cls.model_fields.items():

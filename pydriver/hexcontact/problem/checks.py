@@ -9,8 +9,7 @@ from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
 from ..deck.tables import Deck, Friction, Output, Solver
 from ..errors import DeckError
-from ..variables import FIELDS
-from ..variables import FRICTIONLESS_FIELDS as FRICTIONLESS_FIELDS
+from ..variables import FIELDS, FRICTIONLESS_FIELDS
 from .loads import LoadStep, load_steps
 
 

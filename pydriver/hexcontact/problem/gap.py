@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[np.float64]
+GivenGap = Callable[[Array, Array], ArrayLike] | Array
+"""A function of x and y, or values over the nodes of a window."""
 
 
-def given_gap(gap: Any, lattice: Lattice | None) -> Callable[[Array, Array], ArrayLike] | Array | None:
+def given_gap(gap: Any, lattice: Lattice | None) -> GivenGap | None:
     """Return a gap as a function of x and y, or as an array over the nodes of the lattice.
 
     Raises
@@ -64,7 +66,7 @@ class Gap:
         Two surfaces; a function of x and y; or values over the nodes of a window.
     """
 
-    source: Callable[[Array, Array], ArrayLike] | Array
+    source: GivenGap
 
     @property
     def at_nodes(self) -> bool:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..core import contact as native
 from ..core import friction as native_friction
@@ -22,14 +22,13 @@ from ..deck.faults import MISSING, Mistake, Source, deck_error
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
 from ..deck.surfaces import Separation
-from ..deck.tables import Accuracy, Body, Deck, Grid, Output, Solver
+from ..deck.tables import Accuracy, Grid
 from ..deck.write import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
 from . import window
 from .checks import checked
-from .gap import Gap
-from .loads import LoadStep
+from .gap import Gap, GivenGap
 from .window import Estimate, NoContactFound
 
 Array = NDArray[np.float64]
@@ -52,13 +51,13 @@ class Problem:
         Their compliances.
     friction_coefficient : float
         Coefficient of friction.
-    solver : SolverSettings
-        How it is solved.
-    accuracy : AccuracySettings or None
+    solver : Solver
+        How it is solved: the table of the deck, with the algorithm that follows from it.
+    accuracy : Accuracy or None
         How accurate the result is to be; None: the lattice is not refined.
     load_steps : tuple of LoadStep
         The history; a segment in adaptive steps is one of them.
-    output : OutputSettings
+    output : Output
         What is kept.
     deck : Deck
         The deck, checked and in SI.
@@ -71,19 +70,7 @@ class Problem:
         grows.
     """
 
-    title: str
-    body_1: Body
-    body_2: Body
-    pair: ElasticPair
-    friction_coefficient: float
-    solver: Solver
-    accuracy: Accuracy | None
-    load_steps: tuple[LoadStep, ...]
-    output: Output
-    deck: Deck
     deck_file: Path | None = None
-    lattice: Lattice
-    window_fixed: bool
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Self:
@@ -103,14 +90,16 @@ class Problem:
             If it cannot be read, or with a sentence for each thing that is wrong with it.
         """
         data, text = toml.read_toml(path)
-        case = cls._made(data, text, Source(str(path), text), Path(path).parent, overrides)
+        source = Source(str(path), text)
+        case = cls._made(assemble(data, text, source, Path(path).parent, overrides))
         case.deck_file = Path(path).absolute()
         return case
 
     @classmethod
     def from_text(cls, text: str, name: str = "deck", overrides: Mapping[str, Any] | None = None) -> Self:
         """Read a deck from its text (as a result file keeps it); `name` is what messages call it."""
-        return cls._made(toml.parse_toml(text, name), text, Source(name, text), overrides=overrides)
+        data = toml.parse_toml(text, name)
+        return cls._made(assemble(data, text, Source(name, text), Path(), overrides))
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -118,27 +107,15 @@ class Problem:
         if not isinstance(data, Mapping):
             raise DeckError("a deck: expected tables of keys")
         toml.refuse_deep(data, "")
-        return cls._made(plain(data), None, Source())
+        return cls._made(assemble(plain(data)))
 
     @classmethod
-    def _made(
-        cls,
-        data: Mapping[str, Any],
-        text: str | None,
-        source: Source,
-        folder: Path = Path(),
-        overrides: Mapping[str, Any] | None = None,
-    ) -> Self:
+    def _made(cls, given: Assembled, gap: GivenGap | None = None, lattice: Lattice | None = None) -> Self:
         case = cls.__new__(cls)
-        case._set_up(assemble(data, text, source, folder, overrides), None, None)
+        case._set_up(given, gap, lattice)
         return case
 
-    def _set_up(
-        self,
-        given: Assembled,
-        gap: Callable[[Array, Array], ArrayLike] | Array | None,
-        lattice: Lattice | None,
-    ) -> None:
+    def _set_up(self, given: Assembled, gap: GivenGap | None, lattice: Lattice | None) -> None:
         self._given = given
         self.deck, self.solver, self.load_steps = checked(given, gap is not None)
         deck = self.deck
@@ -309,10 +286,9 @@ class Problem:
             With a sentence for each thing that is wrong then.
         """
         folder = self.deck_file.parent if self.deck_file else Path()
-        case = type(self).__new__(type(self))
         lattice = self.lattice if self._gap.at_nodes else None
-        given = assemble(plain(self._given.data), None, Source(), folder, changes)
-        case._set_up(given, self._gap.source if self._gap.given else None, lattice)
+        given = assemble(plain(self._given.data), folder=folder, overrides=changes)
+        case = self._made(given, self._gap.source if self._gap.given else None, lattice)
         if lattice is not None and case.deck.grid != self.deck.grid:
             changed = listed([key for key in changes if key.partition(".")[0] == "grid"], "and")
             raise DeckError(

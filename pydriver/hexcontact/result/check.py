@@ -126,7 +126,7 @@ def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
 
 
 def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
-    """Tell of steps, rows and columns that are not numbered one by one."""
+    """Return a fault of steps, rows and columns: they are numbered one by one."""
     if dataset["step"].values[0] != 1:
         return "its steps do not begin with 1"
     for name in ("step", "row", "col"):
@@ -140,7 +140,7 @@ def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
 
 
 def _fault_of_histories(dataset: xarray.Dataset) -> str:
-    """Tell of numbers that no load step has."""
+    """Return a fault of the numbers by step; empty if there is none."""
     known = [name for name in history_of(dataset) if name in VARIABLES and VARIABLES[name].dtype != "str"]
     history = {name: dataset[name].values for name in known}
     for name in known:
@@ -150,7 +150,7 @@ def _fault_of_histories(dataset: xarray.Dataset) -> str:
 
 
 def _fault_of_numbers(history: Mapping[str, Any], parameters: Mapping[Any, Any], story: str) -> str:
-    """Tell of values by step that no step has; a run that was resumed may have had several tolerances."""
+    """Return a fault of values by step; a run that was resumed may have had several tolerances."""
     tolerances = [parameters.get("tolerance", 1.0), *map(float, chain(*_CHANGED.findall(story)))]
     cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
     for name, values in history.items():
@@ -182,7 +182,7 @@ def fault_of_fields(dataset: xarray.Dataset) -> str:
 def _fault_of_values(
     fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], spacing: float, kept: bool = True
 ) -> str:
-    """Tell of values at nodes that no load step has, or that do not fit to its history."""
+    """Return a fault of values at nodes: they are those of a load step, and fit to its history."""
     zone, pressure = fields.get("zone"), fields.get("pressure")
     contact = zone > 0 if zone is not None else pressure > 0 if pressure is not None else None
     for name, values in fields.items():

@@ -40,15 +40,15 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
     DeckError
         If there is no such step, or nothing was kept of it.
     """
-    asked = [int(step) for step in result.dataset["step"].values]
+    wanted = [int(step) for step in result.dataset["step"].values]
     if numbers is not None:
         try:
-            asked = [int(result.step(number)["step"]) for number in numbers]
+            wanted = [int(result.step(number)["step"]) for number in numbers]
         except IndexError as error:
             raise DeckError(f"--step: {error}") from error
-    kept = [number for number in asked if any(is_kept(field) for _, field in _fields(result, number))]
-    if not kept or (numbers is not None and len(kept) < len(asked)):
-        lost = sorted(set(asked) - set(kept))
+    kept = [number for number in wanted if any(is_kept(field) for _, field in _fields(result, number))]
+    if not kept or (numbers is not None and len(kept) < len(wanted)):
+        lost = sorted(set(wanted) - set(kept))
         where = f"step {lost[0]}" if numbers is not None else "any step"
         raise DeckError(f"the fields of {where} were not kept (output.fields, output.every)")
     return kept
@@ -238,7 +238,7 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
 
 
 def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | None = None) -> list[Path]:
-    """Write the history as a table, and of the steps that are asked for the fields, a line for each node.
+    """Write the history as a table, and of the chosen steps the fields, a line for each node.
 
     Parameters
     ----------

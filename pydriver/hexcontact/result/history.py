@@ -172,13 +172,13 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
         if history.get("cuts") and (static or not before.get("contact_area"))
     ]
     in_parts = [k for k in cold if histories[k - 1]["residual_tangential"] > tolerance]
-    said = [
+    sentences = [
         unasked_path(in_parts, in_parts=True),
         unasked_path([k for k in cold if k not in in_parts], in_parts=False),
         halved_steps(histories, tolerance),
         limited_steps(histories, float(parameters.get("step_tolerance", 0.0))),
     ]
-    return [sentence for sentence in said if sentence]
+    return [sentence for sentence in sentences if sentence]
 
 
 def unasked_path(numbers: Sequence[int], in_parts: bool) -> str:

@@ -33,8 +33,10 @@ _MARGIN = 0.15  # of a section on both sides, in widths of the contact
 _SAME = 1e-9  # spacings between corners that are one
 
 
-def linear(values: Array, basis: Array, start: tuple[float, float], x: ArrayLike, y: ArrayLike) -> Array:
-    """Interpolate values at the nodes of a lattice linearly on its triangles; 0 outside the window.
+def linear(
+    values: Array, basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float = 0.0
+) -> Array:
+    """Interpolate values at the nodes of a lattice linearly on its triangles.
 
     Parameters
     ----------
@@ -46,6 +48,8 @@ def linear(values: Array, basis: Array, start: tuple[float, float], x: ArrayLike
         Position of node [0, 0], m.
     x, y : array_like
         Points, m.
+    outside : float
+        Value at nodes outside the window.
 
     Returns
     -------
@@ -57,7 +61,7 @@ def linear(values: Array, basis: Array, start: tuple[float, float], x: ArrayLike
     col, row = np.round(col, 9), np.round(row, 9)  # a node is a node
     i, j = np.floor(col).astype(int), np.floor(row).astype(int)
     u, v = col - i, row - j
-    padded = np.pad(values, 1)
+    padded = np.pad(np.asarray(values, dtype=float), 1, constant_values=outside)
     n_row, n_col = padded.shape
     lower = u + v <= 1
     total = np.zeros(u.shape)
@@ -72,20 +76,18 @@ def linear(values: Array, basis: Array, start: tuple[float, float], x: ArrayLike
     return total.reshape(np.shape(x))
 
 
-def nearest_nodes(
-    shape: tuple[int, int], basis: Array, start: Point, x: Array, y: Array
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
-    """Return row and column of the node next to each point, and whether the window of this shape has it.
-
-    Without such a node they are those of one at the rim. The other arguments are those of `linear`.
-    """
-    away = np.stack([x - start[0], y - start[1]], axis=-1)
-    corner = np.floor(away @ np.linalg.inv(basis)).astype(np.intp)
-    corners = corner + np.array([(0, 0), (1, 0), (0, 1), (1, 1)]).reshape(4, *(1,) * x.ndim, 2)
+def nearest(
+    values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
+) -> Array:
+    """Return the values at the nodes next to some points; parameters as of `linear`."""
+    away = np.stack([np.subtract(x, start[0]), np.subtract(y, start[1])], axis=-1)
+    corner = np.floor(away @ np.linalg.inv(basis))
+    corners = np.stack([corner + of_cell for of_cell in ((0, 0), (1, 0), (0, 1), (1, 1))])
     distance = np.linalg.norm(corners @ basis - away, axis=-1)
     chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0]
-    node = np.clip(chosen, 0, np.array(shape)[::-1] - 1)
-    return node[..., 1], node[..., 0], (node == chosen).all(axis=-1)
+    col, row = np.moveaxis(np.clip(chosen, 0, np.array(values.shape)[::-1] - 1).astype(int), -1, 0)
+    inside = (chosen == np.stack([col, row], axis=-1)).all(axis=-1)
+    return np.where(inside, values[row, col], outside).astype(float)
 
 
 def first_node(lattice: Lattice) -> Point:
@@ -115,16 +117,9 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
         Values at the points. Outside the window tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-    start = first_node(lattice)
     variable = VARIABLES[name]
-    if variable.flags:
-        row, col, inside = nearest_nodes(lattice.shape, lattice.basis, start, x, y)
-        return np.where(inside, values[row, col], variable.padding).astype(float)
-    found = linear(np.asarray(values, dtype=float), lattice.basis, start, x, y)
-    if math.isnan(variable.padding):
-        share = linear(np.ones(lattice.shape), lattice.basis, start, x, y)  # 1 inside the window
-        found = np.where(share > 1.0 - _SAME, found, np.nan)
-    return found
+    between = nearest if variable.flags else linear
+    return between(values, lattice.basis, first_node(lattice), x, y, variable.padding)
 
 
 class PressureField:
@@ -251,12 +246,12 @@ def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point
 
 
 def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
-    """Return those of the fields of a load step that were asked for; all that were kept if none was.
+    """Return the named fields of a load step; without names, all that the output has of it.
 
     Parameters
     ----------
     names : sequence of str
-        What was asked for.
+        Names of fields.
     fields : mapping of str to array_like
         The fields that there are.
     step : int

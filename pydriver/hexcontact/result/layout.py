@@ -50,7 +50,7 @@ class Metadata:
     fields : tuple of str
         Fields the output keeps; empty: all that there are.
     every : int
-        The output keeps the fields of every so manieth step, and of the last one.
+        The output keeps the fields of each step whose number is a multiple of this, and of the last one.
     planned_steps : int
         Load steps the whole run has; 0 while adaptive steps leave it open.
     parameters : mapping of str to number or text

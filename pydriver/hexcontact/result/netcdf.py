@@ -180,7 +180,7 @@ def _attributes(file: netCDF4.Dataset) -> dict[str, Any]:
 
 
 def read_output(path: Path) -> Result:
-    """Open an output file; its fields are read when they are asked for.
+    """Open an output file; its fields are read when they are first used.
 
     All bytes are checked first. In a file without a checksum, of an earlier version or rewritten by another
     program, the fields are read once to see that they can be values of a solution.

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .interpolate import nearest_nodes
+from .interpolate import nearest
 from .view import StepView
 
 Array = NDArray[np.float64]
@@ -53,7 +53,10 @@ class Plane:
 
     def nearest(self, view: StepView) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
         """Return row and column of the node next to each pixel, and whether the window has it."""
-        return nearest_nodes(view.lattice.shape, view.basis, view.start, *self.points)
+        numbers = np.arange(view.lattice.size).reshape(view.lattice.shape)
+        node = nearest(numbers, view.basis, view.start, *self.points, outside=-1).astype(np.intp)
+        row, col = np.divmod(np.maximum(node, 0), view.lattice.n_col)
+        return row, col, node >= 0
 
 
 def png_of(gray: NDArray[np.uint8]) -> str:

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..text import did_you_mean, html_table, text_table
 from ..variables import FIELDS, VARIABLES, Variable
-from . import html
 from .interpolate import (
     Line,
     Point,
@@ -161,7 +160,7 @@ class Result:
 
     @property
     def shortfall(self) -> str:
-        """Why the accuracy that was asked for is not reached; empty if it is, or none was asked for."""
+        """Why the accuracy that the deck demands is not reached; empty if it is, or none is demanded."""
         return str(self.dataset.attrs.get("accuracy_shortfall", ""))
 
     @property
@@ -325,7 +324,7 @@ class Result:
         """Return the values at the nodes of some fields of a step, or of all."""
         data = self.step(step)
         known = [str(n) for n, values in data.data_vars.items() if values.dims == ("row", "col")]
-        # xarray reads from the file what is asked for only
+        # xarray reads from the file only what is used
         return chosen_fields(names, {name: cast(Any, data[name]) for name in known}, int(data["step"]))
 
     # --- tables ---------------------------------------------------------------------------------------------
@@ -413,6 +412,8 @@ class Result:
 
     def __repr__(self) -> str:
         """Say in a few lines what is there."""
+        from . import html  # with pictures
+
         fields = [name for name in FIELDS if name in self.dataset]
         table = text_table(("", ""), html.result_rows(self.dataset))
         header = html.result_header(self.dataset, self.path)
@@ -420,4 +421,6 @@ class Result:
         return "\n  ".join([*lines, *([self.stopped] if self.stopped else [])])
 
     def _repr_html_(self) -> str:
+        from . import html
+
         return html.result_html(self.dataset, self.path, self.quantities._repr_html_())

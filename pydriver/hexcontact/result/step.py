@@ -1,4 +1,4 @@
-"""A finished load step: what a run has in hand between one step and the next."""
+"""A finished load step: the state of a run between one step and the next."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     Returns
     -------
     Result
-        Fields of a finished run are read from the file when they are asked for.
+        Fields of a finished run are read from the file when they are first used.
 
     Raises
     ------
@@ -283,7 +283,7 @@ class Store:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        """Close it; an error on its way out is written down, and told what is kept."""
+        """Close it; the reason of an error is kept, and the error names the finished steps."""
         known = isinstance(error, HexcontactError | KeyboardInterrupt)
         self.close((str(error) or "interrupted") if known else "")
         if isinstance(error, HexcontactError) and self.kept:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..analytic.hertz_gap import QuadraticGap, friction_of, pressure_is_frictionless
 from ..text import scaled as scaled
 from ..text import visible, worded
-from ..variables import LARGEST, spelled
+from ..variables import LARGEST, VARIABLES, spelled
 from .interpolate import PressureField, first_node, is_kept, linear
 from .layout import lattice_of, step_of
 
@@ -184,14 +184,15 @@ def _loads(one: xarray.Dataset) -> str:
     normal = float(one["normal_load"])
     carried = min(float(one.attrs.get("friction_coefficient", 1.0)), 1.0) * normal
     named = [f"$P$ = {worded(normal, 'N')}"]
-    for sign, name, unit, least in (
-        ("Q_x", "tangential_load_x", "N", 1e-3 * carried),
-        ("Q_y", "tangential_load_y", "N", 1e-3 * carried),
-        ("M_z", "torque", "N m", 5e-3 * carried * float(one.get("contact_radius", 1.0))),
-    ):
+    least = {
+        "tangential_load_x": 1e-3 * carried,
+        "tangential_load_y": 1e-3 * carried,
+        "torque": 5e-3 * carried * float(one.get("contact_radius", 1.0)),
+    }
+    for name, share in least.items():
         value = float(one.get(name, 0.0))
-        if abs(value) > least:
-            named.append(f"${sign}$ = {worded(value, unit)}")
+        if abs(value) > share:
+            named.append(f"${VARIABLES[name].symbol}$ = {worded(value, VARIABLES[name].units)}")
     return ", ".join(named)
 
 

@@ -31,16 +31,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 History = Mapping[str, Any]
 
-RATIO = math.sqrt(2.0)  # of the spacings of a lattice and the next finer one
-LEAST_LEVELS = 3
 LEVELS_FITTED = 4  # the finest ones, with their shifted copies
 ORDERS = (1.0, 1.5, 2.0)
 SAFETY = 1.25  # on the trend
 DEVIATIONS = 2.0  # standard errors of the limit that the fit finds
 _ALIKE = 1.5  # orders whose residual is at most so many times the least one are all possible
-# Origins of the shifted copies, in spacings along both basis vectors: multiples of (1/g, 1/g^2) with
-# g^3 = g + 1, which no row or symmetry of the lattice takes to each other.
-SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794))
 
 JUDGED = ("max_pressure", "contact_area_fit", "stick_area_fit", "approach")
 """Quantities that are to reach the target."""

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..problem.loads import LEAST, LoadStep
-from . import log, nonconvergence
+from . import nonconvergence
 from .step_error import STICK_SAFETY, Change, Memory, change, shear_free
 
 if TYPE_CHECKING:
@@ -313,7 +313,6 @@ class AdaptivePath:
             except _Rim as rim:
                 smaller = self.window.lattice
                 self.window = self.window.grown(rim.solution, self.numbered(target))
-                log.grown(self._number + 1, smaller, self.window.lattice)
                 self._before = self.window.carried(self._before, smaller)
                 self._whole = self.window.carried(self._whole, smaller)
 

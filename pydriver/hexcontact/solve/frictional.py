@@ -8,39 +8,41 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core import contact
 from ..core.edges import ContactEdges, Edge
 from ..core.estimators import area_radius
+from ..core.friction import ContactState, FrictionalContact
 from ..errors import DeckError
 from ..problem.loads import LoadStep
 from ..result.history import RESIDUALS
-from ..result.result import Step
-from .frictionless import Array, Window
+from ..result.step import Step
+from .frictionless import STATE, Array, Window
 
 if TYPE_CHECKING:
-    from ..core.friction import ContactState, FrictionalContact
     from ..core.lattice import Lattice
 
 _SCALARS = (  # of a state, besides the residuals, that have the names of the history
     *("normal_load", "tangential_load_x", "tangential_load_y", "torque"),
     *("approach", "shift_x", "shift_y", "twist", "dissipated_energy", "operator_applications"),
 )
+_PLACES: dict[str, tuple[Any, str]] = {  # of the stick zone
+    "stick_center_x": (np.mean, "x"),
+    "stick_center_y": (np.mean, "y"),
+    "stick_min_x": (np.min, "x"),
+    "stick_max_x": (np.max, "x"),
+    "stick_min_y": (np.min, "y"),
+    "stick_max_y": (np.max, "y"),
+}
 _ROUGHLY = 1e-4  # residual of a solution that only tells how large the contact becomes
 
 
-class FrictionWindow(Window["ContactState"]):
+class FrictionWindow(Window[ContactState]):
     """Contact with friction; a step starts from the state at the end of the step before."""
 
-    state = (
-        *("pressure", "traction_x", "traction_y", "gap", "zone"),
-        *("relative_displacement_x", "relative_displacement_y"),
-        *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
-    )
-    arrays = 34  # the state before, itself and on its way through the core both ways; gaps, coordinates
+    state = STATE[True]
 
-    def _set_up(self, gap: Array) -> None:
-        from ..core.friction import FrictionalContact
-
-        self._contact: FrictionalContact = FrictionalContact(
+    def _solver(self, gap: Array) -> FrictionalContact:
+        return FrictionalContact(
             self.lattice,
             self.case.pair,
             gap,
@@ -50,14 +52,11 @@ class FrictionWindow(Window["ContactState"]):
             method=self.case.method_for(self.lattice),
         )
 
-    def _let_go(self) -> None:
-        del self._contact
-
     def advance(
         self, state: ContactState | None, target: LoadStep, values: tuple[float, ...]
     ) -> ContactState:
         """Go on from a state to new loads and motions."""
-        return self._contact.advance(
+        solution: ContactState = self._contact.advance(
             self._contact.virgin() if state is None else state,
             [motion.control for motion in target.targets],
             values,
@@ -65,6 +64,7 @@ class FrictionWindow(Window["ContactState"]):
             entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
             tolerance=self.case.solver.tolerance,
         )
+        return solution
 
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
         """Return a state on this window; what the new nodes have been through follows from it."""
@@ -75,10 +75,6 @@ class FrictionWindow(Window["ContactState"]):
         return state_of(step)
 
     # --- what a step leaves -------------------------------------------------------------------------------
-
-    def _more_fields(self, solution: ContactState) -> dict[str, NDArray[Any]]:
-        known = ("pressure", "gap", "zone")
-        return {name: getattr(solution, name) for name in self.state if name not in known}
 
     def _more_history(
         self, solution: ContactState, before: ContactState | None, edges: ContactEdges
@@ -105,17 +101,14 @@ class FrictionWindow(Window["ContactState"]):
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        from ..core.contact import NormalContact
-
-        gap, candidate = self.case.initial_gap(self.lattice)
         method = self.case.method_for(self.lattice)
-        contact = NormalContact(self.lattice, self.case.pair, gap, candidate, method)
+        solver = contact.NormalContact(self.lattice, self.case.pair, self.initial_gap, self.candidate, method)
         areas = []
         for control, name in (("force", "normal_load"), ("displacement", "approach")):
             values = [step.z.value for step in self.case.load_steps if step.z.control == control]
             if (value := max(values, default=0.0)) > 0:
                 driven: dict[str, Any] = {name: value}
-                solution = contact.solve(**driven, tolerance=_ROUGHLY)
+                solution = solver.solve(**driven, tolerance=_ROUGHLY)
                 areas.append(self.lattice.cell_area * int((solution.zone > 0).sum()))
         return max([self.lattice.cell_area, *areas])
 
@@ -123,33 +116,25 @@ class FrictionWindow(Window["ContactState"]):
         """Return size and place of the stick zone; NaN for its place where there is none."""
         stick = solution.zone == 1
         edge = self.stick_edge(solution, edges)
-        x, y = self.lattice.x[stick], self.lattice.y[stick]
-        some = x.size > 0
+        place = {
+            name: float(measure(getattr(self.lattice, axis)[stick])) if stick.any() else math.nan
+            for name, (measure, axis) in _PLACES.items()
+        }
         return {
-            "stick_area": self.lattice.cell_area * x.size,
+            "stick_area": self.lattice.cell_area * int(stick.sum()),
             "stick_radius": area_radius(stick, self.lattice.cell_area),
             "stick_area_fit": edge.area,
             "stick_radius_fit": edge.radius,
-            "stick_center_x": float(x.mean()) if some else math.nan,
-            "stick_center_y": float(y.mean()) if some else math.nan,
-            "stick_min_x": float(x.min()) if some else math.nan,
-            "stick_max_x": float(x.max()) if some else math.nan,
-            "stick_min_y": float(y.min()) if some else math.nan,
-            "stick_max_y": float(y.max()) if some else math.nan,
+            **place,
         }
 
-    def _elastic_energy(self, solution: ContactState) -> float:
-        """U = sum A_p (p w + q . (u1 - u2))/2, with u1 - u2 = s + shift + twist x r."""
-        inside = solution.zone > 0
+    def _work(self, solution: ContactState, inside: NDArray[np.bool_]) -> float:
+        """Return the work with that of the shear tractions, u1 - u2 = s + shift + twist x r."""
         x, y = self.lattice.x[inside], self.lattice.y[inside]
         moved_x = solution.relative_displacement_x[inside] + solution.shift_x - solution.twist * y
         moved_y = solution.relative_displacement_y[inside] + solution.shift_y + solution.twist * x
-        work = (
-            solution.pressure[inside] @ self.closing(solution)[inside]
-            + solution.traction_x[inside] @ moved_x
-            + solution.traction_y[inside] @ moved_y
-        )
-        return 0.5 * self.lattice.cell_area * float(work)
+        work = super()._work(solution, inside) + solution.traction_x[inside] @ moved_x
+        return float(work + solution.traction_y[inside] @ moved_y)
 
 
 def state_of(step: Step) -> ContactState:
@@ -165,8 +150,6 @@ def state_of(step: Step) -> ContactState:
     DeckError
         If a field or a value is missing, as in a frictionless run.
     """
-    from ..core.friction import ContactState
-
     needed = {*FrictionWindow.state, *_SCALARS, *RESIDUALS.values(), "sweeps", "cuts"}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(

@@ -1,7 +1,7 @@
-"""A case on one window of its lattice: gap, solver, operators, and what a load step leaves.
+"""A case on one window of its lattice: gap, solver, operators, and the fields and history of a load step.
 
 `Window` is what all algorithms share, `NormalWindow` contact without friction; for contact with friction see
-`hexcontact.window_friction`.
+`hexcontact.solve.frictional`.
 """
 
 from __future__ import annotations
@@ -14,18 +14,19 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import memory
+from ..core import contact, memory
+from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
 from ..core.edges import ContactEdges
 from ..core.estimators import area_radius, pressure_center
 from ..deck.series import LOADS
 from ..errors import DeckError
 from ..problem.loads import MOTIONS
-from ..result.result import Step
+from ..result.step import Step
 from ..text import listed
 from ..variables import FIELDS
+from .events import Listener
 
 if TYPE_CHECKING:
-    from ..core.contact import FlexibilityOperator, NormalContact, NormalSolution
     from ..core.friction import ContactState
     from ..core.lattice import Lattice
     from ..problem.loads import LoadStep
@@ -33,8 +34,20 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+STATE = {  # fields of every step, without and with friction; the next step needs no others
+    False: ("pressure", "gap", "zone"),
+    True: (
+        *("pressure", "traction_x", "traction_y", "gap", "zone"),
+        *("relative_displacement_x", "relative_displacement_y"),
+        *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
+    ),
+}
+# Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap,
+# zones, on their way through the core. With friction: the state before, itself and on its way through the
+# core both ways, gaps, coordinates.
+ARRAYS = {False: 8, True: 34}
 DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"))
-S = TypeVar("S", "NormalSolution", "ContactState")  # how a load step ends
+S = TypeVar("S", NormalSolution, "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
 _WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
@@ -64,7 +77,7 @@ def memory_needed(case: Problem, lattice: Lattice) -> int:
         native.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
         for part in ("operator", "set-up of the operator")
     )
-    arrays = kind_of(case).arrays
+    arrays = ARRAYS[case.frictional]
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
         arrays += _ENTRY_ARRAYS
     if case.adaptive:
@@ -107,7 +120,7 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
 
 def fields_of(case: Problem) -> tuple[str, ...]:
     """Return the fields that each step of a case has: its whole state, and displacements if asked for."""
-    return (*kind_of(case).state, *(name for name in DISPLACEMENTS if name in case.output.fields))
+    return (*STATE[case.frictional], *(name for name in DISPLACEMENTS if name in case.output.fields))
 
 
 # --- windows --------------------------------------------------------------------------------------
@@ -124,6 +137,8 @@ class Window(ABC, Generic[S]):
         The window.
     steps_held : int
         Load steps whose fields the result will keep in memory.
+    listener : Listener, optional
+        Follows the run.
 
     Attributes
     ----------
@@ -138,24 +153,22 @@ class Window(ABC, Generic[S]):
         If it does not fit into memory.
     """
 
-    state: ClassVar[tuple[str, ...]]  # fields that every step has, all that the next step needs among them
-    arrays: ClassVar[int]  # fields that Python holds while a step is solved and written
+    state: ClassVar[tuple[str, ...]]  # fields of every step
 
-    def __init__(self, case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
+    def __init__(
+        self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
+    ) -> None:
         require_memory(case, lattice, steps_held)
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
+        self.listener = listener or Listener()
         gap, self.candidate = case.initial_gap(lattice)
         self.initial_gap: Array = np.where(self.candidate, gap, np.nan)
         self._bodies: dict[int, FlexibilityOperator] = {}
-        self._set_up(gap)
+        self._contact: Any = self._solver(gap)
 
     @abstractmethod
-    def _set_up(self, gap: Array) -> None:
+    def _solver(self, gap: Array) -> Any:
         """Make the solver, given the initial gap (inf where nothing can touch)."""
-
-    @abstractmethod
-    def _let_go(self) -> None:
-        """Free the memory of the solver."""
 
     @abstractmethod
     def advance(self, state: S | None, target: LoadStep, values: tuple[float, ...]) -> S:
@@ -171,21 +184,25 @@ class Window(ABC, Generic[S]):
             The load or motion prescribed for each of them.
         """
 
-    @abstractmethod
     def carried(self, state: S | None, lattice: Lattice) -> S | None:
         """Return a state that was solved on a smaller window on this one."""
+        return state
 
-    @abstractmethod
     def restored(self, step: Step) -> S | None:
-        """Return the state at the end of a step that was solved on this window, as the next one needs it."""
-
-    @abstractmethod
-    def _more_fields(self, solution: S) -> dict[str, NDArray[Any]]:
-        """Return the fields of a step beyond initial gap, pressure, gap and zone."""
+        """Return the state at the end of a step that was solved on this window, if the next one needs it."""
+        return None
 
     @abstractmethod
     def _more_history(self, solution: S, before: S | None, edges: ContactEdges) -> dict[str, float]:
         """Return what has one value by step beyond load, approach and contact area."""
+
+    def _work(self, solution: S, inside: NDArray[np.bool_]) -> float:
+        """Return the work of the tractions at the nodes in contact, by unit of cell area."""
+        return float(solution.pressure[inside] @ self.closing(solution)[inside])
+
+    def _elastic_energy(self, solution: S) -> float:
+        """Return U = sum A_p (p w + q . (u1 - u2))/2."""
+        return 0.5 * self.lattice.cell_area * self._work(solution, solution.zone > 0)
 
     def outgrown(self, solution: S) -> bool:
         """Tell whether the contact reached the rim of the window, be it in a part of the step only."""
@@ -205,9 +222,11 @@ class Window(ABC, Generic[S]):
                 f"{self.lattice.n_row} x {self.lattice.n_col} nodes; "
                 'expected a larger grid.extent or grid.window, or grid.extent = "auto"'
             )
-        self._let_go()  # its memory goes before that of the next comes
+        del self._contact  # its memory goes before that of the next comes
         self._bodies.clear()
-        return type(self)(self.case, self.case.grown(self.lattice, solution.zone > 0), self.steps_held)
+        larger = self.case.grown(self.lattice, solution.zone > 0)
+        self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
+        return type(self)(self.case, larger, self.steps_held, self.listener)
 
     def step(self, target: LoadStep, solution: S, before: S | None, started: float) -> Step:
         """Return what a load step leaves.
@@ -221,13 +240,9 @@ class Window(ABC, Generic[S]):
         started : float
             When work on it began (s, `time.perf_counter`).
         """
-        fields = {
-            "initial_gap": self.initial_gap,
-            "pressure": solution.pressure,
-            "gap": np.where(self.candidate, solution.gap, np.nan),
-            "zone": solution.zone,
-            **self._more_fields(solution),
-        }
+        fields = {"initial_gap": self.initial_gap}
+        fields |= {name: getattr(solution, name) for name in self.state}
+        fields["gap"] = np.where(self.candidate, solution.gap, np.nan)
         for body in (1, 2):
             wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
             if wanted:
@@ -293,8 +308,6 @@ class Window(ABC, Generic[S]):
 
         Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z.
         """
-        from ..core.contact import ElasticPair, FlexibilityOperator
-
         body = self.case.body_1 if number == 1 else self.case.body_2
         if body.rigid:
             return dict.fromkeys("xyz", np.zeros(self.lattice.shape))
@@ -310,60 +323,30 @@ class Window(ABC, Generic[S]):
         return {"x": sign * x, "y": sign * y, "z": z}
 
 
-class NormalWindow(Window["NormalSolution"]):
+class NormalWindow(Window[NormalSolution]):
     """Contact without friction; every step stands for itself."""
 
-    state = ("pressure", "gap", "zone")
-    arrays = 8  # initial gap, pressure, gap, zones, on their way through the core
+    state = STATE[False]
 
-    def _set_up(self, gap: Array) -> None:
-        from ..core.contact import NormalContact
-
-        self._contact: NormalContact = NormalContact(
-            self.lattice, self.case.pair, gap, self.candidate, self.case.method_for(self.lattice)
-        )
-
-    def _let_go(self) -> None:
-        del self._contact
+    def _solver(self, gap: Array) -> contact.NormalContact:
+        method = self.case.method_for(self.lattice)
+        return contact.NormalContact(self.lattice, self.case.pair, gap, self.candidate, method)
 
     def advance(
         self, state: NormalSolution | None, target: LoadStep, values: tuple[float, ...]
     ) -> NormalSolution:
         """Press with a force or to an approach."""
-        tolerance = self.case.solver.tolerance
-        if target.z.control == "force":
-            return self._contact.solve(normal_load=values[0], tolerance=tolerance)
-        return self._contact.solve(approach=values[0], tolerance=tolerance)
-
-    def carried(self, state: NormalSolution | None, lattice: Lattice) -> NormalSolution | None:
-        """Return the state as it is: the next step does not look at its fields."""
-        return state
-
-    def restored(self, step: Step) -> NormalSolution | None:
-        """Return nothing: every step stands for itself."""
-        return None
-
-    def _more_fields(self, solution: NormalSolution) -> dict[str, NDArray[Any]]:
-        return {}
+        driven = {"normal_load" if target.z.control == "force" else "approach": values[0]}
+        solution: NormalSolution = self._contact.solve(**driven, tolerance=self.case.solver.tolerance)
+        return solution
 
     def _more_history(
         self, solution: NormalSolution, before: NormalSolution | None, edges: ContactEdges
     ) -> dict[str, float]:
-        inside = solution.zone > 0
-        work = float(solution.pressure[inside] @ self.closing(solution)[inside])
         return {
-            "elastic_energy": 0.5 * self.lattice.cell_area * work,
+            "elastic_energy": self._elastic_energy(solution),
             "sweeps": solution.sweeps,
             "operator_applications": solution.operator_applications,
             "residual_normal": solution.residual_normal,
             "residual_force": solution.residual_force,
         }
-
-
-def kind_of(case: Problem) -> type[Window[Any]]:
-    """Return the kind of window that the algorithm of a case needs."""
-    if not case.frictional:
-        return NormalWindow
-    from .frictional import FrictionWindow
-
-    return FrictionWindow

@@ -23,22 +23,22 @@ class Interrupted(BaseException):
 
 
 @contextlib.contextmanager
-def news() -> Iterator[tuple[int, int]]:
+def signal_pipe() -> Iterator[tuple[int, int]]:
     """Open a pipe into which the signals that end a run put their numbers, in the order they come.
 
     They raise nothing, wherever they come, so that leaving is not interrupted by those that follow.
     """
     old = {number: signal.getsignal(number) for number in _SIGNALS}
-    heeded = {number: handler for number, handler in old.items() if handler not in (signal.SIG_IGN, None)}
+    handled = {number: handler for number, handler in old.items() if handler not in (signal.SIG_IGN, None)}
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     former = signal.set_wakeup_fd(writer)
     try:
-        for number in heeded:
+        for number in handled:
             signal.signal(number, lambda *_: None)
         yield reader, writer
     finally:
-        for number, handler in heeded.items():
+        for number, handler in handled.items():
             signal.signal(number, signal.SIG_IGN if ends_process else handler)
         signal.set_wakeup_fd(former)
         os.close(reader)
@@ -46,7 +46,7 @@ def news() -> Iterator[tuple[int, int]]:
 
 
 def in_background(
-    work: Callable[[], object], heard: tuple[int, int], ends: Callable[[Interrupted], bool] = lambda _: True
+    work: Callable[[], object], pipe: tuple[int, int], ends: Callable[[Interrupted], bool] = lambda _: True
 ) -> None:
     """Do `work` in a second thread while this one waits for it, and for signals.
 
@@ -56,8 +56,8 @@ def in_background(
     ----------
     work : callable
         What to do.
-    heard : tuple of int
-        The pipe of `news`.
+    pipe : tuple of int
+        The pipe of `signal_pipe`.
     ends : callable
         Tells whether a signal ends the work; if not, it goes on.
 
@@ -66,7 +66,7 @@ def in_background(
     Interrupted
         If a signal ends the work; the thread may still be at it.
     """
-    reader, writer = heard
+    reader, writer = pipe
     raised: list[BaseException] = []
     own = os.dup(writer)  # the pipe may be closed by the time, and its number be that of another file
 

@@ -9,87 +9,38 @@ nothing is handed from one lattice to the next.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ResourceError, StopRun
-from ..result.result import Metadata, Result, Step, assemble
-from ..result.trials import Solution
-from ..text import quantity
+from ..errors import DeckError, ResourceError
+from ..problem.refinement import LEAST_LEVELS, RATIO, SHIFTS, Trial
+from ..result.history import spelled
+from ..result.journal import Journal, journal_of
+from ..result.result import Metadata
+from ..result.step import Step
+from ..result.store import Store
+from ..result.trials import Solution, TrialFolder
 from ..variables import ESTIMATED
-from . import accuracy, log
-from .accuracy import LEAST_LEVELS, RATIO, SHIFTS
-from .progress import Reporter
+from . import accuracy
+from .events import Listener
+from .frictionless import require_memory
+from .steps import check_step, steps
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
 
-History = Mapping[str, Any]
+_SAME = 1e-12  # relative difference of spacings that are the same
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A lattice to solve the case on.
-
-    Parameters
-    ----------
-    level : int
-        How often it was refined.
-    copy : int
-        0: the lattice itself, else the number of its shifted copy.
-    """
-
-    level: int
-    copy: int = 0
-
-    def case(self, case: Problem) -> Problem:
-        """Return the case on this lattice."""
-        spacing = case.lattice.spacing / RATIO**self.level
-        origin = np.array(case.lattice.origin)
-        if self.copy:
-            origin += SHIFTS[self.copy - 1] @ case.lattice.basis / RATIO**self.level
-        return case.on_lattice(spacing, (float(origin[0]), float(origin[1])))
-
-    @property
-    def name(self) -> str:
-        """Say which one it is: "lattice 3", "lattice 1, shifted (2 of 4)"."""
-        shifted = f", shifted ({self.copy} of {len(SHIFTS)})" if self.copy else ""
-        return f"lattice {self.level + 1}{shifted}"
-
-
-class Solver(ABC):
-    """Solves a case on one lattice after the other, and keeps what comes out.
-
-    Attributes
-    ----------
-    in_memory : bool
-        Whether the load steps of a lattice stay in memory.
-    """
-
-    in_memory: ClassVar[bool] = False
-
-    @abstractmethod
-    def solve(self, trial: Trial, case: Problem) -> Solution:
-        """Solve the load history on a lattice.
-
-        Parameters
-        ----------
-        trial : Trial
-            The lattice.
-        case : Problem
-            The case on it.
-        """
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a refinement came to.
+class Refinement:
+    """A case on all its lattices, with the errors that follow.
 
     Parameters
     ----------
@@ -115,8 +66,8 @@ class Outcome:
     def parameters(self) -> dict[str, Any]:
         """Attributes of the result."""
         reached = _meets(self.relative, self.target)
-        told = {"accuracy_estimate": accuracy.worst(self.relative)[1], "accuracy_reached": np.int32(reached)}
-        return told if reached else {**told, "accuracy_shortfall": self.shortfall}
+        found = {"accuracy_estimate": accuracy.worst(self.relative)[1], "accuracy_reached": np.int32(reached)}
+        return found if reached else {**found, "accuracy_shortfall": self.shortfall}
 
     @property
     def shortfall(self) -> str:
@@ -153,17 +104,15 @@ class Outcome:
         return dataclasses.replace(step, history={**step.history, **errors})
 
 
-def refine(case: Problem, solver: Solver, shown: Reporter) -> Outcome:
+def refine(case: Problem, solver: InMemory | OnDisk) -> Refinement:
     """Solve a case on finer and finer lattices, until its accuracy is reached or a limit is.
 
     Parameters
     ----------
     case : Problem
         The case, with an accuracy to reach.
-    solver : Solver
-        Solves it.
-    shown : Reporter
-        Who is told about it.
+    solver : InMemory or OnDisk
+        Solves it on one lattice after the other, and keeps the load steps.
 
     Raises
     ------
@@ -174,9 +123,14 @@ def refine(case: Problem, solver: Solver, shown: Reporter) -> Outcome:
     target = case.accuracy.target
     levels: list[Solution] = []
     copies: list[Solution] = []
+
+    def solved(trial: Trial) -> Solution:
+        on_lattice = trial.case(case)
+        solver.listener.lattice(trial.name, on_lattice.lattice, trial.copy > 0)
+        return solver.solve(trial, on_lattice)
+
     while True:
-        trial = Trial(len(levels))
-        levels.append(_solved(trial, trial.case(case), solver, shown))
+        levels.append(solved(Trial(len(levels))))
         limit = limit_of(case, levels[-1], solver.in_memory)
         if len(levels) < LEAST_LEVELS:
             if limit:
@@ -185,40 +139,24 @@ def refine(case: Problem, solver: Solver, shown: Reporter) -> Outcome:
         if not limit and not _meets(accuracy.changes(levels[-2], levels[-1], case.load_steps), target):
             continue
         coarse = len(levels) - LEAST_LEVELS
-        for copy in range(1, len(SHIFTS) + 1):
-            trial = Trial(coarse, copy)
-            copies.append(_solved(trial, trial.case(case), solver, shown))
+        copies += [solved(Trial(coarse, copy)) for copy in range(1, len(SHIFTS) + 1)]
         solutions = [*levels, *copies]
         errors = accuracy.estimated_errors(solutions, case.load_steps)
         relative = accuracy.relative_errors(levels[-1].histories, errors)
         name, error = accuracy.worst(relative)
-        log.logger.info(log.words("errors", worst=name, error=error, target=target))
-        shown.says(f"estimated error {100 * error:.2g} % ({_words(name)}), target {100 * target:.3g} %")
+        words = spelled(name.removesuffix("_fit"))
+        text = f"estimated error {100 * error:.2g} % ({words}), target {100 * target:.3g} %"
+        solver.listener.said("errors", text, worst=name, error=error, target=target)
         if limit or _meets(relative, target):
-            return Outcome(solutions, errors, relative, target, limit)
-
-
-def _solved(trial: Trial, case: Problem, solver: Solver, shown: Reporter) -> Solution:
-    lattice = case.lattice
-    log.logger.info(log.words("lattice", name=trial.name, spacing=lattice.spacing, nodes=lattice.size))
-    shown.lattice(
-        f"{trial.name}: spacing {quantity(lattice.spacing, 'm')}, {lattice.size:,} nodes", trial.copy > 0
-    )
-    return solver.solve(trial, case)
+            return Refinement(solutions, errors, relative, target, limit)
 
 
 def _meets(relative: Mapping[str, float], target: float) -> bool:
     return all(error <= target for error in relative.values())
 
 
-def _words(name: str) -> str:
-    return name.removesuffix("_fit").replace("_", " ")
-
-
 def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
     """Return what keeps the lattice from being refined after a solution; empty if nothing does."""
-    from .frictionless import require_memory
-
     assert case.accuracy is not None
     try:
         finer = Trial(last.level + 1).case(case)
@@ -236,74 +174,126 @@ def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
     return ""
 
 
-def least_and_most(case: Problem) -> tuple[list[Problem], list[Problem]]:
-    """Return a case on all lattices of the shortest refinement, and of the longest that max_nodes allows.
-
-    The last one is the finest.
-    """
-    assert case.accuracy is not None
-    coarse, levels = Trial(0).case(case), [Trial(level).case(case) for level in range(LEAST_LEVELS)]
-    least = [coarse] * len(SHIFTS) + levels
-    while (finer := Trial(len(levels)).case(case)).lattice.size <= case.accuracy.max_nodes:
-        levels.append(finer)
-    return least, [*(levels[: 1 - LEAST_LEVELS] * len(SHIFTS)), *levels]
+# --- where load steps go ------------------------------------------------------------------------------------
 
 
-# --- in memory ----------------------------------------------------------------------------------------------
-
-
-class InMemory(Solver):
-    """Keeps the load steps of the finest lattice.
-
-    Parameters
-    ----------
-    shown : Reporter
-        Who is told about each step.
-    on_step : callable, optional
-        Called with each finished `Step`.
-    """
-
-    in_memory = True
-
-    def __init__(self, shown: Reporter, on_step: Callable[[Step], object] | None) -> None:
-        self._shown, self._on_step = shown, on_step
-        self.steps: list[Step] = []
-
-    def solve(self, trial: Trial, case: Problem) -> Solution:
-        """Solve the load history on a lattice."""
-        from .run import steps, stops
-
-        if not trial.copy:
-            self.steps.clear()
-        heads = []
-        for step in steps(case, kept_in_memory=not trial.copy):
-            heads.append(step.head)
-            if not trial.copy:
-                self.steps.append(step)
-            log.finished(step, len(case.load_steps))
-            self._shown.finished(step)
-            if stopped := stops(self._on_step, step, more=True):
-                raise StopRun(stopped)
-        return solution_of(trial, case, heads)
-
-
-def solution_of(trial: Trial, case: Problem, heads: Sequence[Step]) -> Solution:
-    """Return what the load steps on a lattice came to."""
+def _solved(
+    trial: Trial,
+    case: Problem,
+    listener: Listener,
+    keep: Callable[[Step], object],
+    before: Sequence[Step] = (),
+    in_memory: bool = False,
+) -> Solution:
+    """Solve the load history on a lattice; `keep` makes each load step safe."""
+    heads = [step.head for step in before]
+    for step in steps(case, in_memory, before, listener=listener):
+        keep(step)
+        heads.append(step.head)
+        listener.step(step)
     lattice = case.lattice
     nodes = max(step.lattice.size for step in heads)
     histories = [step.history for step in heads]
     return Solution(trial.level, trial.copy, lattice.spacing, lattice.origin, nodes, histories)
 
 
-def in_memory(case: Problem, shown: Reporter, on_step: Callable[[Step], object] | None) -> Result:
-    """Solve a case until its accuracy is reached or a limit is, and return the result; errors as `refine`."""
-    from .run import metadata_of
+class InMemory:
+    """Keeps the load steps of the finest lattice.
 
-    solver = InMemory(shown, on_step)
-    try:
-        outcome = refine(case, solver, shown)
-    except StopRun as wanted:  # of the lattice that was under way, without errors
-        dataset = assemble(metadata_of(case), solver.steps, complete=False)
-        return Result(dataset.assign_attrs(stopped=str(wanted)))
-    steps = [outcome.with_errors(step) for step in solver.steps]
-    return Result(assemble(outcome.metadata(metadata_of(case)), steps, trials=outcome.trials))
+    Parameters
+    ----------
+    steps : list of Step
+        Where they go.
+    listener : Listener
+        Follows the run, and may end it.
+    """
+
+    in_memory = True
+
+    def __init__(self, steps: list[Step], listener: Listener) -> None:
+        self.steps, self.listener = steps, listener
+
+    def solve(self, trial: Trial, case: Problem) -> Solution:
+        """Solve the load history on a lattice; the steps on shifted copies are not kept."""
+        if trial.copy:
+            return _solved(trial, case, self.listener, keep=lambda step: None)
+        self.steps.clear()
+        return _solved(trial, case, self.listener, self.steps.append, in_memory=True)
+
+
+class OnDisk:
+    """Keeps finished lattices, and the load steps of the present one, in the journal of an output.
+
+    Parameters
+    ----------
+    store : Store
+        The output.
+    listener : Listener
+        Follows the run, and may end it.
+    """
+
+    in_memory = False
+
+    def __init__(self, store: Store, listener: Listener) -> None:
+        self._store, self.listener = store, listener
+        self._trials = TrialFolder(store.folder)
+        self._solutions = self._trials.read()[1] if self._trials else []
+        with store.writing("the journal"):
+            self._trials.write(store.metadata, self._solutions)
+
+    def solve(self, trial: Trial, case: Problem) -> Solution:
+        """Solve the load history on a lattice, or what is missing of it."""
+        for solution in self._solutions:
+            if (solution.level, solution.copy) == (trial.level, trial.copy):
+                if abs(solution.spacing - case.lattice.spacing) > _SAME * solution.spacing:
+                    raise DeckError(
+                        f"the deck now leads to other lattices than those finished for {self._store.path}"
+                    )
+                return solution
+        with self._opened(trial) as (store, last):
+            if last is not None:
+                found = f"{len(store.heads)} finished steps on {trial.name} of {self._store.path}"
+                check_step(case, last, found)
+            before = [*store.heads[:-1], last] if last is not None else []
+            solution = _solved(trial, case, self.listener, store.append, before)
+        self._solutions.append(solution)
+        with self._store.writing(f"{trial.name}"):
+            self._trials.write(self._store.metadata, self._solutions)
+            if trial.copy:
+                self._trials.drop(trial.level, trial.copy)
+            elif trial.level:
+                self._trials.drop(trial.level - 1)
+        return solution
+
+    @contextlib.contextmanager
+    def _opened(self, trial: Trial) -> Iterator[tuple[Store, Step | None]]:
+        """Open the journal of a lattice; yield its last finished step, too."""
+        path, last = self._trials.path(trial.level, trial.copy), None
+        if Journal(journal_of(path)):
+            store, last = Store.reopened(path)
+            self._trials.check(self._store.metadata, store.metadata)
+        else:
+            store = Store(path, self._store.metadata, overwrite=True)
+        store.interim = False
+        try:
+            yield store, last
+        finally:
+            store.close()
+
+    def finish(self, refinement: Refinement) -> None:
+        """Put the output in its place and clear the journal away."""
+        best = accuracy.finest(refinement.solutions)
+        journal = Journal(journal_of(self._trials.path(best.level)))
+        self._store.finish_with(
+            refinement.metadata(self._store.metadata), _WithErrors(journal, refinement), refinement.trials
+        )
+
+
+class _WithErrors:
+    """The load steps of a journal with their errors."""
+
+    def __init__(self, journal: Journal, refinement: Refinement) -> None:
+        self._journal, self._refinement = journal, refinement
+
+    def __iter__(self) -> Iterator[Step]:
+        return map(self._refinement.with_errors, self._journal)

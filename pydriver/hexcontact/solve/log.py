@@ -1,6 +1,6 @@
 """The log of runs: a line for the beginning, each load step, the end, through the logger ``hexcontact``.
 
-Nobody hears it unless someone listens: ``logging.getLogger("hexcontact")`` in Python, ``--log-file`` and
+It goes nowhere by itself: ``logging.getLogger("hexcontact")`` in Python, ``--log-file`` and
 ``--log-level`` on the command line. A line is words ``name=value``; values are in SI, text stands in quotes.
 """
 
@@ -20,14 +20,14 @@ from ..errors import DeckError, HexcontactError
 from ..result.history import worth_showing
 from ..text import visible
 from ..variables import RESIDUALS, label_of
+from .events import Listener
 
 if TYPE_CHECKING:
     from ..core.lattice import Lattice
-    from ..problem.problem import Problem
-    from ..result.result import Step
+    from ..result.step import Step
 
 logger = logging.getLogger("hexcontact")
-logger.addHandler(logging.NullHandler())  # else warnings went to standard error where nobody listens
+logger.addHandler(logging.NullHandler())  # else warnings went to standard error by default
 
 LEVELS = ("debug", "info", "warning", "error")
 
@@ -40,79 +40,53 @@ def words(event: str, **values: Any) -> str:
 def _word(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
+    if isinstance(value, tuple):  # rows and columns
+        return "x".join(map(str, value))
     if isinstance(value, str | Path):
         return json.dumps(str(value), ensure_ascii=False)
     return str(value)
 
 
-# --- what is told -----------------------------------------------------------------------------------------
+class Log(Listener):
+    """Writes what happens into the log."""
 
+    _planned = 0
 
-def begun(case: Problem, lattice: Lattice, done: int) -> None:
-    """Tell of a run that begins, or goes on after so many steps."""
-    from .._version import __version__
-    from .run import parameters_of
+    def begun(self, title: str, steps: int) -> None:
+        """Keep the number of load steps for the lines to come."""
+        self._planned = steps
 
-    if not logger.isEnabledFor(logging.INFO):
-        return
-    known = parameters_of(case)
-    told = {
-        name: known[name] for name in ("algorithm", "friction_coefficient", "coupling", "entry", "tolerance")
-    }
-    logger.info(
-        words(
-            "resumed" if done else "begun",
-            title=case.title,
-            version=__version__,
-            machine=known["machine"],
-            steps=case.planned_steps or "auto",
-            **({"done": done} if done else {}),
-            window=_size(lattice),
-            spacing=lattice.spacing,
-            method=case.method_for(lattice),
-            **told,
-        )
-    )
+    def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
+        """Write which lattice is next."""
+        self.said("lattice", name=name, spacing=lattice.spacing, nodes=lattice.size)
 
+    def step(self, step: Step) -> None:
+        """Write loads and motions, zones, residuals and work of a load step."""
+        if not logger.isEnabledFor(logging.INFO):
+            return
+        history = step.history
+        values: dict[str, Any] = {"segment": history.get("segment", "-"), "label": history.get("label", "")}
+        values["fraction"] = step.ramp_done
+        shown = worth_showing([history])
+        values |= {label_of(name).replace(" ", "_"): float(history[name]) for name in shown}
+        values["p_max"] = float(history["max_pressure"])
+        values |= _zones(step)
+        values |= {sign: _rounded(history[name]) for sign, name in RESIDUALS.items() if name in history}
+        values["iterations"] = history["sweeps"]
+        values["halvings"] = history.get("cuts", 0)
+        values["applications"] = _rounded(history["operator_applications"])
+        values["seconds"] = _rounded(history["seconds"])
+        self.said(f"step={step.number}" + (f"/{self._planned}" if self._planned else ""), **values)
 
-def grown(number: int, before: Lattice, after: Lattice) -> None:
-    """Tell of a window that grows, since the contact of a step has reached its rim."""
-    logger.info(words("window", step=number, before=_size(before), after=_size(after)))
+    def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
+        """Write what happened and its values."""
+        logger.log(level, words(event, **values))
 
-
-def _size(lattice: Lattice) -> str:
-    return f"{lattice.n_row}x{lattice.n_col}"
-
-
-@contextlib.contextmanager
-def ending() -> Iterator[None]:
-    """Tell why a run ends before its time."""
-    try:
-        yield
-    except HexcontactError as error:
-        if not error.logged:
-            logger.error(words("stopped", reason=str(error)))
-        error.logged = True
-        raise
-
-
-def finished(step: Step, total: int | None) -> None:
-    """Tell of a finished load step: loads and motions, zones, residuals, work; no total: not known yet."""
-    if not logger.isEnabledFor(logging.INFO):
-        return
-    history = step.history
-    values: dict[str, Any] = {"segment": history.get("segment", "-"), "label": history.get("label", "")}
-    values["fraction"] = step.ramp_done
-    shown = worth_showing([history])
-    values |= {label_of(name).replace(" ", "_"): float(history[name]) for name in shown}
-    values["p_max"] = float(history["max_pressure"])
-    values |= _zones(step)
-    values |= {sign: _rounded(history[name]) for sign, name in RESIDUALS.items() if name in history}
-    values["iterations"] = history["sweeps"]
-    values["halvings"] = history.get("cuts", 0)
-    values["applications"] = _rounded(history["operator_applications"])
-    values["seconds"] = _rounded(history["seconds"])
-    logger.info(words(f"step={step.number}" + (f"/{total}" if total else ""), **values))
+    def ended(self, error: BaseException | None) -> None:
+        """Write why the run ends before its time, once."""
+        if isinstance(error, HexcontactError) and not error.logged:
+            self.said("stopped", level=logging.ERROR, reason=str(error))
+            error.logged = True
 
 
 def _rounded(value: float | int | str) -> float:
@@ -128,7 +102,7 @@ def _zones(step: Step) -> dict[str, int]:
     return {"contact": contact, "stick": stick, "slip": contact - stick}
 
 
-# --- who listens ------------------------------------------------------------------------------------------
+# --- where it goes ----------------------------------------------------------------------------------------
 
 
 class _Lines(logging.Formatter):
@@ -143,7 +117,7 @@ class _Lines(logging.Formatter):
 
 
 class _File(logging.FileHandler):
-    """Appends to a file; one that can no longer be written is told of once, and the run goes on."""
+    """Appends to a file; says once that it can no longer be written, and lets the run go on."""
 
     failed = False
 
@@ -194,7 +168,7 @@ def kept(file: Path | None, level: str | None, spare: Sequence[Path] = ()) -> It
     logger.propagate = False
     logger.addHandler(handler)
     try:
-        with ending():
+        with Log().following("", 0):
             yield
     finally:
         logger.removeHandler(handler)

@@ -10,29 +10,25 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from .._version import __version__
 from ..errors import DeckError, HexcontactError
+from ..problem.problem import Problem
 from ..result.journal import PHYSICS, physics
 from ..result.netcdf import read_output
-from ..result.result import Metadata, Result, Step, now
+from ..result.result import Metadata, Result, now
+from ..result.step import Step
 from ..result.store import Store, journal_of, open_result
 from ..result.trials import TrialFolder
-from .progress import Reporter, reporter
-from .run import checked, metadata_of, record
-
-if TYPE_CHECKING:
-    from ..problem.problem import Problem
-
-_SAME = 1e-9  # relative difference of initial gaps that are the same
+from .events import Listener
+from .run import checked, listeners, metadata_of, run_into
+from .steps import check_step
 
 
 @dataclass
 class Restart:
-    """A run that can go on.
+    """An unfinished run, opened again.
 
     Attributes
     ----------
@@ -58,7 +54,7 @@ def resume(
     case: Problem | None = None,
     overrides: Mapping[str, Any] | None = None,
     on_step: Callable[[Step], object] | None = None,
-    progress: Reporter | bool | None = None,
+    progress: Listener | bool | None = None,
 ) -> Result:
     """Go on with a run that was interrupted, was killed, met a full disk or did not converge.
 
@@ -74,8 +70,8 @@ def resume(
         New values for keys of the solver, as ``{"solver.tolerance": 1e-7}``, for the steps to come.
     on_step : callable, optional
         Called with each further `Step`.
-    progress : Reporter or bool, optional
-        Who is told about each step; True: a bar on a terminal, lines otherwise.
+    progress : Listener or bool, optional
+        Follows the run; True: a bar on a terminal, lines otherwise.
 
     Returns
     -------
@@ -93,14 +89,14 @@ def resume(
     --------
     >>> result = hexcontact.resume("fretting.nc")  # doctest: +SKIP
     """
-    shown = progress if isinstance(progress, Reporter) else reporter(quiet=not progress)
     with reopened(path, case, overrides) as restart:
         if restart is None:
             return checked(open_result(path))
         if restart.warning:
             warnings.warn(restart.warning, stacklevel=2)
-        with shown.watching(restart.case.title, restart.case.planned_steps):
-            record(restart.case, restart.store, shown, on_step, restart.before)
+        listener = listeners(restart.case, progress, on_step)
+        with listener.following(restart.case.title, restart.case.planned_steps):
+            run_into(restart.case, restart.store, listener, restart.before)
     return checked(open_result(restart.store.path))
 
 
@@ -132,7 +128,11 @@ def reopened(
         raise
     with store:
         before = [] if last is None else [*store.heads[:-1], last]
-        yield Restart(case, store, before, _warning(store.metadata))
+        warning = (
+            f"the run was started by hexcontact {store.metadata.version} and goes on with {__version__}; the "
+            "result may differ from what either of them gives alone"
+        )
+        yield Restart(case, store, before, warning if store.metadata.version != __version__ else "")
 
 
 def _output_of(path: Path) -> Path:
@@ -163,8 +163,6 @@ def _found(path: Path) -> tuple[Store | None, Step | None]:
 
 def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any], path: Path) -> Problem:
     """Make the case again that the run solves."""
-    from ..problem.problem import Problem
-
     for key in overrides:
         table, _, name = key.partition(".")
         if table != "solver" or name.partition(".")[0] in ("", *PHYSICS):
@@ -179,7 +177,8 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
         return case
     if not metadata.deck:
         raise DeckError(f"the journal of {path} holds no deck")
-    if _from_python(metadata.deck):
+    surface = tomllib.loads(metadata.deck).get("body", {}).get("1", {}).get("surface", {})
+    if surface.get("shape") == "python":
         raise DeckError(
             f"the gap of {path} was given in Python; go on there: hexcontact.resume({str(path)!r}, case=case)"
         )
@@ -193,13 +192,8 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
     return again
 
 
-def _from_python(deck: str) -> bool:
-    body = tomllib.loads(deck).get("body", {})
-    return body.get("1", {}).get("surface", {}).get("shape") == "python"
-
-
 def _check(case: Problem, store: Store, last: Step | None) -> None:
-    """See to it that the case is the one of the steps, though files that its deck names may have changed."""
+    """Refuse a case that is not the one of the steps, as when files that its deck names have changed."""
     found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
     planned = store.metadata.planned_steps
     if last is not None:
@@ -208,18 +202,6 @@ def _check(case: Problem, store: Store, last: Step | None) -> None:
         raise DeckError(f"the deck now has {len(case.load_steps)} load steps; the {found} are of {planned}")
     if last is not None:
         check_step(case, last, found)
-
-
-def check_step(case: Problem, last: Step, found: str) -> None:
-    """See to it that lattice and surfaces of a case are those of a finished step; `found` names it."""
-    if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
-        raise DeckError(f"the deck now leads to another lattice than that of the {found}")
-    gap, touching = case.initial_gap(last.lattice)
-    then = last.fields["initial_gap"]
-    if (touching != np.isfinite(then)).any() or not np.allclose(
-        gap[touching], then[touching], rtol=_SAME, atol=_SAME * np.abs(then[touching]).max(initial=0.0)
-    ):
-        raise DeckError(f"the surfaces are no longer those of the {found}")
 
 
 def _continued(store: Store, case: Problem) -> Metadata:
@@ -239,13 +221,4 @@ def _continued(store: Store, case: Problem) -> Metadata:
         deck=new.deck,
         parameters=new.parameters,
         resumed=(*old.resumed, ", ".join([line, *changed])),
-    )
-
-
-def _warning(metadata: Metadata) -> str:
-    if metadata.version == __version__:
-        return ""
-    return (
-        f"the run was started by hexcontact {metadata.version} and goes on with {__version__}; the result "
-        "may differ from what either of them gives alone"
     )

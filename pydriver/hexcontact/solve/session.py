@@ -21,15 +21,16 @@ from ..deck.write import plain
 from ..errors import DeckError
 from ..problem.arguments import middle_of, with_radians
 from ..problem.loads import LoadStep, load_steps
-from ..result.result import Result, Step, assemble
-from . import log
-from . import run as solve
+from ..problem.problem import Problem
+from ..result.result import Result, assemble
+from ..result.step import Step
+from ..result.store import Store, open_result
+from . import steps as solving
+from .log import Log
+from .run import metadata_of
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
-
-    from ..problem.problem import Problem
-    from ..result.store import Store
 
 _AT_REST = ("tangential_load_x", "tangential_load_y", "twist")  # what is zero where nothing is said
 _FINENESS = ("spacing", "nodes_across", "nodes_in_radius", "origin")
@@ -89,20 +90,20 @@ class Session:
 
     def __init__(self, case: Problem, output: str | Path | None = None, overwrite: bool = False) -> None:
         self.case = case
-        self._about = solve.metadata_of(case)
+        self._about = metadata_of(case)
         self._steps: list[Step] = []  # with an output all but the last without their fields
-        self._march: Iterator[Step] | None = None
-        self._queue: deque[LoadStep] = deque()
+        self._solving: Iterator[Step] | None = None  # the load steps to come; begins anew after a failure
+        self._queue: deque[LoadStep] = deque()  # that `advance` asks for
         self._by_hand = False
+        self._log = Log()
+        self._log.begun(case.title, case.planned_steps)
         self._loads: list[dict[str, Any]] = []  # entries of [[load]], once they are those of the script
         self._driven = copy.copy(case)
         self._closed = False
         self._store: Store | None = None
         if output is not None:
-            from ..result.store import Store
-
             self._store = Store(output, self._about, overwrite)
-            # a session that nobody has any more, as when the cell of a notebook is run again, holds no file
+            # a session that is dropped, as when the cell of a notebook is run again, holds no file
             weakref.finalize(self, self._store.close, "the session was dropped")
 
     # --- what is known --------------------------------------------------------------------------------------
@@ -138,13 +139,11 @@ class Session:
         _ = self.step
         if self._store is None:
             return Result(assemble(self._about, self._steps, self._whole))
-        from ..result.store import open_result
-
         return open_result(self._store.path)
 
     @property
     def _whole(self) -> bool:
-        """Whether all is solved that is to be solved."""
+        """Whether all load steps are solved."""
         return bool(self._steps) and (self._by_hand or self._steps[-1].load_fraction >= 1.0)
 
     # --- steps ----------------------------------------------------------------------------------------------
@@ -166,9 +165,10 @@ class Session:
         if self._whole:
             raise StopIteration
         self._check_open()
-        if self._march is None:
-            self._march = solve.steps(self.case, self._store is None, self._steps)
-        return self._kept(self._solved(self._march))
+        if self._solving is None:
+            in_memory = self._store is None
+            self._solving = solving.steps(self.case, in_memory, self._steps, listener=self._log)
+        return self._next_step()
 
     def advance(
         self,
@@ -234,24 +234,23 @@ class Session:
         before = self._loads if self._by_hand else self._loads_so_far()
         targets = self._unrolled(before, entry)
         if not self._by_hand:
-            self._by_hand, self._loads, self._march = True, before, None
+            self._by_hand, self._loads, self._solving = True, before, None
+            self._log.begun(self.case.title, 0)
         self._driven.load_steps = targets
         segment = int(self._steps[-1].history["segment"]) if self._steps else 0
         done = len(self._steps)
         for target in targets[-steps:]:
             self._queue.append(dataclasses.replace(target, index=len(self._steps), segment=segment))
-            if self._march is None:
-                self._march = solve.steps(self._driven, False, self._steps, self._asked())
+            if self._solving is None:
+                queued = iter(self._queue.popleft, None)
+                self._solving = solving.steps(self._driven, False, self._steps, queued, self._log)
+            last = len(self._steps) + 1 == done + steps
             try:
-                step = self._solved(self._march)
+                self._next_step(done, [entry] if last else None)
             except BaseException:
                 self._queue.clear()
                 self._loads = [*self._loads, *self._resolved(self._steps[done:])]
                 raise
-            last = len(self._steps) + 1 == done + steps
-            solved = [*self._steps[done:], step]
-            self._change([*self._loads, *([entry] if last else self._resolved(solved))], step.number)
-            self._kept(step)
         self._loads = [*self._loads, entry]
         return self.step
 
@@ -274,35 +273,36 @@ class Session:
         if not 1 <= steps <= len(self._steps):
             raise DeckError(f"steps = {steps!r}: expected 1 to {len(self._steps)}, as many as are finished")
         del self._steps[-steps:]
-        self._march = None
+        self._solving = None
         if self._by_hand:
             self._loads = self._resolved(self._steps)
             self._change(self._loads, len(self._steps))
 
-    def _solved(self, march: Iterator[Step]) -> Step:
-        """Solve one step; after a failure the next is solved from the last finished step."""
+    def _next_step(self, done: int = 0, loads: list[dict[str, Any]] | None = None) -> Step:
+        """Solve the next load step, and keep it; after a failure it begins again after the last finished one.
+
+        Parameters
+        ----------
+        done : int
+            Number of steps before `advance` was called.
+        loads : list of dict, optional
+            Entries of [[load]] that led to the step from there; default: one for each step.
+        """
+        assert self._solving is not None
         try:
-            return next(march)
-        except BaseException:
-            self._march = None
-            raise
-
-    def _kept(self, step: Step) -> Step:
-        """Take a step to the finished ones."""
-        if self._store is not None:
-            try:
+            step = next(self._solving)
+            if self._by_hand:
+                loads = loads or self._resolved([*self._steps[done:], step])
+                self._change([*self._loads, *loads], step.number)
+            if self._store is not None:
                 self._store.append(step)
-            except BaseException:
-                self._march = None
-                raise
-            self._steps[-1:] = [before.head for before in self._steps[-1:]]
+                self._steps[-1:] = [before.head for before in self._steps[-1:]]
+        except BaseException:
+            self._solving = None
+            raise
         self._steps.append(step)
-        log.finished(step, None if self._by_hand else self.case.planned_steps)
+        self._log.step(step)
         return step
-
-    def _asked(self) -> Iterator[LoadStep]:
-        while self._queue:
-            yield self._queue.popleft()
 
     # --- loads as a deck has them ---------------------------------------------------------------------------
 
@@ -340,7 +340,7 @@ class Session:
         return targets
 
     def _change(self, loads: Sequence[dict[str, Any]], count: int) -> None:
-        """Have the result say that these loads, in so many steps, are all of them."""
+        """Write these loads into the deck of the result, and the number of their steps."""
         import tomli_w
 
         tables = tomllib.loads(self.case.deck_text)
@@ -363,7 +363,7 @@ class Session:
         """End the session; with an output, complete the file, or leave a run that can be resumed."""
         if self._closed:
             return
-        self._closed, self._march = True, None
+        self._closed, self._solving = True, None
         if self._store is not None:
             if self._whole:
                 self._store.finish()
@@ -383,7 +383,7 @@ class Session:
     ) -> None:
         """Close the session; after an exception the finished steps stay as an unfinished run."""
         if error is not None and self._store is not None:
-            self._closed, self._march = True, None
+            self._closed, self._solving = True, None
             self._store.__exit__(kind, error, trace)
         self.close()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from ..files import reading, replacing, require_ordinary
 from ..result.netcdf import check_seal
 from ..variables import CONVENTIONS, VARIABLES
 from .folder import StudyFolder
-from .plan import Axis, Plan
+from .plan import Axis, Plan, PlannedCase
 
 if TYPE_CHECKING:
     import xarray
@@ -73,31 +74,24 @@ def collect(
     columns: dict[str, Any] = {}
     for name in (name for name in VARIABLES if name in present):
         values = np.full((total, longest), np.nan)
+        last = np.full(total, np.nan)
         for row, history in enumerate(found):
             if name in history:
                 values[row, : len(history[name])] = history[name]
+                last[row] = history[name][-1]
         kept = {key: value for key, value in VARIABLES[name].attributes.items() if not key.startswith("flag")}
         if steps == "all":
             columns[name] = ((*dims, "step"), values.reshape(*shape, longest), kept)
         else:
-            last = [history[name][-1] if name in history else np.nan for history in found]
-            columns[name] = (dims, np.reshape(last, shape), kept)
-
-    failures = [
-        None if history else folder.failure(case) for case, history in zip(plan.cases, found, strict=True)
-    ]
-    status = [
-        DONE if history else FAILED if failure else MISSING
-        for history, failure in zip(found, failures, strict=True)
-    ]
-    flags = {"flag_values": np.array(list(_STATUS), "i1"), "flag_meanings": " ".join(_STATUS.values())}
-    codes = [failure.exit_code if failure else 0 for failure in failures]
-    messages = [failure.message if failure else "" for failure in failures]
-    numbers = [folder.number(case) for case in plan.cases]
+            columns[name] = (dims, last.reshape(shape), kept)
 
     def by_case(values: Any, dtype: Any, long_name: str, **more: Any) -> Any:
-        return dims, np.array(values, dtype=dtype).reshape(shape), {"long_name": long_name, **more}
+        return dims, np.array(list(values), dtype=dtype).reshape(shape), {"long_name": long_name, **more}
 
+    outcomes = [_outcome(folder, case, bool(h)) for case, h in zip(plan.cases, found, strict=True)]
+    status, codes, messages = zip(*outcomes, strict=True)
+    flags = {"flag_values": np.array(list(_STATUS), "i1"), "flag_meanings": " ".join(_STATUS.values())}
+    numbers = map(folder.number, plan.cases)
     columns["status"] = by_case(status, "i1", "what became of the case", **flags)
     columns["exit_code"] = by_case(codes, "i2", "exit code of the case, 0 if it has not failed", units="1")
     columns["message"] = by_case(messages, str, "why the case failed")
@@ -105,12 +99,8 @@ def collect(
 
     coordinates: dict[str, Any] = {}
     for axis in plan.axes:
-        if grid:
-            coordinates[axis.name] = _coordinate(axis, axis.name, list(axis.values))
-        else:
-            coordinates[axis.name] = _coordinate(
-                axis, "case", [case.settings[axis.key] for case in plan.cases]
-            )
+        said = axis.values if grid else [case.settings[axis.key] for case in plan.cases]
+        coordinates[axis.name] = _coordinate(axis, axis.name if grid else "case", said)
     if not grid:
         about = {"long_name": "number of the case in the study, the first is 1", "units": "1"}
         coordinates["case"] = ("case", np.arange(1, total + 1, dtype="i4"), about)
@@ -120,7 +110,15 @@ def collect(
     return xarray.Dataset(columns, coordinates, {"Conventions": CONVENTIONS, **attributes})
 
 
-def _coordinate(axis: Axis, dim: str, values: list[Any]) -> Any:
+def _outcome(folder: StudyFolder, case: PlannedCase, done: bool) -> tuple[int, int, str]:
+    """Return what became of a case: its status, exit code and message."""
+    if done:
+        return DONE, 0, ""
+    failure = folder.failure(case)
+    return (FAILED, failure.exit_code, failure.message) if failure else (MISSING, 0, "")
+
+
+def _coordinate(axis: Axis, dim: str, values: Sequence[Any]) -> Any:
     told = [axis.coordinate(value) for value in values]
     attributes = {"long_name": axis.long_name or axis.key, "deck_key": axis.key}
     if all(isinstance(value, float) for value in told):

@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from .._version import __version__
 from ..errors import ConvergenceError, DeckError, ResourceError
 from ..files import replacing, require_ordinary, text_of
 from ..lock import Lock
@@ -123,27 +124,20 @@ class StudyFolder:
 
     def failure(self, case: PlannedCase) -> Outcome | None:
         """Return the failure that is noted of a case."""
-        return self._noted(case)[0]
-
-    def _noted(self, case: PlannedCase) -> tuple[Outcome | None, str]:
-        """Return the failure that is noted of a case, and the version that has written it."""
         with contextlib.suppress(DeckError, ValueError, TypeError, AttributeError, RecursionError):
             note = json.loads(text_of(self.path(case).with_suffix(".json"), "a note"))
-            version = str(note.pop("hexcontact_version", ""))
-            outcome = Outcome(**note)
+            outcome = Outcome(**{"hexcontact_version": "", **note})
             whole = type(outcome.exit_code), type(outcome.message), type(outcome.lasting)
             if outcome.hash == case.hash and whole == (int, str, bool) and outcome.message.strip():
-                return outcome, version
-        return None, ""
+                return outcome
+        return None
 
     def _is_final(self, case: PlannedCase) -> bool:
         """Tell whether a case has failed for good: by itself, in this version of the program."""
-        from .._version import __version__
-
-        failure, version = self._noted(case)
-        if failure is None or not failure.lasting or failure.exit_code not in _FINAL:
+        failure = self.failure(case)
+        if failure is None or not failure.lasting:
             return False
-        return version == __version__
+        return failure.exit_code in _FINAL and failure.hexcontact_version == __version__
 
     def missing(self, cases: Iterable[PlannedCase], retry: bool = False) -> list[PlannedCase]:
         """Return the cases that are to be run; those that failed for good only to `retry`."""
@@ -154,13 +148,9 @@ class StudyFolder:
 
     def note(self, case: PlannedCase, outcome: Outcome) -> None:
         """Write down how a case has ended, and clear away what attempts have left."""
-        from .._version import __version__
-
         path = self.path(case)
         if outcome.exit_code:
-            self._write(
-                f"{path.stem}.json", dataclasses.asdict(outcome) | {"hexcontact_version": __version__}
-            )
+            self._write(f"{path.stem}.json", dataclasses.asdict(outcome))
             return
         path.with_suffix(".json").unlink(missing_ok=True)
         pattern = re.compile(re.escape(path.stem) + r"\.[0-9a-f]{8}\.nc(\.d)?")

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .._version import __version__
 from ..errors import HexcontactError, ResourceError
 
 if TYPE_CHECKING:
     from ..case import Case
     from ..result.step import Step
-    from ..solve.progress import Reporter
+    from ..solve.events import Listener
     from ..solve.restart import Restart
 
 MOST_CASES = 100_000  # of a study
@@ -48,6 +49,8 @@ class Outcome:
         Wall time of this attempt.
     lasting : bool
         Whether a failure is of the case itself, not of the circumstances.
+    hexcontact_version : str
+        The version of the program that has run it.
     """
 
     hash: str
@@ -55,9 +58,10 @@ class Outcome:
     message: str = ""
     seconds: float = 0.0
     lasting: bool = True
+    hexcontact_version: str = __version__
 
 
-def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> Outcome:
+def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:
     """Run one case into its file.
 
     Parameters
@@ -66,8 +70,8 @@ def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> 
         The case.
     apart : bool
         Write under a name of this attempt's own first, for when another attempt may still be under way.
-    shown : Reporter, optional
-        Who is told about each load step.
+    listener : Listener, optional
+        Follows the run, besides the log.
 
     Returns
     -------
@@ -76,10 +80,9 @@ def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> 
     """
     from ..case import Case
     from ..result.store import Store
-    from ..solve.progress import Reporter
-    from ..solve.run import metadata_of, record
+    from ..solve.run import listeners, metadata_of, run_into
 
-    started, shown = time.perf_counter(), shown or Reporter()
+    started = time.perf_counter()
     target = Path(job.path)
     own = target.with_name(f"{target.stem}.{uuid.uuid4().hex[:8]}.nc") if apart else target
 
@@ -102,8 +105,9 @@ def solve_case(job: Job, apart: bool = False, shown: Reporter | None = None) -> 
                 before: Sequence[Step] = ()
             else:
                 own, began, store, before = restart.store.path, True, restart.store, restart.before
-            with shown.watching(case.title or target.stem, case.planned_steps):
-                record(case, store, shown, before=before)
+            follower = listeners(case, listener)
+            with follower.following(case.title or target.stem, case.planned_steps):
+                run_into(case, store, follower, before)
         apart = own != target
         if apart:
             os.replace(own, target)

@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,10 @@ from ..case import Case
 from ..deck.faults import Source
 from ..deck.kinds import Kind, Quantity, Whole, WordOr
 from ..deck.model import Table, kind_of
+from ..deck.read import assemble
 from ..deck.tables import Deck
 from ..deck.toml import with_overrides
-from ..deck.units import ANGLE
+from ..deck.units import NUMBER
 from ..deck.write import as_toml
 from ..errors import DeckError
 from ..text import shown
@@ -45,6 +46,10 @@ class Axis:
         How the deck reads a value.
     values : tuple
         The values as a deck would say them; empty for a range in a Latin hypercube.
+    bounds : (float, float) or None
+        The ends of a range in SI.
+    scale : str
+        How values lie in a range: linear or log.
     """
 
     key: str
@@ -53,6 +58,22 @@ class Axis:
     long_name: str
     kind: Kind | None
     values: tuple[Any, ...]
+    bounds: tuple[float, float] | None = None
+    scale: str = "linear"
+
+    def at(self, part: float) -> Any:
+        """Return the value at a fraction of the way, as a deck would say it."""
+        if self.bounds is None:
+            return self.values[int(part * len(self.values))]
+        low, high = self.bounds
+        if part in (0.0, 1.0):
+            value = self.bounds[int(part)]
+        elif self.scale == "log":
+            value = low * (high / low) ** part
+        else:
+            value = low + (high - low) * part
+        assert self.kind is not None
+        return round(value) if isinstance(self.kind, Whole) else self.kind.written(value)
 
     def coordinate(self, value: Any) -> float | str:
         """Return what the result says for a value: a number in SI, or the text of what is no number."""
@@ -98,18 +119,6 @@ class Plan:
     cases: tuple[PlannedCase, ...]
 
 
-@dataclass(frozen=True)
-class _StudySource(Source):
-    """Points at the study for what it set, at the deck for the rest."""
-
-    study: str = ""
-
-    def locate(self, key: str) -> str:
-        """Return "study.toml: parameter " or the place in the deck."""
-        place = super().locate(key)
-        return f"{self.study}: parameter " if place == "override: " else place
-
-
 def hash_of(deck: str) -> str:
     """Return the name of a case: a hash of the text of its deck."""
     return hashlib.sha256(deck.encode()).hexdigest()[:20]
@@ -143,7 +152,8 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     """
     base = {key: value for key, value in base.items() if key != "output"} | _output(base)
     keys = frozenset(parameter.key for parameter in file.parameter)
-    about = _StudySource(source.name, source.text, keys, source.included, study)
+    mark = f"{study}: parameter "
+    about = replace(source, overrides=keys, of_override=mark)
     for key in keys:
         if key == "output" or key.startswith("output.file"):
             raise DeckError(f"{study}: parameter {key}: a study names the files of its cases itself")
@@ -151,7 +161,7 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
     try:
         deck = Deck.parse(with_overrides(base, first), about)
     except DeckError as error:
-        raise DeckError(_with_case(str(error), about, 1, first), error.faults) from None
+        raise DeckError(_with_case(str(error), mark, 1, first), error.faults) from None
     axes = tuple(_axis(entry, deck, file.combine, study) for entry in file.parameter)
     _refuse_namesakes(axes, study)
     settings = _settings(file, axes, study)
@@ -160,10 +170,10 @@ def plan(file: StudyFile, base: Mapping[str, Any], source: Source, study: str, c
         try:
             merged = with_overrides(base, values)
             if check:
-                Case._made(merged, None, about)
+                Case._made(assemble(merged, source=about))
             cases.append(PlannedCase(position, values, as_toml(merged)))
         except DeckError as error:
-            sentences.append(_with_case(str(error), about, position + 1, values))
+            sentences.append(_with_case(str(error), mark, position + 1, values))
     if sentences:
         lines = _each_once("\n".join(sentences).splitlines())
         if (more := len(lines) - _MOST_TOLD) > 0:
@@ -182,9 +192,8 @@ def _output(base: Mapping[str, Any]) -> dict[str, Any]:
     return {"output": kept} if kept else {}
 
 
-def _with_case(error: str, source: _StudySource, number: int, settings: Mapping[str, Any]) -> str:
+def _with_case(error: str, mark: str, number: int, settings: Mapping[str, Any]) -> str:
     """Say with which parameters a deck is wrong where the key itself is none of them."""
-    mark = f"{source.study}: parameter "
     named = f" (in case {number}: {described(settings)})"
     keys = tuple(settings)
     lines = []
@@ -212,14 +221,13 @@ def _each_once(lines: Sequence[str]) -> list[str]:
 def _field(deck: Table, key: str) -> Any:
     """Find the field of a checked deck that a dotted key means; None for an entry of an array."""
     here: Any = deck
-    parts = key.split(".")
-    for part in parts[:-1]:
+    *parents, last = key.split(".")
+    for part in parents:
         if isinstance(here, list | tuple):
             here = here[int(part) - 1]
         else:
-            names = {info.alias or name: name for name, info in type(here).model_fields.items()}
-            here = getattr(here, names[part])
-    return type(here).known_keys()[parts[-1]] if isinstance(here, Table) else None
+            here = getattr(here, next(n for n, f in type(here).model_fields.items() if part in (n, f.alias)))
+    return type(here).known_keys()[last] if isinstance(here, Table) else None
 
 
 def _axis(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
@@ -228,25 +236,14 @@ def _axis(entry: Parameter, deck: Table, combine: str, study: str) -> Axis:
     values = entry.values or ()
     if isinstance(kind, WordOr) and isinstance(kind.kind, Quantity | Whole) and kind.word not in values:
         kind = kind.kind  # a number like any other
-    units = ""
-    if isinstance(kind, Quantity | Whole):
-        units = (kind.dimension.unit or "1") if isinstance(kind, Quantity) else "1"
-    axis = Axis(
-        entry.key,
-        entry.label,
-        units,
-        (info.description or "").partition(";")[0] if info else "",
-        kind,
-        values,
-    )
+    units = {Quantity: getattr(kind, "dimension", NUMBER).unit or "1", Whole: "1"}.get(type(kind), "")
+    long_name = (info.description or "").partition(";")[0] if info else ""
+    axis = Axis(entry.key, entry.label, units, long_name, kind, values)
     if entry.range is None:
         return axis
-    bounds = _bounds(axis, entry, study)
-    if combine == "lhs":
-        return axis
-    count = entry.count or 0
-    spread = [_between(axis, bounds, entry.scale, part) for part in np.linspace(0.0, 1.0, count)]
-    return Axis(axis.key, axis.name, units, axis.long_name, kind, tuple(spread))
+    axis = replace(axis, bounds=_bounds(axis, entry, study), scale=entry.scale)
+    parts = np.linspace(0.0, 1.0, 0 if combine == "lhs" else entry.count or 0).tolist()
+    return replace(axis, values=tuple(map(axis.at, parts)))
 
 
 def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
@@ -270,27 +267,11 @@ def _bounds(axis: Axis, entry: Parameter, study: str) -> tuple[float, float]:
     return low, high
 
 
-def _between(axis: Axis, bounds: tuple[float, float], scale: str, part: float) -> Any:
-    """Return the value at a fraction of a range, as a deck would say it."""
-    low, high = bounds
-    if part in (0.0, 1.0):
-        value = bounds[int(part)]
-    elif scale == "log":
-        value = low * (high / low) ** float(part)
-    else:
-        value = low + (high - low) * float(part)
-    if isinstance(axis.kind, Whole):
-        return round(value)
-    if isinstance(axis.kind, Quantity) and axis.kind.dimension is ANGLE:
-        return f"{value!r} rad"
-    return value
-
-
 def _settings(file: StudyFile, axes: Sequence[Axis], study: str) -> list[dict[str, Any]]:
     """Return the parameters of each case."""
     keys = [axis.key for axis in axes]
     if file.combine == "lhs":
-        return _latin_hypercube(file, axes, study)
+        return _latin_hypercube(file, axes)
     count = math.prod(len(axis.values) for axis in axes)
     if file.combine == "grid":
         if count > MOST_CASES:
@@ -299,21 +280,13 @@ def _settings(file: StudyFile, axes: Sequence[Axis], study: str) -> list[dict[st
     return [dict(zip(keys, row, strict=True)) for row in zip(*(a.values for a in axes), strict=True)]
 
 
-def _latin_hypercube(file: StudyFile, axes: Sequence[Axis], study: str) -> list[dict[str, Any]]:
+def _latin_hypercube(file: StudyFile, axes: Sequence[Axis]) -> list[dict[str, Any]]:
     from scipy.stats import qmc
 
     # `seed` is called `rng` in later versions of scipy, which still know it.
     sampler = qmc.LatinHypercube(len(axes), seed=np.random.default_rng(file.seed))
-    cases: list[dict[str, Any]] = []
-    for row in sampler.random(file.samples or 1):
-        values = {}
-        for axis, entry, part in zip(axes, file.parameter, row, strict=True):
-            if entry.range is None:
-                values[axis.key] = axis.values[int(part * len(axis.values))]
-            else:
-                values[axis.key] = _between(axis, _bounds(axis, entry, study), entry.scale, float(part))
-        cases.append(values)
-    return cases
+    rows = sampler.random(file.samples or 1).tolist()
+    return [{axis.key: axis.at(part) for axis, part in zip(axes, row, strict=True)} for row in rows]
 
 
 _TAKEN = ("case", "step", "status", "exit_code", "message", "case_number", "case_seconds")

@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from .._version import __version__
 from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
 from ..deck.toml import read_toml
@@ -34,7 +35,7 @@ from .tables import StudyFile
 if TYPE_CHECKING:
     import xarray
 
-    from ..solve.progress import Reporter
+    from ..solve.events import Listener
 
 __all__ = ["Outcome", "PlannedCase", "Study", "StudyWatcher", "run_study"]
 
@@ -266,7 +267,7 @@ class Study:
                 return kind, settings
         return LocalPool, jobs
 
-    def run_case(self, number: int, retry: bool = False, shown: Reporter | None = None) -> Outcome:
+    def run_case(self, number: int, retry: bool = False, listener: Listener | None = None) -> Outcome:
         """Run one case here, unless it is done; for job arrays.
 
         Parameters
@@ -275,8 +276,8 @@ class Study:
             Number of the case, as in the names of the files.
         retry : bool
             Also if it failed by itself before.
-        shown : Reporter, optional
-            Who is told about each load step.
+        listener : Listener, optional
+            Follows the run, besides the log.
 
         Returns
         -------
@@ -290,7 +291,7 @@ class Study:
         case = known[number]
         if number not in missing:
             return self.folder.failure(case) or Outcome(case.hash)
-        outcome = solve_case(self._job(case), shown=shown)
+        outcome = solve_case(self._job(case), listener=listener)
         self.folder.note(case, outcome)
         return outcome
 
@@ -302,7 +303,6 @@ class Study:
         DeckError, ResourceError
             If it cannot be written.
         """
-        from .._version import __version__
         from . import collect as study_collect
 
         self.folder.enter(self.plan)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from .refinement import least_and_most
+
 if TYPE_CHECKING:
-    from ..problem.problem import Problem
+    from .problem import Problem
 
 # Operator applications of a load step to 1e-8, as measured on meshes of 20 to 60 spacings in the radius.
 # Without friction they are of the pressure alone, a third of an application each.
@@ -52,8 +54,6 @@ def seconds(case: Problem) -> float | None:
 
 def work(case: Problem) -> str:
     """Say it in words: "about 1,800 operator applications, about 4 s on one core"."""
-    from .lattices import least_and_most
-
     runs = least_and_most(case) if case.accuracy else ([case],)
     applications = [_total(operator_applications(one) for one in cases) for cases in runs]
     times = [_total(seconds(one) for one in cases) for cases in runs]

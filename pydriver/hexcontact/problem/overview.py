@@ -1,24 +1,62 @@
-"""What is going to be run, as rows of a table."""
+"""What is going to be run: rows of a table, and parameters that a result and the log keep."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+import os
+import platform
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
+from ..deck.kinds import Quantity
 from ..text import percent, quantity
+from .estimates import work
+from .refinement import least_and_most
 
 if TYPE_CHECKING:
+    from ..core.lattice import Lattice
     from ..deck.surfaces import Surface
     from ..deck.tables import Body
-    from ..problem.problem import Problem
+    from .problem import Problem
 
 Row = tuple[str, ...]
 
 
-def case_rows(case: Problem) -> list[Row]:
-    """Return what would be run."""
-    from .estimates import work
+def parameters_of(case: Problem) -> dict[str, Any]:
+    """Return what describes a case and how it is solved, and the machine that does it."""
+    return {
+        "effective_modulus": case.pair.effective_modulus,
+        "dundurs_beta": case.pair.beta,
+        "tangential_compliance_ratio": case.pair.gamma,
+        "friction_coefficient": case.friction_coefficient,
+        "algorithm": case.solver.algorithm,
+        "coupling": case.solver.coupling,
+        "entry": case.solver.entry,
+        "tolerance": case.solver.tolerance,
+        **({"step_tolerance": case.solver.step_tolerance} if case.adaptive else {}),
+        **({"accuracy_target": case.accuracy.target} if case.accuracy else {}),
+        "machine": _machine(),
+    }
 
+
+def _machine() -> str:
+    """Say what the program runs on: "node7, Linux x86_64, 16 processors"."""
+    count = os.cpu_count() or 1
+    return (
+        f"{platform.node()}, {platform.system()} {platform.machine()}, {count} processor{'s' * (count > 1)}"
+    )
+
+
+def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:
+    """Return what would be run.
+
+    Parameters
+    ----------
+    case : Problem
+        The problem.
+    memory : callable, optional
+        Estimates the memory (bytes) that a run on a window takes; without it the table does not name it.
+    """
     lattice = case.lattice
     span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)  # the window may be too large to fill
     return [
@@ -39,23 +77,18 @@ def case_rows(case: Problem) -> list[Row]:
         ("load steps", _history(case)),
         ("largest load", _largest(case)),
         ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
-        ("memory", _memory(case)),
+        *([("memory", _memory(case, memory))] if memory else []),
         ("work", work(case)),
     ]  # fmt: skip
 
 
-def _memory(case: Problem) -> str:
-    from .frictionless import peak_memory
-    from .lattices import least_and_most
-
+def _memory(case: Problem, memory: Callable[[Problem, Lattice], int]) -> str:
     last = [cases[-1] for cases in least_and_most(case)] if case.accuracy else [case]
-    return " to ".join(quantity(peak_memory(one, one.lattice), "B", 3) for one in last)
+    return " to ".join(quantity(memory(one, one.lattice), "B", 3) for one in last)
 
 
 def _accuracy(case: Problem) -> str:
     """Say what is to be reached, and between which lattices the refinement will end."""
-    from .lattices import least_and_most
-
     assert case.accuracy is not None
     last = [cases[-1].lattice for cases in least_and_most(case)]
     spacings = [quantity(lattice.spacing, "m") for lattice in last]
@@ -106,8 +139,6 @@ def _body(body: Body) -> str:
 
 
 def _surface(surface: Surface | None) -> str:
-    from ..deck.kinds import Quantity
-
     if surface is None:
         return "flat"
     given = [surface.shape]

@@ -1,0 +1,65 @@
+"""Lattices on which a problem is solved until its accuracy is reached: each finer by the square root of two.
+
+Shifted copies of a lattice have its spacing and origins moved by fractions of it; they serve to estimate
+errors (theory, section 12).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .problem import Problem
+
+RATIO = math.sqrt(2.0)  # of the spacings of a lattice and the next finer one
+LEAST_LEVELS = 3
+# Origins of the shifted copies, in spacings along both basis vectors: multiples of (1/g, 1/g^2) with
+# g^3 = g + 1, which no row or symmetry of the lattice takes to each other.
+SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A lattice to solve the case on.
+
+    Parameters
+    ----------
+    level : int
+        How often it was refined.
+    copy : int
+        0: the lattice itself, else the number of its shifted copy.
+    """
+
+    level: int
+    copy: int = 0
+
+    def case(self, case: Problem) -> Problem:
+        """Return the case on this lattice."""
+        spacing = case.lattice.spacing / RATIO**self.level
+        origin = np.array(case.lattice.origin)
+        if self.copy:
+            origin += SHIFTS[self.copy - 1] @ case.lattice.basis / RATIO**self.level
+        return case.on_lattice(spacing, (float(origin[0]), float(origin[1])))
+
+    @property
+    def name(self) -> str:
+        """Say which one it is: "lattice 3", "lattice 1, shifted (2 of 4)"."""
+        shifted = f", shifted ({self.copy} of {len(SHIFTS)})" if self.copy else ""
+        return f"lattice {self.level + 1}{shifted}"
+
+
+def least_and_most(case: Problem) -> tuple[list[Problem], list[Problem]]:
+    """Return a case on all lattices of the shortest refinement, and of the longest that max_nodes allows.
+
+    The last one is the finest.
+    """
+    assert case.accuracy is not None
+    coarse, levels = Trial(0).case(case), [Trial(level).case(case) for level in range(LEAST_LEVELS)]
+    least = [coarse] * len(SHIFTS) + levels
+    while (finer := Trial(len(levels)).case(case)).lattice.size <= case.accuracy.max_nodes:
+        levels.append(finer)
+    return least, [*(levels[: 1 - LEAST_LEVELS] * len(SHIFTS)), *levels]

@@ -1,0 +1,167 @@
+"""Load steps of a problem, solved one after the other on windows that grow with the contact."""
+
+from __future__ import annotations
+
+import logging
+import time
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._version import __version__
+from ..deck.series import LOADS
+from ..errors import DeckError, PathWarning
+from ..problem.overview import parameters_of
+from ..result.history import unasked_path
+from ..result.step import Step
+from . import nonconvergence
+from .adaptive import AdaptivePath
+from .events import Listener
+from .frictional import FrictionWindow
+from .frictionless import NormalWindow, Window
+from .log import Log
+
+if TYPE_CHECKING:
+    from ..core.lattice import Lattice
+    from ..problem.loads import LoadStep
+    from ..problem.problem import Problem
+
+_SAME = 1e-9  # relative difference of initial gaps that are the same
+
+
+def window_type(case: Problem) -> type[Window[Any]]:
+    """Return the kind of window that the algorithm of a case needs."""
+    return FrictionWindow if case.frictional else NormalWindow
+
+
+def check_step(case: Problem, last: Step, found: str) -> None:
+    """Refuse a finished step whose lattice or surfaces are not those of a case; `found` names it."""
+    if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
+        raise DeckError(f"the deck now leads to another lattice than that of the {found}")
+    gap, touching = case.initial_gap(last.lattice)
+    then = last.fields["initial_gap"]
+    if (touching != np.isfinite(then)).any() or not np.allclose(
+        gap[touching], then[touching], rtol=_SAME, atol=_SAME * np.abs(then[touching]).max(initial=0.0)
+    ):
+        raise DeckError(f"the surfaces are no longer those of the {found}")
+
+
+def steps(
+    case: Problem,
+    in_memory: bool = False,
+    before: Sequence[Step] = (),
+    targets: Iterable[LoadStep] | None = None,
+    listener: Listener | None = None,
+) -> Iterator[Step]:
+    """Solve a case step by step.
+
+    Parameters
+    ----------
+    case : Problem
+        The checked problem.
+    in_memory : bool
+        The caller keeps the fields of all steps, so that there has to be memory for them.
+    before : sequence of Step
+        The first steps if they are solved already: the heads of them, the last one with all its fields. What
+        follows is to the bit what it would have been in one go.
+    targets : iterable of LoadStep, optional
+        What comes after them instead of the rest of the case; each is asked for when the one before is
+        solved.
+    listener : Listener, optional
+        Follows it; default: the log. Finished steps are the caller's to announce.
+
+    Yields
+    ------
+    Step
+        Each load step when it is finished.
+
+    Raises
+    ------
+    DeckError
+        If the contact outgrows a fixed window.
+    ConvergenceError
+        If a load step misses its tolerance, or the bodies slide on each other without end.
+    ResourceError
+        If there is not enough memory.
+    """
+    listener = listener or Log()
+    lattice = before[-1].lattice if before else case.lattice
+    started, done = time.perf_counter(), len(before)
+    _announce(case, lattice, done, listener)
+    held = len(case.load_steps) if in_memory else 0
+    for step in _solved(case, window_type(case)(case, lattice, held, listener), before, targets):
+        case.check_contact(step.number, step.lattice, step.fields["zone"] > 0)
+        yield step
+        done = step.number
+    listener.said("finished", steps=done, seconds=time.perf_counter() - started)
+
+
+def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) -> None:
+    """Say that the load history begins, or goes on after so many steps."""
+    known = parameters_of(case)
+    values: dict[str, Any] = {"title": case.title, "version": __version__, "machine": known["machine"]}
+    values["steps"] = case.planned_steps or "auto"
+    if done:
+        values["done"] = done
+    values |= {"window": lattice.shape, "spacing": lattice.spacing, "method": case.method_for(lattice)}
+    named = ("algorithm", "friction_coefficient", "coupling", "entry", "tolerance")
+    values |= {name: known[name] for name in named}
+    listener.said("resumed" if done else "begun", **values)
+
+
+def _solved(
+    case: Problem, window: Any, before: Sequence[Step], targets: Iterable[LoadStep] | None
+) -> Iterator[Step]:
+    """Solve step by step, from a window on; see `steps`."""
+    state: Any = window.restored(before[-1]) if before else None
+    adaptive = AdaptivePath(case, window, before) if case.adaptive and targets is None else None
+    segment, begun, reached_by_now = -1, _standing({}), _standing({})
+    for step in before:
+        if step.history["segment"] != segment + 1:
+            segment, begun = int(step.history["segment"]) - 1, reached_by_now
+        reached_by_now = _standing(step.history)
+    if targets is None:
+        targets = case.load_steps[adaptive.position if adaptive else len(before) :]
+    for target in targets:
+        started = time.perf_counter()
+        if target.segment != segment:
+            segment, begun = target.segment, reached_by_now
+        if adaptive and target.ramp is not None:
+            for step, reached in adaptive.steps(state, target, begun):
+                _warn_of_path(case, step, state, window.listener)
+                yield step
+                state, reached_by_now = reached, _standing(step.history)
+            window = adaptive.window
+            continue
+        if adaptive:
+            target = adaptive.numbered(target)
+        values = target.values(begun)
+        # a step that reached the rim is solved again on a larger window, from where it began
+        while window.outgrown(reached := window.advance(state, target, values)):
+            smaller, window = window.lattice, window.grown(reached, target)
+            state = window.carried(state, smaller)
+        if not reached.converged:
+            raise nonconvergence.error(case, window.lattice, reached, target, values)
+        step = window.step(target, reached, state, started)
+        if adaptive:
+            adaptive.window, step = window, adaptive.given(step)
+        _warn_of_path(case, step, state, window.listener)
+        yield step
+        state, reached_by_now = reached, _standing(step.history)
+
+
+def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) -> None:
+    """Warn of a load step that was halved where nothing prescribes the path of its parts."""
+    static = case.solver.algorithm == "static"
+    if step.history.get("cuts") and (static or before is None or not (before.pressure > 0).any()):
+        in_parts = float(step.history["residual_tangential"]) > case.solver.tolerance
+        words = unasked_path([step.number], in_parts)
+        listener.said("halved", level=logging.WARNING, step=step.number, warning=words)
+        warnings.warn(words, PathWarning, stacklevel=2)
+
+
+def _standing(history: Mapping[str, Any]) -> dict[str, float]:
+    """Return the loads and motions at the end of a step by the keys of the deck; none are zero."""
+    return {name: float(history.get(name, 0.0)) for pair in LOADS.values() for name in pair}

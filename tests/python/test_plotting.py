@@ -312,7 +312,7 @@ def test_history_shows_each_quantity_over_the_steps() -> None:
 
 def test_field_is_drawn_on_equilateral_triangles_where_there_is_pressure() -> None:
     view = StepView.of(sphere(), -1)
-    found = plotting_maps.triangles(view, view.pressure)
+    found = plotting_maps.mesh_of(view, view.pressure, view.contact)
     assert found is not None
     mesh, values = found
     corners = np.stack([mesh.x, mesh.y], axis=1)[mesh.triangles]
@@ -326,7 +326,7 @@ def test_field_is_drawn_on_equilateral_triangles_where_there_is_pressure() -> No
 
 def test_a_huge_field_is_thinned_out() -> None:
     view = StepView.of(sphere(half=330, spacing=0.0035), -1)
-    found = plotting_maps.triangles(view, view.pressure)
+    found = plotting_maps.mesh_of(view, view.pressure, view.contact)
     assert found is not None
     mesh, values = found
     assert (

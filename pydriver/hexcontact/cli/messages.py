@@ -66,7 +66,7 @@ class Messages:
     def interrupted(self, signaled: Interrupted, kept: str, **about: Any) -> NoReturn:
         """Say what is kept after a signal and end the process, whatever the core is doing."""
         message = f"interrupted; {kept}"
-        with contextlib.suppress(OSError):  # nobody listens any more
+        with contextlib.suppress(OSError):  # standard error is closed
             log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", **about))
             log.logger.disabled = True  # for what is still at work
             complain(message)

@@ -20,7 +20,7 @@ class StudyLines(StudyWatcher):
 
     @contextlib.contextmanager
     def watching(self, study: Study, missing: int) -> Iterator[None]:
-        """Say first what there is to do."""
+        """Print the title and the number of cases first."""
         self.total, self.study = missing, study
         self._print(f"{study.title}: {_of_study(study, missing)}")
         yield
@@ -33,7 +33,7 @@ class StudyLines(StudyWatcher):
         self._print(f"{place}  case {number} ({case}): {_ending(outcome)}")
 
     def _print(self, line: str) -> None:
-        with contextlib.suppress(OSError):  # nobody listens any more; the study goes on
+        with contextlib.suppress(OSError):  # the stream is closed; the study goes on
             print(visible(line), file=self.stream, flush=True)
 
 

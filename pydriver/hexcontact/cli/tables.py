@@ -359,7 +359,7 @@ def file_rows(result: Result) -> list[Row]:
 
 
 def _reached(attributes: Mapping[str, Any]) -> str:
-    """Say whether the accuracy that was asked for is reached."""
+    """Say whether the target of the accuracy is reached."""
     if "accuracy_shortfall" in attributes:
         return str(attributes["accuracy_shortfall"])
     error, target = (percent(float(attributes[f"accuracy_{name}"])) for name in ("estimate", "target"))

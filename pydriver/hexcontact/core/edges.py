@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
 
-_STEPS = np.array([(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)])  # to the neighbors, (row, col)
-_TO = np.stack([_STEPS[:, 1] + 0.5 * _STEPS[:, 0], np.sqrt(0.75) * _STEPS[:, 0]], axis=1)  # in the plane
+# steps (row, col) to the neighbors of a node, counterclockwise
+NEIGHBORS = np.array([(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)])
+_TO = NEIGHBORS[:, ::-1] @ np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])  # in the plane
 _FAR = 3  # steps over which nodes next to the edge get their slope from nodes that have one
 _LEAST = 1e-9  # distance of a node inside
 _HALF_WAY = 0.5  # distance of a node where there is no slope: the zone is too small, or not sharply bounded
@@ -211,7 +212,7 @@ class _Band:
     def __init__(self, zone: Mask) -> None:
         near = np.pad(boundary(zone), self.MARGIN)
         self.n_col = near.shape[1]
-        steps: Index = _STEPS @ np.array([self.n_col, 1])
+        steps: Index = NEIGHBORS @ np.array([self.n_col, 1])
         near = near.ravel()
         for _ in range(_FAR + 1):
             near = np.logical_or.reduce([near, *(np.roll(near, step) for step in steps)])

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core import estimators
 from ..core.edges import ContactEdges, Edge
 from ..result.view import StepView, worded
+from .maps import mesh_of
 from .plane import Part
 from .registry import figure
 from .style import COMPUTED, IN_CONTACT, SLIP, STICK, THIRD, set_title
@@ -32,7 +33,7 @@ _APART = 80  # spacings over the width of the picture up to which nodes can be t
 def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
     """Draw the nodes in contact on the lattice, the circle (9.1)-(9.2) or ellipse fitted to them, and Hertz.
 
-    With friction the sticking nodes are told apart, and an ellipse is fitted to them, too (Figure 9.4).
+    With friction sticking nodes have a color of their own, and an ellipse is fitted to them, too (Figure 9.4).
 
     Parameters
     ----------
@@ -64,7 +65,10 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
     pitch = 240.0 / across  # points between nodes
     if across < _APART:
         shown = (view.x > x_min) & (view.x < x_max) & (view.y > y_min) & (view.y < y_max)
-        axes.add_collection(_lattice_lines(x, y, shown))
+        if (found := mesh_of(view, view.pressure, shown)) is not None:
+            mesh, _ = found
+            at = mesh.x * part.factor, mesh.y * part.factor
+            axes.triplot(*at, mesh.triangles, color="0.85", lw=0.4, zorder=0)
     inside_size = 0.45 * pitch if across < _APART else 2.0 * pitch  # too many to tell apart: an area
     dot: dict[str, Any] = {"marker": "o", "mew": 0, "ls": "", "rasterized": across > _APART}
     stick = view.contact & view.stick if view.friction else None
@@ -118,18 +122,3 @@ def _fitted(
         radius = estimators.boundary_circle(view.x, view.y, zone, view.spacing, center).radius
         return estimators.Ellipse(radius, radius, 0.0, center), f"circle, {letter} = {worded(radius, 'm')}"
     return moments, f"ellipse, {worded(moments.semi_major, 'm')} by {worded(moments.semi_minor, 'm')}"
-
-
-def _lattice_lines(x: Array, y: Array, shown: Mask) -> LineCollection:
-    """Edges of the lattice's triangles between nodes of the picture."""
-    segments = []
-    for here, there in (
-        ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
-        ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
-        ((slice(None, -1), slice(1, None)), (slice(1, None), slice(None, -1))),
-    ):
-        both = shown[here] | shown[there]
-        segments.append(
-            np.stack([np.stack([x[end][both], y[end][both]], axis=-1) for end in (here, there)], axis=1)
-        )
-    return LineCollection(cast(Any, np.concatenate(segments)), colors="0.85", linewidths=0.4, zorder=0)

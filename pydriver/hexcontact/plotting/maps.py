@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from ..result.mesh import triangles
 from ..result.view import StepView, scaled
 from .plane import ARROWS, FEWER_ARROWS, Part, map_panels, views_of
 from .registry import figure, styled
@@ -26,14 +27,15 @@ if TYPE_CHECKING:
     from ..result.result import Result
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 DRAWN_NODES = 60_000  # nodes beyond which a field is drawn from every second, third, ... node
 LEAST_ASPECT = 0.6  # of a single map, so that there is room for a color bar beside it
 _WITH_ARROWS = 9  # maps in a picture up to which their arrows can be seen
 
 
-def triangles(view: StepView, values: Array) -> tuple[Triangulation, Array] | None:
-    """Return the triangles of the lattice where there is pressure, and the values at their corners.
+def mesh_of(view: StepView, values: Array, where: Mask) -> tuple[Triangulation, Array] | None:
+    """Return the triangles of the lattice with a corner at some of the nodes, and the values at all corners.
 
     Parameters
     ----------
@@ -41,15 +43,13 @@ def triangles(view: StepView, values: Array) -> tuple[Triangulation, Array] | No
         The step.
     values : ndarray, shape (n_row, n_col)
         A field.
+    where : ndarray of bool, shape (n_row, n_col)
+        The nodes; of more than `DRAWN_NODES` in contact only some are taken.
     """
     stride = int(np.ceil(np.sqrt((1 + int(view.contact.sum())) / DRAWN_NODES)))
-    x, y, contact, shown = (f[::stride, ::stride] for f in (view.x, view.y, view.contact, values))
-    n_row, n_col = x.shape
-    number = np.arange(x.size).reshape(n_row, n_col)
-    first, right = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
-    above, across = number[1:, :-1].ravel(), number[1:, 1:].ravel()
-    corners = np.concatenate([np.stack([first, right, above], 1), np.stack([right, across, above], 1)])
-    corners = corners[contact.ravel()[corners].any(axis=1)]
+    x, y, shown = (f[::stride, ::stride] for f in (view.x, view.y, values))
+    corners = triangles(*x.shape)
+    corners = corners[where[::stride, ::stride].ravel()[corners].any(axis=1)]
     if not corners.size:
         return None
     used, renumbered = np.unique(corners, return_inverse=True)
@@ -127,7 +127,7 @@ def draw_field(
     factor, unit = scaled(largest, field.unit)
     shades: TriMesh | None = None
     for axes, view, field_values in zip(panels, views, values, strict=True):
-        drawn = triangles(view, field_values)
+        drawn = mesh_of(view, field_values, view.contact)
         if drawn is None:
             axes.text(0.5, 0.5, "no contact", transform=axes.transAxes, ha="center", va="center")
         else:

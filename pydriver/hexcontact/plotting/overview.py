@@ -1,4 +1,4 @@
-"""What there is to see of a load step, in one picture."""
+"""A load step in several pictures: maps, a section, the history."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @figure("overview", "pressure and a section; with friction shear and zones, too", first=True)
 def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
-    """Draw what there is to see of a load step.
+    """Draw a load step in several pictures.
 
     Without friction that is the pressure over the plane and along x; with friction the shear traction, the
     zones and the history, too.

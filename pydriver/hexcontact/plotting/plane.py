@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Limits = tuple[float, float, float, float]
 
-ARROWS, FEWER_ARROWS = 13, 9  # about so many across the contact, in a large and a small picture
+ARROWS, FEWER_ARROWS = 13, 9  # about, across the contact, in a large and a small picture
 _WIDTH = 7.2  # inches of a picture with several panels
 
 

@@ -61,7 +61,7 @@ class Cut:
     at_nodes : bool
         Whether these are nodes.
     through : tuple of float, optional
-        The point that was asked for, if it was.
+        The point that the line passes through, if one was given.
     """
 
     line: Line

@@ -13,6 +13,7 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, PartialSlip
+from ..core.edges import NEIGHBORS
 from ..result.view import StepView, as_list, dataset_of
 from .plane import FEWER_ARROWS, Part, map_panels, views_of
 from .registry import figure
@@ -26,16 +27,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Neighbors of a node counterclockwise, as steps in (row, col), and the corner of its cell before each: the
-# middle of a triangle of the lattice, as (1 for an upper triangle, row, col).
-_SIDES = (
-    ((0, 1), (1, -1, 0)),
-    ((1, 0), (0, 0, 0)),
-    ((1, -1), (1, 0, -1)),
-    ((0, -1), (0, 0, -1)),
-    ((-1, 0), (1, -1, -1)),
-    ((-1, 1), (0, -1, 0)),
-)
+# The corner of a node's cell before each of `NEIGHBORS`: the middle of a triangle, as (1 for an upper one,
+# row, col).
+_CORNERS = ((1, -1, 0), (0, 0, 0), (1, 0, -1), (0, 0, -1), (1, -1, -1), (0, -1, 0))
 
 
 def cell_outline(zone: Mask, basis: Array, start: tuple[float, float]) -> list[Array]:
@@ -62,22 +56,19 @@ def cell_outline(zone: Mask, basis: Array, start: tuple[float, float]) -> list[A
     n_col = padded.shape[1]
     begins: list[NDArray[np.int64]] = []
     ends: list[NDArray[np.int64]] = []
-    for number, ((row, col), corner) in enumerate(_SIDES):
-        side = padded & ~np.roll(padded, (-row, -col), axis=(0, 1))
-        nodes = np.argwhere(side)
-        following = _SIDES[(number + 1) % 6][1]
-        for corners, (up, j, i) in ((begins, corner), (ends, following)):
-            corners.append(((nodes[:, 0] + j) * n_col + nodes[:, 1] + i) * 2 + up)
+    for number, step in enumerate(NEIGHBORS):
+        nodes = np.argwhere(padded & ~np.roll(padded, -step, axis=(0, 1)))
+        for ids, (up, j, i) in ((begins, _CORNERS[number]), (ends, _CORNERS[(number + 1) % 6])):
+            ids.append(((nodes[:, 0] + j) * n_col + nodes[:, 1] + i) * 2 + up)
     after = dict(zip(np.concatenate(begins).tolist(), np.concatenate(ends).tolist(), strict=True))
     polygons = []
     while after:
         first, corner_id = after.popitem()
-        ids_of_loop = [first, corner_id]
+        polygon = [first, corner_id]
         while corner_id != first:
             corner_id = after.pop(corner_id)
-            ids_of_loop.append(corner_id)
-        ids = np.array(ids_of_loop)
-        triangle, upper = ids // 2, ids % 2
+            polygon.append(corner_id)
+        triangle, upper = np.divmod(polygon, 2)
         index = np.stack([triangle % n_col, triangle // n_col], axis=1) - 1 + (1.0 + upper[:, None]) / 3.0
         polygons.append(np.asarray(start) + index @ basis)
     return polygons

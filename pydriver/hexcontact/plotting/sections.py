@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Point = tuple[float, float]
 
-_APART = 100  # nodes along a line that can be told apart
+_APART = 130  # nodes along a line that can be told apart
 _FINER = 8  # points between nodes where the line misses them: closed solutions are curved there
 
 
@@ -159,7 +159,7 @@ class Cut:
         """Return how values are drawn: nodes as circles if they can be told apart."""
         if not self.few:
             return {"ls": "-"}
-        size = 3.5 if self.place.size < 60 else 2.5
+        size = 3.5 if self.place.size < 80 else 2.5
         return {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9, "ls": ""}
 
     def beside(self, color: str, family: bool = False) -> dict[str, Any]:

@@ -33,7 +33,7 @@ _APART = 80  # spacings over the width of the picture up to which nodes can be t
 def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
     """Draw the nodes in contact on the lattice, the circle (9.1)-(9.2) or ellipse fitted to them, and Hertz.
 
-    With friction sticking nodes have a color of their own, and an ellipse is fitted to them, too (Figure 9.4).
+    With friction sticking nodes have a color of their own, and an ellipse fitted to them (Figure 9.4).
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
         shown = (view.x > x_min) & (view.x < x_max) & (view.y > y_min) & (view.y < y_max)
         if (found := mesh_of(view, view.pressure, shown)) is not None:
             mesh, _ = found
-            at = mesh.x * part.factor, mesh.y * part.factor
-            axes.triplot(*at, mesh.triangles, color="0.85", lw=0.4, zorder=0)
+            edges = np.stack([mesh.x, mesh.y], axis=1)[mesh.edges] * part.factor
+            axes.add_collection(LineCollection(cast(Any, edges), colors="0.85", linewidths=0.4, zorder=0))
     inside_size = 0.45 * pitch if across < _APART else 2.0 * pitch  # too many to tell apart: an area
     dot: dict[str, Any] = {"marker": "o", "mew": 0, "ls": "", "rasterized": across > _APART}
     stick = view.contact & view.stick if view.friction else None

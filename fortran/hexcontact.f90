@@ -9,6 +9,7 @@
 module hexcontact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
+  use hc_options, only: options_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_field_space, only: field_space_t, space_over
   use hc_triangle_integrals, only: triangle_integral, triangle_integrals, is_supported, vertex_kernels, &
@@ -24,15 +25,27 @@ module hexcontact
                               load_target_t, force_control, displacement_control, about_z, n_motion, touches_rim, &
                               not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, &
                               out_of_range
+  use hc_friction_law, only: friction_law_t
+  use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_coulomb, only: coulomb_t
   use hc_contact_residuals, only: normal_residual, tangential_residual, force_residual
-  use hc_contact_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: contact_solver_t, friction_solver_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_load_path, only: advance
+  use hc_adaptive_path, only: adaptive_path_t
+  use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed
+  use hc_step_error, only: step_change_t, compare_halves
+  use hc_discretization_error, only: limits_of_error
+  use hc_zone_estimators, only: boundary, boundary_circle, circle_fit_t, area_radius, edge_radius, pressure_center, &
+                                moment_ellipse, edge_ellipse, ellipse_t
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
+  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   implicit none
   public
 end module hexcontact

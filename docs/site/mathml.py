@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,13 @@ from sphinx.util.fileutil import copy_asset_file
 
 logger = logging.getLogger(__name__)
 converter = LatexToMathML(fancy_error=False)
+# Number of an equation, which the converter takes in numbered environments only.
+TAG = re.compile(r"\\tag\{(\w+)\}\s*$")
 # Not every system has a font for formulas, so that the site brings one.
 FONT = Path(ziamath.__file__).parent / "fonts/STIXTwoMath-Regular.ttf"
 
 
-def converted(node: nodes.Element, display: bool) -> str:
-    latex = node.astext()
+def converted(node: nodes.Element, latex: str, display: bool) -> str:
     try:
         return converter.convert_with_local_state(latex, displaystyle=display)
     except LatexError as error:
@@ -29,12 +31,16 @@ def converted(node: nodes.Element, display: bool) -> str:
 
 
 def inline(writer: Any, node: nodes.Element) -> None:
-    writer.body.append(converted(node, display=False))
+    writer.body.append(converted(node, node.astext(), display=False))
     raise nodes.SkipNode
 
 
 def block(writer: Any, node: nodes.Element) -> None:
-    writer.body.append(f'<div class="formula">{converted(node, display=True)}</div>')
+    latex = node.astext()
+    tag = TAG.search(latex)
+    number = f'<span class="number">({tag[1]})</span>' if tag else ""
+    formula = converted(node, TAG.sub("", latex), display=True)
+    writer.body.append(f'<div class="formula">{formula}{number}</div>')
     raise nodes.SkipNode
 
 

@@ -5,12 +5,14 @@
 !>
 !>     g = h + w - approach,   s = (u1 - u2) - shift - twist x r,   ds = s - s^n,
 !>
-!> where w, u1 - u2 are the flexibility operator's. `friction_solver_t` is what
-!> both methods, on LAPACK and on FFTs, look like from outside.
+!> where w, u1 - u2 are the flexibility operator's.
+!>
+!> Equations: docs/theory/conditions.md, (C1) to (C4).
 module hc_contact_problem
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi
-  use hc_error, only: error_t, status, raise
+  use hc_error, only: error_t
+  use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -20,20 +22,14 @@ module hc_contact_problem
     loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
     tangential_residual, force_residual, least_traction
-  use hc_coulomb, only: coulomb_t
-  use hc_friction_rows, only: zone_row
+  use hc_friction_law, only: friction_law_t
+  use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_transfer, only: restrict_field, restrict_mask
+  use hc_window_part, only: part_of
   implicit none
   private
 
-  public :: friction_problem_t, new_friction_problem, friction_solver_t
-  public :: classification_scale
-
-  !> Scale kappa of the classification parameter: r = kappa/(2 pi lambda_1 (1 + gamma) a).
-  real(wp), parameter :: classification_scale = 10.0_wp
-
-  !> |beta| min(mu, 1) from which pressure and shear traction are better found together.
-  real(wp), parameter :: strong_coupling = 0.03_wp
+  public :: friction_problem_t, new_friction_problem
 
   !> What is given.
   type :: friction_problem_t
@@ -42,7 +38,9 @@ module hc_contact_problem
     !> Elastic constants of the two bodies
     type(elastic_pair_t) :: pair
     !> Law of friction
-    type(coulomb_t) :: friction
+    class(friction_law_t), allocatable :: friction
+    !> Law of contact along the normal
+    class(normal_law_t), allocatable :: normal_law
     !> Goodman's approximation: shear tractions do not move the pressure
     logical :: goodman = .false.
     !> Initial gap (n_col, n_row) [m]
@@ -53,11 +51,15 @@ module hc_contact_problem
     real(wp), allocatable :: x(:, :), y(:, :)
     !> Self-compliances d_n and d_t of a node [m/Pa]
     real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
+    !> Tolerances, caps and tuning numbers of whoever solves it
+    type(options_t) :: options
     !> Threads that share the passes over its nodes
     type(field_space_t) :: space
   contains
     !> The same problem on the lattice of every second node
-    procedure :: coarsened
+    procedure :: coarsen
+    !> The same problem on a part of its window
+    procedure :: take_part
     !> Will the bodies touch?
     procedure :: is_pressed
     !> Do pressure and shear traction act strongly on each other?
@@ -70,65 +72,18 @@ module hc_contact_problem
     procedure :: rigid_displacement
     !> Resultants of given tractions
     procedure :: resultants
-    !> Classification parameter r of the tangential conditions
-    procedure :: classification_parameter
+    !> Classification parameters r of the tangential conditions and r' of those along the normal
+    procedure :: classification_parameter, normal_classification_parameter
     !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known
     procedure :: conclude
     !> Residuals of its loads alone
     procedure :: judge_loads
   end type friction_problem_t
 
-  !> A method of solving it.
-  type, abstract :: friction_solver_t
-    type(friction_problem_t) :: problem
-  contains
-    !> One load step
-    procedure(solve_step), deferred :: solve_step
-    !> Relative displacements (w, u_x, u_y) of given tractions
-    procedure(solver_displacements), deferred :: displacements
-  end type friction_solver_t
-
-  abstract interface
-    !> Tractions and motions at the end of a load step.
-    !>
-    !> `state%converged` tells whether all residuals are within the tolerance. The
-    !> accumulated quantities (slip path, dissipated energy) are left alone.
-    subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
-      import :: friction_solver_t, contact_state_t, load_target_t, wp, error_t
-      class(friction_solver_t), intent(inout), target :: self
-      !> State to start the iteration from; without pressure anywhere: none
-      type(contact_state_t), intent(in) :: start
-      !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
-      real(wp), intent(in) :: reference(:, :, :)
-      !> Loads or motions to be reached
-      type(load_target_t), intent(in) :: target
-      !> Bound of all residuals
-      real(wp), intent(in) :: tolerance
-      !> Active sets that may be tried
-      integer, intent(in) :: max_sweeps
-      !> State at the end of the step, converged or not
-      type(contact_state_t), intent(out) :: state
-      !> Allocated on failure: memory, an operator that is not positive definite
-      type(error_t), allocatable, intent(out) :: error
-    end subroutine solve_step
-
-    !> Relative displacements (w, u_x, u_y) of given tractions.
-    subroutine solver_displacements(self, pressure, traction, displacement, error)
-      import :: friction_solver_t, wp, error_t
-      class(friction_solver_t), intent(inout) :: self
-      !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
-      real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
-      !> w, u_x, u_y (n_col, n_row, 3) [m]
-      real(wp), intent(out), contiguous :: displacement(:, :, :)
-      !> Allocated on failure
-      type(error_t), allocatable, intent(out) :: error
-    end subroutine solver_displacements
-  end interface
-
 contains
 
   !> A problem from what is given.
-  subroutine new_friction_problem(problem, lattice, pair, initial_gap, candidate, friction, goodman, error)
+  subroutine new_friction_problem(problem, lattice, pair, initial_gap, candidate, friction, goodman, error, normal_law)
     !> Problem to be set up
     type(friction_problem_t), intent(out) :: problem
     !> Lattice and window
@@ -140,24 +95,26 @@ contains
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
     !> Law of friction
-    type(coulomb_t), intent(in) :: friction
+    class(friction_law_t), intent(in) :: friction
     !> Goodman's approximation: shear tractions do not move the pressure
     logical, intent(in) :: goodman
     !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, a negative coefficient
     type(error_t), allocatable, intent(out) :: error
-    logical :: sound
+    !> Law of contact along the normal; absent: unilateral contact
+    class(normal_law_t), intent(in), optional :: normal_law
 
     call check_problem(lattice, pair, initial_gap, candidate, error)
     if (allocated(error)) return
-    sound = friction%no_slip .or. ieee_is_finite(friction%coefficient)
-    if (sound .and. .not. friction%no_slip) sound = friction%coefficient >= 0.0_wp
-    if (.not. sound) then
-      call raise(error, status%invalid_input, 'coefficient of friction: a finite number of at least 0 expected, or no_slip')
-      return
-    end if
+    call friction%check(lattice, error)
+    if (allocated(error)) return
     problem%lattice = lattice
     problem%pair = pair
-    problem%friction = friction
+    allocate (problem%friction, source=friction)
+    if (present(normal_law)) then
+      allocate (problem%normal_law, source=normal_law)
+    else
+      allocate (unilateral_t :: problem%normal_law)
+    end if
     problem%goodman = goodman
     problem%initial_gap = initial_gap
     problem%candidate = candidate
@@ -168,14 +125,17 @@ contains
   end subroutine new_friction_problem
 
   !> The same problem on the lattice of every second node.
-  function coarsened(self) result(coarse)
+  subroutine coarsen(self, coarse)
     class(friction_problem_t), intent(in) :: self
-    type(friction_problem_t) :: coarse
+    !> The problem there
+    type(friction_problem_t), intent(out) :: coarse
 
     coarse%lattice = self%lattice%coarsened()
     coarse%pair = self%pair
-    coarse%friction = self%friction
+    call self%friction%on_lattice(self%lattice, coarse%lattice, coarse%friction)
+    allocate (coarse%normal_law, source=self%normal_law)
     coarse%goodman = self%goodman
+    coarse%options = self%options
     coarse%space = self%space
     allocate (coarse%initial_gap, source=restrict_field(self%lattice, self%initial_gap, coarse%lattice))
     allocate (coarse%candidate, source=restrict_mask(self%lattice, self%candidate, coarse%lattice))
@@ -183,7 +143,30 @@ contains
     call coarse%lattice%coordinates(coarse%x, coarse%y)
     coarse%normal_compliance = normal_self_compliance(coarse%lattice, coarse%pair)
     coarse%tangential_compliance = tangential_self_compliance(coarse%lattice, coarse%pair)
-  end function coarsened
+  end subroutine coarsen
+
+  !> The same problem on the part of its window between some columns and rows.
+  subroutine take_part(self, low, high, part)
+    class(friction_problem_t), intent(in) :: self
+    !> First and last column and row
+    integer, intent(in) :: low(2), high(2)
+    !> The problem there
+    type(friction_problem_t), intent(out) :: part
+
+    part%lattice = part_of(self%lattice, low, high)
+    part%pair = self%pair
+    call self%friction%on_lattice(self%lattice, part%lattice, part%friction)
+    allocate (part%normal_law, source=self%normal_law)
+    part%goodman = self%goodman
+    part%options = self%options
+    part%space = self%space
+    part%initial_gap = self%initial_gap(low(1):high(1), low(2):high(2))
+    part%candidate = self%candidate(low(1):high(1), low(2):high(2))
+    part%x = self%x(low(1):high(1), low(2):high(2))
+    part%y = self%y(low(1):high(1), low(2):high(2))
+    part%normal_compliance = self%normal_compliance
+    part%tangential_compliance = self%tangential_compliance
+  end subroutine take_part
 
   !> Will the bodies touch? A load does, an approach only beyond the smallest gap.
   pure logical function is_pressed(self, target)
@@ -201,11 +184,9 @@ contains
   !> Do pressure and shear traction act strongly on each other? |beta| min(mu, 1) tells.
   pure logical function couples_strongly(self)
     class(friction_problem_t), intent(in) :: self
-    real(wp) :: mu
 
-    mu = 1.0_wp
-    if (.not. self%friction%no_slip) mu = min(self%friction%coefficient, 1.0_wp)
-    couples_strongly = abs(self%pair%beta())*mu > strong_coupling .and. .not. self%goodman
+    couples_strongly = abs(self%pair%beta())*min(self%friction%strength(), 1.0_wp) > &
+                       self%options%contact%strong_coupling .and. .not. self%goodman
   end function couples_strongly
 
   !> State of bodies that do not touch; motions that are driven by their load stay where they are.
@@ -289,15 +270,25 @@ contains
     load = self%lattice%cell_area()*sum(part, dim=2)
   end function resultants
 
-  !> r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius [Pa/m].
+  !> r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius, (F8) [Pa/m].
   pure real(wp) function classification_parameter(self, n_contact) result(r)
     class(friction_problem_t), intent(in) :: self
     !> Nodes in contact
     integer, intent(in) :: n_contact
 
-    r = classification_scale/(2.0_wp*pi*(self%pair%lambda_1 + self%pair%lambda_5) &
-                              *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+    r = self%options%contact%classification_scale/(2.0_wp*pi*(self%pair%lambda_1 + self%pair%lambda_5) &
+                                                   *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
   end function classification_parameter
+
+  !> r' = kappa/(2 pi lambda_1 a) [Pa/m].
+  pure real(wp) function normal_classification_parameter(self, n_contact) result(r)
+    class(friction_problem_t), intent(in) :: self
+    !> Nodes in contact
+    integer, intent(in) :: n_contact
+
+    r = self%options%contact%classification_scale/(2.0_wp*pi*self%pair%lambda_1 &
+                                                   *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+  end function normal_classification_parameter
 
   !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known.
   subroutine conclude(self, target, tolerance, reference, displacement, state)
@@ -313,7 +304,7 @@ contains
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
 
-    real(wp) :: r, unit, slope
+    real(wp) :: r, unit
     integer :: col, row, m, n_contact
     logical :: finite
 
@@ -321,7 +312,6 @@ contains
     r = self%classification_parameter(n_contact)
     unit = max(self%space%max(state%pressure), 0.0_wp)
     if (unit > 0.0_wp) unit = 1.0_wp/unit
-    slope = self%friction%slope()
     finite = .true.
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(col, m) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
@@ -337,9 +327,9 @@ contains
                                                 state%pressure(:, row) > 0.0_wp)
       end do
       if (self%friction%resists()) then
-        call zone_row(size(state%zone, 1), unit, slope, r, state%pressure(:, row), state%traction(:, row, 1), &
-                      state%traction(:, row, 2), state%slip_increment(:, row, 1), state%slip_increment(:, row, 2), &
-                      state%zone(:, row))
+        call self%friction%find_zones((row - 1)*size(state%zone, 1) + 1, unit, r, state%pressure(:, row), &
+                                      state%traction(:, row, 1), state%traction(:, row, 2), &
+                                      state%slip_increment(:, row, 1), state%slip_increment(:, row, 2), state%zone(:, row))
       else
         state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
       end if
@@ -350,7 +340,7 @@ contains
 
     state%load = self%resultants(state%pressure, state%traction)
     state%residual_normal = normal_residual(state%pressure, state%gap, self%candidate, self%normal_compliance, &
-                                            self%space)
+                                            self%space, self%normal_law)
     state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
                                                     self%friction, self%tangential_compliance, self%space)
     call self%judge_loads(target, state)
@@ -376,8 +366,9 @@ contains
     state%residual_force = merge(force_residual(state%load(normal), target%value(normal)), 0.0_wp, &
                                  target%control(normal) == force_control)
     ! mu P, or P times the ratio of the largest traction to the largest pressure where there is no slip
-    scale = self%friction%coefficient*state%load(normal)
-    if (self%friction%no_slip) then
+    if (self%friction%is_bounded()) then
+      scale = self%friction%strength()*state%load(normal)
+    else
       scale = sqrt(maxval(sum(state%traction**2, dim=3)))/max(maxval(state%pressure), tiny(1.0_wp))
       scale = max(scale, least_traction)*state%load(normal)
     end if

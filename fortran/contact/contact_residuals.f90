@@ -1,4 +1,6 @@
 !> How well a state fulfils the contact conditions; dimensionless.
+!>
+!> Equations: docs/theory/residuals.md, (R1) to (R4).
 module hc_contact_residuals
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
@@ -9,8 +11,8 @@ module hc_contact_residuals
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, touches_rim, force_control, normal, separated, slip, within_tolerance, &
     not_finite
-  use hc_coulomb, only: coulomb_t
-  use hc_friction_rows, only: residual_row
+  use hc_friction_law, only: friction_law_t
+  use hc_normal_law, only: normal_law_t, unilateral_t
   implicit none
   private
 
@@ -58,34 +60,43 @@ contains
   !> Bounds tension, penetration and pressure across a gap at once. Without
   !> pressure anywhere the penetration is all there can be: it is 0 if the gap is nowhere
   !> negative, and else infinite; so it is where a number is not finite, which a maximum would hide.
-  real(wp) function normal_residual(pressure, gap, candidate, compliance, space)
+  real(wp) function normal_residual(pressure, gap, candidate, compliance, space, law)
     !> Pressure [Pa] and gap [m]
     real(wp), intent(in) :: pressure(:, :), gap(:, :)
     !> Nodes that may come into contact
-    logical, intent(in) :: candidate(:, :)
+    logical, intent(in), contiguous :: candidate(:, :)
     !> Self-compliance d_n [m/Pa]
     real(wp), intent(in) :: compliance
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: p_max, worst, p, g
+    !> Law of contact; absent: unilateral contact
+    class(normal_law_t), intent(in), optional :: law
+    class(normal_law_t), allocatable :: actual
+    real(wp), dimension(size(pressure, 1)) :: p, g
+    real(wp) :: p_max, worst
     integer :: col, row, n_wrong
 
+    if (present(law)) then
+      allocate (actual, source=law)
+    else
+      allocate (unilateral_t :: actual)
+    end if
     p_max = 0.0_wp
     worst = 0.0_wp
     n_wrong = 0
     !$omp parallel do schedule(static) num_threads(space%threads) private(col, p, g) reduction(max: p_max, worst) &
     !$omp& reduction(+: n_wrong)
     do row = 1, size(pressure, 2)
-      !$omp simd private(p, g) reduction(max: p_max, worst) reduction(+: n_wrong)
+      !$omp simd reduction(max: p_max) reduction(+: n_wrong)
       do col = 1, size(pressure, 1)
         ! a comparison with NaN may be trapped
-        p = merge(pressure(col, row), 0.0_wp, ieee_is_finite(pressure(col, row)))
-        g = merge(gap(col, row), 0.0_wp, ieee_is_finite(gap(col, row)))
-        p_max = max(p_max, p)
-        worst = max(worst, merge(abs(min(p, g/compliance)), 0.0_wp, candidate(col, row)))
+        p(col) = merge(pressure(col, row), 0.0_wp, ieee_is_finite(pressure(col, row)))
+        g(col) = merge(gap(col, row), 0.0_wp, ieee_is_finite(gap(col, row)))
+        p_max = max(p_max, p(col))
         n_wrong = n_wrong + merge(0, 1, ieee_is_finite(pressure(col, row)) .and. &
                                   (ieee_is_finite(gap(col, row)) .or. .not. candidate(col, row)))
       end do
+      call actual%violation((row - 1)*size(pressure, 1) + 1, compliance, p, g, candidate(:, row), worst)
     end do
     !$omp end parallel do
     if (n_wrong > 0) then
@@ -108,38 +119,41 @@ contains
     !> Pressure (n_col, n_row) [Pa]
     real(wp), intent(in), contiguous :: pressure(:, :)
     !> Law of friction
-    type(coulomb_t), intent(in) :: friction
+    class(friction_law_t), intent(in) :: friction
     !> Self-compliance d_t [m/Pa]
     real(wp), intent(in) :: compliance
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: p_max, slope, largest, worst
+    real(wp) :: p_max, largest, worst
     integer :: row
 
     tangential_residual = 0.0_wp
     p_max = space%max(pressure)
     if (.not. (p_max > 0.0_wp .and. friction%resists())) return
-    slope = friction%slope()
     largest = 0.0_wp
     worst = 0.0_wp
     !$omp parallel do schedule(static) num_threads(space%threads) reduction(max: largest, worst)
     do row = 1, size(pressure, 2)
-      call residual_row(size(pressure, 1), 1.0_wp/p_max, slope, 1.0_wp/compliance, pressure(:, row), traction(:, row, 1), &
-                        traction(:, row, 2), slip_increment(:, row, 1), slip_increment(:, row, 2), largest, worst)
+      call friction%violation((row - 1)*size(pressure, 1) + 1, 1.0_wp/p_max, 1.0_wp/compliance, pressure(:, row), &
+                              traction(:, row, 1), traction(:, row, 2), slip_increment(:, row, 1), slip_increment(:, row, 2), &
+                              largest, worst)
     end do
     !$omp end parallel do
     tangential_residual = sqrt(worst)/tangential_scale(friction, largest)
   end function tangential_residual
 
   !> The scale tau of R_t over p_max.
-  elemental real(wp) function tangential_scale(friction, largest)
+  pure real(wp) function tangential_scale(friction, largest)
     !> Law of friction
-    class(coulomb_t), intent(in) :: friction
+    class(friction_law_t), intent(in) :: friction
     !> Square of the largest traction over p_max
     real(wp), intent(in) :: largest
 
-    tangential_scale = friction%coefficient
-    if (friction%no_slip) tangential_scale = max(sqrt(largest), least_traction)
+    if (friction%is_bounded()) then
+      tangential_scale = friction%strength()
+    else
+      tangential_scale = max(sqrt(largest), least_traction)
+    end if
   end function tangential_scale
 
   !> R_P = |sum A_p p - P|/P; without a load any pressure at all is as wrong as a load that is not carried.

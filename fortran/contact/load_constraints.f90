@@ -4,23 +4,17 @@
 !> the unit motion does along x and y, summed over the traction, is the load. A torque is
 !> taken about the middle of the contact, as far as the tangential loads are
 !> known too: a contact far from the origin would not tell a twist from a shift.
+!>
+!> Equations: docs/theory/friction.md, (F4), (F12).
 module hc_load_constraints
   use hc_precision, only: wp, pi
   use hc_lapack, only: eliminate
-  use hc_contact_state, only: load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
+  use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_problem, only: friction_problem_t
   implicit none
   private
 
-  public :: driven_motions_t, new_driven_motions, overloads
-
-  !> Share of a load that rounding may add.
-  real(wp), parameter :: rounding = 1.0e-6_wp
-  !> Residual R_n above which a pressure tells nothing.
-  real(wp), parameter :: trusted = 0.1_wp
-  !> Motions that are tried for the one that the least load drives, and the gain below which no more are.
-  integer, parameter :: max_tries = 100
-  real(wp), parameter :: no_gain = 1.0e-9_wp
+  public :: driven_motions_t, new_driven_motions, overloads, hold_nodes
 
   !> The driven motions of a contact.
   type :: driven_motions_t
@@ -169,7 +163,8 @@ contains
   !>
   !>     factor <= sum of mu p |u| / (loads . motion)
   !>
-  !> with u the displacement of any motion that they drive (upper bound of limit analysis). For shifts alone the
+  !> with u the displacement of any motion that they drive (upper bound of limit analysis, (F12) of
+  !> docs/theory/friction.md). For shifts alone the
   !> least is mu P/|Q|. With a torque, or without a prescribed P, it depends on the pressure: a gap that makes the
   !> residual R_n moves it by that share of its largest value where it acts on single nodes, by less where it is smooth.
   logical function overloads(problem, target, pressure, residual_normal)
@@ -181,25 +176,28 @@ contains
     real(wp), intent(in) :: pressure(problem%lattice%extent(1), problem%lattice%extent(2)), residual_normal
     type(driven_motions_t) :: driven
     real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
-    real(wp) :: carried, error, factor, before
+    real(wp) :: carried, error, factor, before, bounds(size(pressure))
     integer :: k, try
 
     overloads = .false.
-    if (problem%friction%no_slip .or. .not. any(pressure > 0.0_wp)) return
+    if (.not. problem%friction%is_bounded() .or. .not. any(pressure > 0.0_wp)) return
     call new_driven_motions(driven, problem, target, pressure > 0.0_wp)
-    associate (n => size(driven%motion), n_contact => count(pressure > 0.0_wp))
+    associate (n => size(driven%motion), n_contact => count(pressure > 0.0_wp), options => problem%options%contact)
       load = [(driven%load(k, problem, target), k=1, n)]
       overloads = any(abs(load) > 0.0_wp) .and. .not. problem%friction%resists()
       if (overloads .or. n == 0) return
       allocate (u(n_contact, 2, n))
-      bound = problem%friction%bound(pack(pressure, pressure > 0.0_wp))
       error = residual_normal
+      carried = problem%lattice%cell_area()*sum(pressure, mask=pressure > 0.0_wp)
       if (target%control(normal) == force_control) then
-        carried = problem%friction%bound(target%value(normal))/problem%lattice%cell_area()
-        if (sum(bound) > 0.0_wp) bound = bound*(carried/sum(bound))
+        ! under the prescribed load
+        call problem%friction%find_bounds(1, target%value(normal)/carried*reshape(pressure, [size(pressure)]), bounds)
         if (.not. any(driven%motion == about_z)) error = 0.0_wp
+      else
+        call problem%friction%find_bounds(1, reshape(pressure, [size(pressure)]), bounds)
       end if
-      if (error > trusted) return
+      bound = pack(bounds, reshape(pressure > 0.0_wp, [size(pressure)]))
+      if (error > options%trusted_residual) return
       do k = 1, n
         field = driven%direction(k, problem)
         u(:, 1, k) = pack(field(:, :, 1), pressure > 0.0_wp)
@@ -207,21 +205,23 @@ contains
       end do
       allocate (length(n_contact), source=1.0_wp)
       factor = huge(1.0_wp)
-      do try = 1, max_tries
+      do try = 1, options%max_limit_motions
         before = factor
-        call lower(u, bound, load, length, factor)
-        if (.not. factor < (1.0_wp - no_gain)*before) exit
+        call lower(u, bound, load, options%least_limit_gain, length, factor)
+        if (.not. factor < (1.0_wp - options%least_limit_gain)*before) exit
       end do
-      overloads = factor*(1.0_wp + error) < 1.0_wp - rounding
+      overloads = factor*(1.0_wp + error) < 1.0_wp - options%load_rounding
     end associate
   end function overloads
 
   !> Try the motion that nodes with springs of stiffness bound/length would make: what slips far resists the less.
-  pure subroutine lower(u, bound, load, length, factor)
+  pure subroutine lower(u, bound, load, least_length, length, factor)
     !> Displacements of unit motions (n, 2, motion)
     real(wp), intent(in) :: u(:, :, :)
     !> Largest traction of each node, and load of each motion over the cell area [Pa]
     real(wp), intent(in) :: bound(:), load(:)
+    !> Least displacement of a node that counts, relative to the largest
+    real(wp), intent(in) :: least_length
     !> Displacement of each node in the motion tried before, and in this one
     real(wp), intent(inout) :: length(:)
     !> Least load factor so far
@@ -247,7 +247,36 @@ contains
     end do
     length = norm2(moved, dim=2)
     factor = min(factor, dot_product(bound, length))
-    length = max(length, no_gain*maxval(length))
+    length = max(length, least_length*maxval(length))
   end subroutine lower
+
+  !> Let the nodes stick that slip least: without any, nothing resists a prescribed load.
+  pure subroutine hold_nodes(share, compliance, zone)
+    !> Share of the slipping nodes to be held
+    real(wp), intent(in) :: share
+    !> Compliance of each node, the less the closer it is to sticking; 0 where it is held [m/Pa]
+    real(wp), intent(inout) :: compliance(:)
+    !> Zone of each node
+    integer, intent(inout) :: zone(:)
+    real(wp) :: low, high, middle
+    integer :: i, n_slip
+
+    n_slip = count(zone == slip)
+    if (n_slip == 0) return
+    low = minval(compliance, mask=zone == slip)
+    high = maxval(compliance, mask=zone == slip)
+    do i = 1, 60
+      middle = sqrt(low)*sqrt(high)
+      if (count(zone == slip .and. compliance <= middle) < share*n_slip) then
+        low = middle
+      else
+        high = middle
+      end if
+    end do
+    where (zone == slip .and. compliance <= high)
+      zone = stick
+      compliance = 0.0_wp
+    end where
+  end subroutine hold_nodes
 
 end module hc_load_constraints

@@ -8,6 +8,8 @@
 !> forward transform of the conjugate, so that two plans are enough.
 !>
 !> Every kernel is even or odd, so that its spectrum is real, or i times real.
+!>
+!> Equations: docs/theory/discretisation.md, (D4).
 module hc_convolution
   use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int
   use hc_precision, only: wp

@@ -4,28 +4,29 @@
 !> in tension leave, and nodes that penetrate enter again. Should the number of wrong
 !> nodes not fall any more, one node at a time is exchanged (Murty's rule, with
 !> which the iteration ends for every positive definite matrix).
+!>
+!> Equations: docs/theory/normal_contact.md, (N1).
 module hc_direct_contact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
+  use hc_options, only: options_t
   use hc_lapack, only: dposv
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target, force_control, &
+  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, force_control, &
     sweeps_used_up, no_progress
   use hc_contact_residuals, only: normal_self_compliance, conclude
+  use hc_contact_solver, only: contact_solver_t
   implicit none
   private
 
-  public :: direct_contact_t, new_direct_contact, first_guess, exchange, patience
-
-  !> Exchanges of whole sets that may fail to lower the number of wrong nodes.
-  integer, parameter :: patience = 10
+  public :: direct_contact_t, new_direct_contact, first_guess, exchange
 
   !> A frictionless contact problem with its flexibility.
-  type :: direct_contact_t
+  type, extends(contact_solver_t) :: direct_contact_t
     private
     type(dense_flexibility_t) :: flexibility
     !> Initial gap (n_col, n_row) [m]
@@ -34,7 +35,9 @@ module hc_direct_contact
     logical, allocatable :: candidate(:, :)
     !> Self-compliance of a node [m/Pa]
     real(wp) :: compliance = 0.0_wp
+    type(options_t) :: options
   contains
+    procedure :: solve_step
     !> Solve for a normal load or an approach
     procedure :: solve
   end type direct_contact_t
@@ -42,7 +45,7 @@ module hc_direct_contact
 contains
 
   !> Flexibility of a problem.
-  subroutine new_direct_contact(self, lattice, pair, initial_gap, candidate, error)
+  subroutine new_direct_contact(self, lattice, pair, initial_gap, candidate, error, options)
     !> Problem to be set up
     type(direct_contact_t), intent(out) :: self
     !> Lattice and window
@@ -55,7 +58,10 @@ contains
     logical, intent(in) :: candidate(:, :)
     !> Allocated on failure: wrong shapes, no candidate at all, numbers of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
+    !> Tolerances, caps and tuning numbers
+    type(options_t), intent(in), optional :: options
 
+    if (present(options)) self%options = options
     call check_problem(lattice, pair, initial_gap, candidate, error)
     if (allocated(error)) return
     self%initial_gap = initial_gap
@@ -63,6 +69,29 @@ contains
     self%compliance = normal_self_compliance(lattice, pair)
     call new_dense_flexibility(self%flexibility, lattice, pair, error)
   end subroutine new_direct_contact
+
+  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(direct_contact_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+    logical :: again
+
+    again = allocated(start%pressure)
+    if (again) again = any(start%pressure > 0.0_wp)
+    associate (reference => reference)
+      if (again) then
+        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error, &
+                        start%pressure > 0.0_wp)
+      else
+        call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
+      end if
+    end associate
+  end subroutine solve_step
 
   !> Solve for a normal load or an approach.
   subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)
@@ -114,7 +143,7 @@ contains
       if (control /= force_control) delta = target
     end if
     fewest = huge(1)
-    left = patience
+    left = self%options%direct%stalled_exchanges
 
     do while (any(active) .and. state%sweeps < max_sweeps)
       state%sweeps = state%sweeps + 1
@@ -126,7 +155,7 @@ contains
       ! the gap of a node in contact is zero up to rounding, which must not count as penetration
       wrong = (active .and. p < 0.0_wp) .or. (candidate .and. .not. active .and. gap < 0.0_wp)
       if (.not. any(wrong)) exit
-      call exchange(wrong, fewest, left, active)
+      call exchange(wrong, self%options%direct%stalled_exchanges, fewest, left, active)
       if (.not. any(active)) active = candidate .and. gap <= minval(gap, mask=candidate)
     end do
 
@@ -142,12 +171,14 @@ contains
   end subroutine solve
 
   !> Exchange the wrong nodes; one only as soon as the number of them does not fall any more.
-  pure subroutine exchange(wrong, fewest, left, active)
+  pure subroutine exchange(wrong, stalled_exchanges, fewest, left, active)
     !> Nodes that are active and should not be, or should be and are not; one at least
     logical, intent(in) :: wrong(:)
+    !> Exchanges of whole sets that may fail to lower the number of wrong nodes
+    integer, intent(in) :: stalled_exchanges
     !> Smallest number of wrong nodes so far; huge(1) at the start
     integer, intent(inout) :: fewest
-    !> Exchanges of whole sets left that may fail to lower it; `patience` at the start
+    !> Those that are left; all of them at the start
     integer, intent(inout) :: left
     !> Active nodes
     logical, intent(inout) :: active(:)
@@ -155,7 +186,7 @@ contains
 
     if (count(wrong) < fewest) then
       fewest = count(wrong)
-      left = patience
+      left = stalled_exchanges
     else
       left = left - 1
     end if

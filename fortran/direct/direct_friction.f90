@@ -7,36 +7,24 @@
 !> area of a step starts from the last one with a ring of nodes around it. Stick and
 !> slip follow from q - r ds, and slip is linearised as in hc_coulomb, so
 !> that the whole is a Newton method for pressure, traction and motions at once.
+!>
+!> Equations: docs/theory/friction.md, (F7).
 module hc_direct_friction
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: direct_options_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
     normal, along_x, force_control, displacement_control, loads_not_carried
-  use hc_coulomb, only: linearize, on_cone
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
-  use hc_load_constraints, only: overloads
-  use hc_direct_contact, only: first_guess, exchange, patience
-  use hc_direct_system, only: iterate_t, infinite, unloaded, solve_area
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
+  use hc_load_constraints, only: overloads, hold_nodes
+  use hc_direct_contact, only: first_guess, exchange
+  use hc_direct_system, only: direct_iterate_t, infinite, unloaded, solve_area
   implicit none
   private
 
   public :: direct_friction_t, new_direct_friction, ring
-
-  !> Areas that are tried before there is any shear traction.
-  integer, parameter :: first_tries = 3*patience
-  !> Tension and penetration, relative to the largest pressure, that are rounding errors.
-  real(wp), parameter :: rounding = 1.0e-12_wp
-  !> Slip that gives a node without traction no direction yet, relative to that of the largest pressure.
-  real(wp), parameter :: negligible_slip = 1.0e-6_wp
-  !> Share of the classification parameter with which a step begins.
-  real(wp), parameter :: first_share = 0.2_wp
-  !> Sweeps after which it is halved, again and again.
-  integer, parameter :: halving = 10
-  !> Times that a step may lose its hold.
-  integer, parameter :: max_adrift = 6
-  !> Traction, relative to its largest bound, that no step towards a solution leads to.
-  real(wp), parameter :: beyond_reason = 5.0_wp
 
   !> A contact problem with friction and its flexibility.
   type, extends(friction_solver_t) :: direct_friction_t
@@ -80,14 +68,16 @@ contains
     integer, intent(in) :: max_sweeps
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
-    type(iterate_t) :: it, before
+    type(direct_iterate_t) :: it, before
+    type(direct_options_t) :: options
     real(wp) :: share
-    integer :: n, sweep, adrift
+    integer :: n, sweep, unsupported
 
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
       return
     end if
+    options = self%problem%options%direct
     call new_friction_state(state, self%problem%lattice)
     self%flexibility%applications = 0.0_wp
     n = self%problem%lattice%size()
@@ -96,7 +86,7 @@ contains
     it%reference = reshape(reference, [n, 2])
     it%motion = merge(target%value, start%motion, target%control == displacement_control)
     allocate (it%p(n), it%compliance(n), source=0.0_wp)
-    allocate (it%q(n, 2), it%direction(n, 2), source=0.0_wp)
+    allocate (it%q(n, 2), it%direction(2, n), source=0.0_wp)
     allocate (it%zone(n), source=separated)
 
     if (any(start%pressure > 0.0_wp)) then
@@ -104,7 +94,7 @@ contains
     else
       call begin(self, target, it, error)
     end if
-    adrift = 0
+    unsupported = 0
     share = 1.0_wp
     do sweep = 1, max_sweeps
       if (allocated(error)) return
@@ -112,24 +102,24 @@ contains
       ! as long as stick and slip are wrong a settled area is not worth its price
       call find_area(self, target, sweep, it, error)
       if (allocated(error)) return
-      if (is_adrift(self%problem, it)) then
-        adrift = adrift + 1
-        if (adrift < max_adrift .and. any(it%zone == slip)) then
+      if (is_unsupported(self%problem, it)) then
+        unsupported = unsupported + 1
+        if (unsupported < options%max_unsupported .and. any(it%zone == slip)) then
           before%solves = it%solves
           it = before
-          share = first_share*share
-          call hold(it)
+          share = options%cautious_share*share
+          call hold_nodes(self%problem%options%contact%held_share, it%compliance, it%zone)
           call find_area(self, target, sweep, it, error)
           if (allocated(error)) return
         end if
       end if
       call record(self, reference, target, tolerance, it, state, error)
       if (allocated(error) .or. state%converged) exit
-      if (adrift > 0 .or. sweep == max_sweeps) then
+      if (unsupported > 0 .or. sweep == max_sweeps) then
         state%sliding = overloads(self%problem, target, state%pressure, state%residual_normal)
-        if (state%sliding .or. adrift == max_adrift) exit
+        if (state%sliding .or. unsupported == options%max_unsupported) exit
       end if
-      if (mod(sweep, halving) == 0) share = 0.5_wp*share
+      if (mod(sweep, options%sweeps_per_cut) == 0) share = 0.5_wp*share
       call classify(self%problem, share, it)
     end do
     if (state%sliding) state%stopped = loads_not_carried
@@ -141,7 +131,7 @@ contains
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Iterate
-    type(iterate_t), intent(inout) :: it
+    type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: weight(size(it%p)), mean
@@ -153,7 +143,7 @@ contains
       it%zone = slip
       it%compliance = infinite
     end where
-    call find_area(self, target, first_tries, it, error)
+    call find_area(self, target, self%problem%options%direct%first_areas, it, error)
     if (allocated(error)) return
     ! shifts that are free follow the bodies
     weight = max(it%p, 0.0_wp)/max(sum(max(it%p, 0.0_wp)), tiny(1.0_wp))
@@ -163,7 +153,7 @@ contains
       it%motion(1 + i) = it%motion(1 + i) + mean
       it%ds(:, i) = it%ds(:, i) - mean
     end do
-    call classify(self%problem, first_share, it)
+    call classify(self%problem, self%problem%options%direct%cautious_share, it)
   end subroutine begin
 
   !> Tractions, and contact with a ring around it, of the state to start from.
@@ -172,7 +162,7 @@ contains
     !> State to start from
     type(contact_state_t), intent(in) :: start
     !> Iterate
-    type(iterate_t), intent(inout) :: it
+    type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     integer :: n
@@ -183,7 +173,7 @@ contains
     it%p = merge(reshape(start%pressure, [n]), 0.0_wp, it%contact)
     it%q = reshape(start%traction, [n, 2])
     call evaluate(self, it, error)
-    if (.not. allocated(error)) call classify(self%problem, first_share, it)
+    if (.not. allocated(error)) call classify(self%problem, self%problem%options%direct%cautious_share, it)
   end subroutine continue_from
 
   !> An area with the ring of lattice neighbours around it.
@@ -207,21 +197,17 @@ contains
     !> Share of the classification parameter to use
     real(wp), intent(in) :: share
     !> Iterate
-    type(iterate_t), intent(inout) :: it
-    real(wp) :: r, largest_bound
+    type(direct_iterate_t), intent(inout) :: it
+    logical :: pressed(size(it%p))
+    real(wp) :: r
     integer :: i
 
     r = share*problem%classification_parameter(count(it%contact .and. it%p > 0.0_wp))
-    largest_bound = problem%friction%bound(maxval(it%p))
-    it%zone = separated
+    pressed = it%contact .and. it%p > 0.0_wp .and. problem%friction%resists() .and. problem%friction%is_bounded()
+    call problem%friction%linearize(1, maxval(it%p), r, pressed, it%p, it%q(:, 1), it%q(:, 2), it%ds(:, 1), it%ds(:, 2), &
+                                    it%zone, it%direction, it%compliance)
     do i = 1, size(it%p)
-      if (.not. it%contact(i)) cycle
-      if (it%p(i) > 0.0_wp .and. problem%friction%resists() .and. .not. problem%friction%no_slip) then
-        call linearize(it%q(i, :), it%ds(i, :), problem%friction%bound(it%p(i)), largest_bound, r, &
-                       it%zone(i), it%direction(i, :), it%compliance(i))
-      else
-        call enter(problem, it, i)
-      end if
+      if (it%contact(i) .and. .not. pressed(i)) call enter(problem, it, i)
     end do
   end subroutine classify
 
@@ -230,41 +216,32 @@ contains
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
-    type(iterate_t), intent(inout) :: it
+    type(direct_iterate_t), intent(inout) :: it
     !> Node
     integer, intent(in) :: node
     real(wp) :: length
 
-    it%zone(node) = merge(stick, slip, problem%friction%no_slip)
-    it%compliance(node) = merge(0.0_wp, infinite, problem%friction%no_slip)
-    it%direction(node, :) = 0.0_wp
+    it%zone(node) = merge(slip, stick, problem%friction%is_bounded())
+    it%compliance(node) = merge(infinite, 0.0_wp, problem%friction%is_bounded())
+    it%direction(:, node) = 0.0_wp
     length = norm2(it%ds(node, :))
-    if (length > negligible_slip*problem%tangential_compliance*maxval(it%p)) then
-      it%direction(node, :) = -it%ds(node, :)/length
+    if (length > problem%options%direct%negligible_slip*problem%tangential_compliance*maxval(it%p)) then
+      it%direction(:, node) = -it%ds(node, :)/length
     end if
   end subroutine enter
 
   !> Is there nothing to carry the loads, or no more than the directions of slip, with tractions to match?
-  pure logical function is_adrift(problem, it)
+  pure logical function is_unsupported(problem, it)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
-    type(iterate_t), intent(in) :: it
+    type(direct_iterate_t), intent(in) :: it
 
-    is_adrift = .not. it%carried
-    if (is_adrift .or. any(it%zone == stick)) return
-    is_adrift = sqrt(maxval(sum(it%q**2, dim=2)))/beyond_reason > problem%friction%bound(maxval(it%p))
-  end function is_adrift
-
-  !> Let the nodes stick that are the closest to it: those whose compliance is below the (harmonic) mean.
-  pure subroutine hold(it)
-    !> Iterate
-    type(iterate_t), intent(inout) :: it
-    real(wp) :: mean
-
-    mean = count(it%zone == slip)/sum(1.0_wp/it%compliance, mask=it%zone == slip)
-    where (it%zone == slip .and. it%compliance <= mean) it%zone = stick
-  end subroutine hold
+    is_unsupported = .not. it%carried
+    if (is_unsupported .or. any(it%zone == stick)) return
+    is_unsupported = sqrt(maxval(sum(it%q**2, dim=2)))/problem%options%direct%most_across &
+                     > problem%friction%largest_bound(maxval(it%p))
+  end function is_unsupported
 
   !> Contact area under a frozen state of stick and slip, and its tractions.
   subroutine find_area(self, target, max_tries, it, error)
@@ -274,7 +251,7 @@ contains
     !> Areas that may be tried
     integer, intent(in) :: max_tries
     !> Iterate
-    type(iterate_t), intent(inout) :: it
+    type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     logical, dimension(size(it%p)) :: wrong, before
@@ -282,19 +259,19 @@ contains
     integer :: i, fewest, left, try
 
     fewest = huge(1)
-    left = patience
+    left = self%problem%options%direct%stalled_exchanges
     do try = 1, max_tries
       call solve_area(self%problem, self%flexibility, target, it, error)
       if (allocated(error)) return
       it%solves = it%solves + 1
       call evaluate(self, it, error)
       if (allocated(error)) return
-      negligible = rounding*maxval(it%p)
+      negligible = self%problem%options%direct%pressure_rounding*maxval(it%p)
       wrong = merge(it%p < -negligible, &
                     it%candidate .and. it%gap < -negligible*self%problem%normal_compliance, it%contact)
       if (.not. any(wrong)) return
       before = it%contact
-      call exchange(wrong, fewest, left, it%contact)
+      call exchange(wrong, self%problem%options%direct%stalled_exchanges, fewest, left, it%contact)
       if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
       do i = 1, size(it%p)
         if (it%contact(i) .and. .not. before(i)) call enter(self%problem, it, i)
@@ -306,7 +283,7 @@ contains
   subroutine evaluate(self, it, error)
     class(direct_friction_t), intent(inout) :: self
     !> Iterate
-    type(iterate_t), intent(inout) :: it
+    type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), dimension(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3) :: traction, displacement
@@ -330,22 +307,20 @@ contains
     !> Bound of all residuals
     real(wp), intent(in) :: tolerance
     !> Iterate
-    type(iterate_t), intent(in) :: it
+    type(direct_iterate_t), intent(in) :: it
     !> State to be filled
     type(contact_state_t), intent(inout) :: state
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: displacement(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3)
-    integer :: col, row
+    real(wp) :: p(size(it%p)), q(size(it%p), 2), unit
 
-    state%pressure = reshape(max(it%p, 0.0_wp), shape(state%pressure))
-    state%traction = reshape(it%q, shape(state%traction))
-    do row = 1, size(state%pressure, 2)
-      do col = 1, size(state%pressure, 1)
-        state%traction(col, row, :) = on_cone(state%traction(col, row, :), &
-                                              self%problem%friction%bound(state%pressure(col, row)))
-      end do
-    end do
+    call self%problem%normal_law%project(1, it%p, p)
+    unit = maxval(p)
+    if (unit > 0.0_wp) unit = 1.0_wp/unit
+    call self%problem%friction%project(1, unit, p, it%q(:, 1), it%q(:, 2), q(:, 1), q(:, 2))
+    state%pressure = reshape(p, shape(state%pressure))
+    state%traction = reshape(q, shape(state%traction))
     state%motion = it%motion
     call self%displacements(state%pressure, state%traction, displacement, error)
     if (allocated(error)) return

@@ -1,4 +1,6 @@
 !> The linear problem of the direct method: an area in contact, with stick and slip frozen.
+!>
+!> Equations: docs/theory/friction.md, (F7).
 module hc_direct_system
   use, intrinsic :: iso_fortran_env, only: real32
   use hc_precision, only: wp
@@ -13,20 +15,16 @@ module hc_direct_system
   implicit none
   private
 
-  public :: iterate_t, infinite, unloaded, solve_area
+  public :: direct_iterate_t, infinite, unloaded, solve_area
 
   !> A compliance that leaves no traction across the direction of slip.
   real(wp), parameter :: infinite = huge(1.0_wp)
-  !> Singular value, relative to the largest, below which a rigid motion is not determined.
-  real(wp), parameter :: undetermined = 1.0e-12_wp
-  !> Part of a load, relative to the sum of all tractions, that counts as rounding error.
-  real(wp), parameter :: carried = 1.0e-8_wp
 
   character(len=*), parameter :: no_memory = &
     'not enough memory for the matrix of the contact area: use method "fft"'
 
   !> An iterate; over the nodes of the window.
-  type :: iterate_t
+  type :: direct_iterate_t
     !> Nodes that may come into contact, nodes in contact
     logical, allocatable :: candidate(:), contact(:)
     !> Initial gap (n) and relative displacement at the beginning of the step (n, 2) [m]
@@ -37,7 +35,7 @@ module hc_direct_system
     real(wp), allocatable :: gap(:), ds(:, :)
     !> Approach, shifts [m] and twist [rad]
     real(wp) :: motion(n_motion) = 0.0_wp
-    !> Frozen state of the nodes in contact: stick or slip, its direction (n, 2) and
+    !> Frozen state of the nodes in contact: stick or slip, its direction (2, n) and
     !> compliance across it; a node with an infinite one has no traction across
     integer, allocatable :: zone(:)
     real(wp), allocatable :: direction(:, :), compliance(:)
@@ -45,7 +43,7 @@ module hc_direct_system
     logical :: carried = .true.
     !> Linear systems solved so far
     integer :: solves = 0
-  end type iterate_t
+  end type direct_iterate_t
 
 contains
 
@@ -54,7 +52,7 @@ contains
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Iterate
-    type(iterate_t), intent(in) :: it
+    type(direct_iterate_t), intent(in) :: it
     real(wp) :: unloaded(size(it%p), 3)
 
     unloaded(:, normal) = it%initial_gap - it%motion(normal)
@@ -75,7 +73,7 @@ contains
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Iterate
-    type(iterate_t), intent(inout) :: it
+    type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -85,7 +83,7 @@ contains
     real(real32), allocatable :: first(:, :)
     logical :: solved
     integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), place(:)
-    real(wp) :: load(n_motion)
+    real(wp) :: load(n_motion), slope(size(it%p))
     integer :: i, k, n, n_p, n_free, stat
 
     contact = pack([(i, i=1, size(it%p))], it%contact)
@@ -109,12 +107,13 @@ contains
     weight(along_x, n_p + 1:n_p + size(stuck)) = 1.0_wp
     weight(along_y, n_p + size(stuck) + 1:n_p + 2*size(stuck)) = 1.0_wp
     do k = n_p + 2*size(stuck) + 1, n
-      weight(along_x:, k) = normal_to(it%direction(node(k), :))
+      weight(along_x:, k) = normal_to(it%direction(:, node(k)))
     end do
     traction = weight
+    call problem%friction%find_slopes(1, it%p, slope)
     do k = 1, n_p
-      if (it%zone(node(k)) == stick .or. problem%friction%no_slip) cycle
-      traction(along_x:, k) = problem%friction%coefficient*it%direction(node(k), :)
+      if (it%zone(node(k)) == stick .or. .not. problem%friction%is_bounded()) cycle
+      traction(along_x:, k) = slope(node(k))*it%direction(:, node(k))
     end do
 
     rigid = unloaded(problem, it)
@@ -146,7 +145,7 @@ contains
       if (allocated(error)) return
     end if
 
-    call fulfil_loads(problem, driven, load(:n_free), resultant, unknown, it, error)
+    call satisfy_loads(problem, driven, load(:n_free), resultant, unknown, it, error)
     if (allocated(error)) return
     it%p = 0.0_wp
     it%q = 0.0_wp
@@ -183,7 +182,7 @@ contains
   !> Find the motions whose loads are prescribed from these loads.
   !>
   !> Motions that the loads do not determine stay as they are (without a node in stick, say).
-  subroutine fulfil_loads(problem, driven, load, resultant, rhs, it, error)
+  subroutine satisfy_loads(problem, driven, load, resultant, rhs, it, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Tangential motions driven by their loads
@@ -195,7 +194,7 @@ contains
     !> Unknowns at the present motions, and those of unit motions; on return the first are at the new motions
     real(wp), intent(inout) :: rhs(:, 0:)
     !> Iterate
-    type(iterate_t), intent(inout) :: it
+    type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -206,19 +205,21 @@ contains
     if (n == 0) return
     stiffness(:n, :n) = matmul(transpose(resultant), rhs(:, 1:))
     change(:n, 1) = load - matmul(rhs(:, 0), resultant)
-    call dgelss(n, n, 1, stiffness, n_motion, change, n_motion, singular, undetermined, rank, work, size(work), info)
+    call dgelss(n, n, 1, stiffness, n_motion, change, n_motion, singular, problem%options%direct%undetermined_motion, &
+                rank, work, size(work), info)
     if (info /= 0) then
       call raise(error, status%no_convergence, 'the rigid motions of the contact cannot be found')
       return
     end if
     rhs(:, 0) = rhs(:, 0) + matmul(rhs(:, 1:), change(:n, 1))
-    it%carried = maxval(abs(load - matmul(rhs(:, 0), resultant))) <= carried*sum(abs(rhs(:, 0)))
+    it%carried = maxval(abs(load - matmul(rhs(:, 0), resultant))) <= &
+                 problem%options%direct%load_rounding*sum(abs(rhs(:, 0)))
 
     change(:n, 1) = change(:n, 1)*problem%normal_compliance
     m = size(driven%motion)
     if (n > m) it%motion(normal) = it%motion(normal) + change(1, 1)
     call driven%set_motions(driven%multipliers(it%motion) + change(n - m + 1:n, 1), it%motion)
-  end subroutine fulfil_loads
+  end subroutine satisfy_loads
 
   !> Matrix of the nodes' mutual influence: weight.K.traction, divided by the self-compliance.
   subroutine assemble(problem, flexibility, contact, place, weight, traction, matrix)

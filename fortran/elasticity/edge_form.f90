@@ -5,6 +5,8 @@
 !> the build makes a second module of this file, hc_edge_form_extended, in
 !> which rk is the extended precision xp (see other_precision.py). It takes
 !> some thirty times as long.
+!>
+!> Equations: docs/theory/elasticity.md, (E3), (E4).
 module hc_edge_form
   use hc_precision, only: rk => wp
   implicit none

@@ -8,6 +8,8 @@
 !>
 !> Three numbers describe any pair exactly: no averaged Poisson's ratio (Table
 !> 8.2) is needed. beta is Dundurs' second constant.
+!>
+!> Equations: docs/theory/elasticity.md, (E14) to (E16).
 module hc_elastic_pair
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, pi

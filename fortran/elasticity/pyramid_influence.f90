@@ -18,6 +18,8 @@
 !> product_q sinh(w_q/2)/(w_q/2), w_q = s d_q + t conj(d_q), and the kernels are
 !> power series in 1/z. Both hold for any lattice; lengths are in units of the
 !> longest edge inside this module.
+!>
+!> Equations: docs/theory/elasticity.md, (E5) to (E13).
 module hc_pyramid_influence
   use hc_precision, only: wp
   use hc_lattice, only: edge_directions

@@ -14,6 +14,8 @@
 !>
 !> The pure procedures expect valid arguments; evaluate_* check them, work on
 !> many points at a time, and share the points out over threads.
+!>
+!> Equations: docs/theory/elasticity.md, (E1), (E2).
 module hc_triangle_integrals
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
   use hc_precision, only: wp, xp, pi

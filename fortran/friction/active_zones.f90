@@ -1,41 +1,40 @@
 !> What the tractions of an iterate call for: contact area, stick and slip, and loads as constraints.
+!>
+!> Equations: docs/theory/friction.md, (F5), (F8).
 module hc_active_zones
-  use hc_precision, only: wp, pi
+  use hc_precision, only: wp
   use hc_contact_state, only: separated, stick, slip, along_x, along_y, about_z, n_motion, force_control
-  use hc_coulomb, only: linearize, normal_to
-  use hc_contact_problem, only: classification_scale
-  use hc_friction_iterate, only: iterate_t, cautious
+  use hc_coulomb, only: normal_to
+  use hc_friction_iterate, only: friction_iterate_t
   use hc_spring_blend, only: soft
-  use hc_load_constraints, only: driven_motions_t, new_driven_motions
+  use hc_load_constraints, only: driven_motions_t, new_driven_motions, hold_nodes
   implicit none
   private
 
-  public :: find_contact, classify, find_constraints, find_wanted
-
-  !> Share of the nodes that are held where none sticks.
-  real(wp), parameter :: held_share = 0.25_wp
+  public :: find_contact, classify, find_constraints, find_prescribed_displacement
 
 contains
 
-  !> Nodes with p - r g > 0: one step of a projected gradient map, which contracts
-  !> because r is scaled with the size of the contact.
+  !> Nodes that the law of contact calls for, (F5): one step of a projected gradient map, which contracts
+  !> because r' is scaled with the size of the contact.
   subroutine find_contact(now, gap, contact)
-    type(iterate_t), intent(in) :: now
+    type(friction_iterate_t), intent(in) :: now
     !> Gap of the present tractions [m]
     real(wp), intent(in), contiguous :: gap(:)
     !> The nodes (n)
     logical, allocatable, intent(out) :: contact(:)
     real(wp) :: r
-    integer :: i, n_contact
+    integer :: row, n_contact, from, to
 
-    r = classification_scale/(2.0_wp*pi*now%problem%pair%lambda_1 &
-                              *sqrt(now%problem%lattice%cell_area()*max(now%operators%space%count(now%contact), 1)/pi))
+    r = now%problem%normal_classification_parameter(now%operators%space%count(now%contact))
     allocate (contact(size(gap)))
     n_contact = 0
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) reduction(+: n_contact)
-    do i = 1, size(gap)
-      contact(i) = now%candidate(i) .and. now%p(i) - r*gap(i) > 0.0_wp
-      n_contact = n_contact + merge(1, 0, contact(i))
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to) reduction(+: n_contact)
+    do row = 1, now%problem%lattice%extent(2)
+      to = row*now%problem%lattice%extent(1)
+      from = to - now%problem%lattice%extent(1) + 1
+      call now%problem%normal_law%find_contact(from, r, now%p(from:to), gap(from:to), now%candidate(from:to), contact(from:to))
+      n_contact = n_contact + count(contact(from:to))
     end do
     !$omp end parallel do
     if (n_contact == 0) contact = now%candidate .and. gap <= minval(gap, mask=now%candidate)
@@ -46,90 +45,63 @@ contains
   !> The shear traction is put on the cone where a node slips, and its component across
   !> left as a start.
   subroutine classify(now, holding, active)
-    type(iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout) :: now
     !> Let some nodes stick where none does
     logical, intent(in) :: holding
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
     logical, allocatable, intent(out) :: active(:)
     integer, allocatable :: zone(:)
-    real(wp) :: ds(now%problem%lattice%extent(1), 2), r, bound, largest, across, e(2)
-    integer :: n, row, col, i
+    real(wp) :: ds(now%problem%lattice%extent(1), 2), bound(now%problem%lattice%extent(1)), r, p_max, across, e(2)
+    integer :: n, row, col, i, from, to
 
     n = size(now%p)
     allocate (zone(n), active(2*n))
-    r = now%caution*now%problem%classification_parameter(now%operators%space%count(now%contact))
-    if (now%first .and. .not. any(abs(now%q) > 0.0_wp)) r = cautious*r
+    r = now%globalization%share_of_r*now%problem%classification_parameter(now%operators%space%count(now%contact))
+    if (now%first .and. .not. any(abs(now%q) > 0.0_wp)) r = now%problem%options%newton%cautious_share*r
     associate (friction => now%problem%friction)
-      largest = friction%bound(now%operators%space%max(now%p))
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, col, i)
+      p_max = now%operators%space%max(now%p)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, i, from, to)
       do row = 1, now%problem%lattice%extent(2)
+        to = row*size(ds, 1)
+        from = to - size(ds, 1) + 1
         call now%slip_row(row, ds(:, 1), ds(:, 2))
-        do col = 1, size(ds, 1)
-          i = (row - 1)*size(ds, 1) + col
-          if (now%contact(i)) then
-            call linearize([now%q(i), now%q(n + i)], ds(col, :), friction%bound(now%p(i)), largest, r, zone(i), &
-                           now%shear%direction(:, i), now%shear%compliance(i))
-          else
-            zone(i) = separated
-            now%q([i, n + i]) = 0.0_wp
-            now%shear%direction(:, i) = [1.0_wp, 0.0_wp]
-            now%shear%compliance(i) = 0.0_wp
-          end if
+        call friction%linearize(from, p_max, r, now%contact(from:to), now%p(from:to), now%q(from:to), now%q(n + from:n + to), &
+                                ds(:, 1), ds(:, 2), zone(from:to), now%shear%direction(:, from:to), &
+                                now%shear%compliance(from:to))
+        do i = from, to
+          if (.not. now%contact(i)) now%q([i, n + i]) = 0.0_wp
         end do
       end do
       !$omp end parallel do
       now%held = holding
-      if (now%held) call hold(now%shear%compliance, zone)
+      if (now%held) call hold_nodes(now%problem%options%contact%held_share, now%shear%compliance, zone)
 
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, across, e)
-      do i = 1, n
-        active(i) = zone(i) /= separated
-        active(n + i) = zone(i) == stick
-        if (zone(i) == slip) then
-          bound = friction%bound(now%p(i))
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, across, e, col, i, from, to)
+      do row = 1, now%problem%lattice%extent(2)
+        to = row*size(bound)
+        from = to - size(bound) + 1
+        call friction%find_bounds(from, now%p(from:to), bound)
+        do col = 1, size(bound)
+          i = from + col - 1
+          active(i) = zone(i) /= separated
+          active(n + i) = zone(i) == stick
+          if (zone(i) /= slip) cycle
           e = now%shear%direction(:, i)
           across = 0.0_wp
           if (now%shear%compliance(i) < soft*now%shear%elastic_compliance) then
             across = dot_product(normal_to(e), [now%q(i), now%q(n + i)])
           end if
-          now%q([i, n + i]) = bound*e + across*normal_to(e)
-        end if
+          now%q([i, n + i]) = bound(col)*e + across*normal_to(e)
+        end do
       end do
       !$omp end parallel do
     end associate
     call now%shear%weigh(now%contact)
   end subroutine classify
 
-  !> Let the nodes stick that slip least: without any, nothing resists a prescribed load.
-  subroutine hold(compliance, zone)
-    !> Compliance of each node, the less the closer it is to sticking [m/Pa]
-    real(wp), intent(inout) :: compliance(:)
-    !> Zone of each node
-    integer, intent(inout) :: zone(:)
-    real(wp) :: low, high, middle
-    integer :: i, n_contact
-
-    n_contact = count(zone == slip)
-    if (n_contact == 0) return
-    low = minval(compliance, mask=zone == slip)
-    high = maxval(compliance, mask=zone == slip)
-    do i = 1, 60
-      middle = sqrt(low)*sqrt(high)
-      if (count(zone == slip .and. compliance <= middle) < held_share*n_contact) then
-        low = middle
-      else
-        high = middle
-      end if
-    end do
-    where (zone == slip .and. compliance <= high)
-      zone = stick
-      compliance = 0.0_wp
-    end where
-  end subroutine hold
-
   !> Loads that are prescribed as constraints on the unknowns.
   subroutine find_constraints(now, active, driven, constraint, missing)
-    type(iterate_t), intent(in) :: now
+    type(friction_iterate_t), intent(in) :: now
     !> Unknowns, in the frames (2 n)
     logical, intent(in) :: active(:)
     !> Motions that are driven by their loads
@@ -165,8 +137,8 @@ contains
 
   !> Displacements that sticking nodes should have as far as it is known: where they stood, and the motions that
   !> are prescribed.
-  subroutine find_wanted(now, frame)
-    type(iterate_t), intent(in) :: now
+  subroutine find_prescribed_displacement(now, frame)
+    type(friction_iterate_t), intent(in) :: now
     !> In the frames (2 n)
     real(wp), intent(out), contiguous :: frame(:)
     real(wp) :: motion(n_motion), x, y
@@ -185,6 +157,6 @@ contains
       end do
     end do
     !$omp end parallel do
-  end subroutine find_wanted
+  end subroutine find_prescribed_displacement
 
 end module hc_active_zones

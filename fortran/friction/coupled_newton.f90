@@ -1,34 +1,45 @@
-!> Newton's method for pressure and shear traction at once.
+!> A coupled sweep: a step of Newton's method for pressure, shear traction and motions at once.
 !>
-!> Where the two act strongly on each other (dissimilar materials and much
-!> friction), sweeps that find one after the other keep exchanging nodes at the
-!> edge of the contact. Here contact area, stick, slip and both tractions come from
-!> one linear problem with the rigid motions, solved by GMRES. It is not
-!> symmetric, because the pressure of a slipping node carries mu p e along.
+!> Where pressure and shear traction act strongly on each other (dissimilar materials and much friction), staggered sweeps
+!> keep exchanging nodes at the edge of the contact. Here F(p, q, motions) = 0, (F2) to (F4) of docs/theory/friction.md as they
+!> stand at the top of staggered_newton, is linearised as a whole (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
+!> 1991; Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003):
+!>
+!>     ( E_t^T T E + D   -E_t^T B ) ( p, q_stick, tau )   ( E_t^T (-h, s^n) )
+!>     (  A B^T E            0    ) (     motions     ) = ( P, Q_x, Q_y, M_z ),                    (F7)
+!>
+!> with q = mu p e + tau t in E and q = tau t in E_t where a node slips: the pressure carries mu p e along, and the matrix is
+!> not symmetric. The steps, in their order below:
+!>
+!> 1. contact, stick, slip, directions e and compliances D by (F5), (F6), with r' and r of (F8);
+!> 2. unknowns in the frames of the nodes, without mu p e, which belongs to p;
+!> 3. loads as rows A B^T E, motions as columns E_t^T B, and the start corrected so that it carries the loads;
+!> 4. (F7) by GMRES, preconditioned block by block and projected as in (F11);
+!> 5. tractions and motions of the solution, and the residuals R_n and R_t from the product that GMRES carries along.
+!>
+!> If nothing resists the loads, `failed` is true, and a staggered sweep follows.
 module hc_coupled_newton
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
-  use hc_friction_iterate, only: iterate_t, rounding
-  use hc_staggered_newton, only: lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
-  use hc_friction_systems, only: coupled_system_t
+  use hc_active_zones, only: find_contact, classify, find_constraints, find_prescribed_displacement
+  use hc_friction_iterate, only: friction_iterate_t
+  use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
+  use hc_coupled_system, only: coupled_system_t
   use hc_krylov, only: projected_gmres, fulfil
   implicit none
   private
 
   public :: coupled_sweep
 
-  !> Directions that GMRES keeps.
-  integer, parameter :: max_directions = 40
-
 contains
 
   !> One step of Newton's method.
   subroutine coupled_sweep(now, failed, error)
     !> Tractions and motions
-    type(iterate_t), intent(inout), target :: now
+    type(friction_iterate_t), intent(inout), target :: now
     !> Nothing came of it: no node resists the loads
     logical, intent(out) :: failed
     !> Allocated on failure
@@ -41,16 +52,20 @@ contains
     logical, allocatable :: active(:), shear_active(:), contact(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
+    type(newton_options_t) :: options
     real(wp) :: missing(4), multiplier(4), goal, residual, drift
     integer :: n, m, k, n_shear, iterations
     logical :: independent
 
     n = size(now%p)
+    options = now%problem%options%newton
+    ! 1.
     call now%find_gap(gap)
     call find_contact(now, gap, contact)
     call move_alloc(contact, now%contact)
     now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
     call classify(now, .false., shear_active)
+    ! 2.
     system%operators => now%operators
     system%shear => now%shear
     call now%pressure%take(now%contact)
@@ -60,8 +75,9 @@ contains
     active(:n) = now%contact
     active(n + 1:) = shear_active
     allocate (system%slope(n), source=0.0_wp)
-    if (.not. now%problem%friction%no_slip) then
-      where (now%contact .and. .not. shear_active(n + 1:)) system%slope = now%problem%friction%coefficient
+    if (now%problem%friction%is_bounded()) then
+      call now%problem%friction%find_slopes(1, now%p, system%slope)
+      where (.not. now%contact .or. shear_active(n + 1:)) system%slope = 0.0_wp
     end if
     x(:n) = now%p
     call now%shear%to_frame(now%q, x(n + 1:))
@@ -69,6 +85,7 @@ contains
     x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
     where (.not. shear_active) x(n + 1:) = 0.0_wp
 
+    ! 3.
     call find_constraints(now, shear_active, driven, shear_columns, shear_missing)
     n_shear = size(shear_missing)
     m = n_shear
@@ -90,41 +107,43 @@ contains
       multiplier(m) = now%motion(normal)
     end if
     allocate (mb(3*n, m), source=0.0_wp)
-    call drag_shear(now, shear_active, shear_columns, .false., part, error)
+    call find_rigid_traction(now, shear_active, shear_columns, .false., part, error)
     if (allocated(error)) return
     mb(n + 1:, :n_shear) = part
     if (m > n_shear) then
-      call lift_pressure(now, columns(:n, m:), part, error)
+      call find_punch_pressure(now, columns(:n, m:), part, error)
       if (allocated(error)) return
       mb(:n, m:) = part
     end if
     call fulfil(rows, mb, missing(:m), x, independent, system%space)
+    ! 4.
     if (independent) then
       call system%product(x, ax, error)
       if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
-      call find_wanted(now, rhs(n + 1:))
+      call find_prescribed_displacement(now, rhs(n + 1:))
       weight(:n) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
       weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
-      goal = max(inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
-                 final_accuracy*now%tolerance)
+      goal = max(options%inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
+                 options%final_accuracy*now%tolerance)
       goal = goal*real(system%space%count(active), wp)**0.25_wp
-      call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, max_directions, multiplier(:m), &
+      call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, options%max_directions, multiplier(:m), &
                            independent, residual, iterations, now%outcome, error, drift)
       if (allocated(error)) return
-      if (drift > rounding) call system%product(x, ax, error)
+      if (drift > options%displacement_rounding) call system%product(x, ax, error)
       if (allocated(error)) return
     end if
     ! where all nodes slip, only their directions resist a load: not beyond reason
     failed = .not. independent
     if (.not. failed .and. n_shear > 0 .and. .not. any(shear_active(n + 1:))) then
-      failed = maxval(abs(x(n + 1:2*n))) > beyond_reason*now%traction_scale()
+      failed = maxval(abs(x(n + 1:2*n))) > options%most_across*now%traction_scale()
     end if
     if (failed) then
       call now%refresh(error)
       return
     end if
 
+    ! 5.
     call driven%set_motions(multiplier(:n_shear), now%motion)
     if (m > n_shear) now%motion(normal) = multiplier(m)
     now%p = x(:n)

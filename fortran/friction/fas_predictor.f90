@@ -7,11 +7,13 @@
 !>
 !>     h_c = g + approach - w_c,     s_c = u_c - shift - twist x r - (s - s^n).
 !>
-!> The new loads are then applied to it (full approximation scheme), after a
+!> The new loads are then applied to it (full approximation scheme, Brandt, Math. Comput. 31, 1977), after a
 !> still coarser lattice has been asked in the same way, and the change of its
 !> tractions and motions is added to the fine ones. Nodes between coarse ones that slip are put
 !> onto the cone. The fronts of contact, stick and slip are where
 !> they should be then but for a node or two, and no history has to be kept for it.
+!>
+!> Equations: docs/theory/multilevel.md, (M1).
 module hc_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -19,18 +21,12 @@ module hc_fas_predictor
   use hc_coulomb, only: magnitude
   use hc_contact_problem, only: friction_problem_t
   use hc_elastic_operators, only: operators_t
-  use hc_lattice_solver, only: solve_level
+  use hc_lattice_solver, only: solve_on_lattice
   use hc_transfer, only: prolong, prolong_vector, restrict_field, restrict_vector
   implicit none
   private
 
   public :: predict
-
-  !> Nodes that a coarse contact should have at least.
-  integer, parameter :: enough_nodes = 100
-  !> Coarse lattices only have to give a start, and that soon.
-  real(wp), parameter :: coarse_tolerance = 1.0e-2_wp
-  integer, parameter :: coarse_sweeps = 20
 
 contains
 
@@ -70,7 +66,7 @@ contains
     if (size(coarse) == 0) return
     model = coarse(1)
     call restrict_state(problem, start, model, before)
-    if (count(before%pressure > 0.0_wp) < enough_nodes) return
+    if (count(before%pressure > 0.0_wp) < problem%options%multilevel%least_contact) return
 
     allocate (displacement(model%lattice%extent(1), model%lattice%extent(2), 3))
     operators(1)%flexibility%applications = 0.0_wp
@@ -86,7 +82,8 @@ contains
       call predict(model, coarse(2:), operators(2:), before, origin, coarse_target, first, helped, coarser_work, error)
       if (allocated(error)) return
       work = work + coarser_work
-      call solve_level(model, operators(1), first, origin, coarse_target, coarse_tolerance, coarse_sweeps, after, error)
+      call solve_on_lattice(model, operators(1), first, origin, coarse_target, model%options%multilevel%change_tolerance, &
+                            model%options%multilevel%change_sweeps, after, error)
       if (allocated(error)) return
       work = work + after%operator_applications
       predicted = after%converged
@@ -121,7 +118,7 @@ contains
     !> Fine state: tractions and motions change
     type(contact_state_t), intent(inout) :: state
     real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
-    real(wp) :: bound, length
+    real(wp) :: bound(size(state%pressure, 1)), length
     integer :: col, row
 
     allocate (change, mold=state%pressure)
@@ -137,6 +134,9 @@ contains
       do col = 1, size(slipping, 1)
         state%pressure(col, row) = merge(max(state%pressure(col, row) + change(col, row), 0.0_wp), 0.0_wp, &
                                          problem%candidate(col, row))
+      end do
+      call problem%friction%find_bounds((row - 1)*size(bound) + 1, state%pressure(:, row), bound)
+      do col = 1, size(slipping, 1)
         if (state%pressure(col, row) <= 0.0_wp) then
           state%traction(col, row, :) = 0.0_wp
           cycle
@@ -144,9 +144,10 @@ contains
         state%traction(col, row, :) = state%traction(col, row, :) + change_of_traction(col, row, :)
         ! what is interpolated between tractions on the cone lies inside, and would stick
         if (slipping(col, row) < 1.0_wp) cycle
-        bound = problem%friction%bound(state%pressure(col, row))
         length = magnitude(state%traction(col, row, :))
-        if (length > 0.0_wp .and. length < bound) state%traction(col, row, :) = state%traction(col, row, :)*(bound/length)
+        if (length > 0.0_wp .and. length < bound(col)) then
+          state%traction(col, row, :) = state%traction(col, row, :)*(bound(col)/length)
+        end if
       end do
     end do
     !$omp end parallel do

@@ -3,33 +3,29 @@
 !> It holds tractions and motions with what they cause, and says which residuals follow from
 !> them. Which zones they call for stands in active_zones; how to get to the next iterate is left to
 !> staggered_newton and coupled_newton.
+!>
+!> Equations: docs/theory/friction.md, (F1).
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
-  use hc_friction_rows, only: residual_row, cone_row
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
   use hc_elastic_operators, only: operators_t
-  use hc_friction_systems, only: pressure_system_t, shear_system_t, new_shear_system
+  use hc_globalization, only: globalization_t
+  use hc_pressure_system, only: pressure_system_t
+  use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_krylov, only: solution_accurate
   use hc_field_space, only: field_space_t
   implicit none
   private
 
-  public :: iterate_t, cautious, rounding
-
-  !> The first guess of a shear traction from nothing: this much less of the slip counts.
-  real(wp), parameter :: cautious = 0.2_wp
-
-  !> What rounding errors may leave in displacements that are carried along, relative to the largest; where more may
-  !> be left, they are worked out anew.
-  real(wp), parameter :: rounding = 1.0e-10_wp
+  public :: friction_iterate_t
 
   !> Tractions and what they cause, as vectors over all nodes; two components one after the other.
-  type :: iterate_t
+  type :: friction_iterate_t
     !> Pressure and the closing of the gap that it causes
     real(wp), allocatable :: p(:), w(:)
     !> Shear traction, and the tangential displacement that it causes together with the pressure
@@ -47,7 +43,7 @@ module hc_friction_iterate
     !> Too few nodes stick on their own, some were held so that a prescribed load can be carried
     logical :: held = .false.
     !> Even so nothing resists a motion whose load is prescribed
-    logical :: adrift = .false.
+    logical :: unsupported = .false.
 
     type(friction_problem_t), pointer :: problem => null()
     type(operators_t), pointer :: operators => null()
@@ -58,18 +54,13 @@ module hc_friction_iterate
     !> Initial gap; relative displacement at the beginning of the step
     real(wp), allocatable :: h(:), origin(:)
     logical, allocatable :: candidate(:)
-    !> Pressure drags tangentially; shear tractions move the pressure
-    logical :: dragging = .false., pressing = .false.
-    !> Factor of the classification parameter, the smaller the worse the iteration goes
-    real(wp) :: caution = 1.0_wp
-    !> Shear tractions solved for, and the least of their residuals R_t
-    integer :: n_sweep = 0
-    real(wp) :: best = huge(1.0_wp)
-    !> Share of the next step that is taken if that residual does not fall
-    real(wp) :: share = 0.5_wp
-    !> About the pressure that an approach of the contact causes, and the shear traction of each rigid motion,
-    !> components along x and y: what constraints are fulfilled with
-    real(wp), allocatable :: lift(:, :), drag(:, :)
+    !> Pressure moves nodes tangentially; shear tractions move them along the normal, and so the pressure
+    logical :: shear_feels_pressure = .false., pressure_feels_shear = .false.
+    !> Damping and cuts of the classification parameter
+    type(globalization_t) :: globalization
+    !> Estimates, with the preconditioner, of the pressure that an approach of the contact causes, and of the shear traction of
+    !> each rigid motion, components along x and y: they correct tractions that do not carry the prescribed loads
+    real(wp), allocatable :: punch_pressure(:, :), rigid_traction(:, :)
     !> How the linear solutions of the last sweep ended, the worst of them
     integer :: outcome = solution_accurate
     !> The start knew of no contact
@@ -95,13 +86,13 @@ module hc_friction_iterate
     procedure :: is_finite
     !> Are displacements those of the tractions?
     procedure :: check_displacements
-  end type iterate_t
+  end type friction_iterate_t
 
 contains
 
   !> Start from a state.
   subroutine begin(self, problem, operators, start, reference, target, tolerance, error)
-    class(iterate_t), intent(inout) :: self
+    class(friction_iterate_t), intent(inout) :: self
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners over its window
@@ -128,11 +119,11 @@ contains
     self%pressure%operators => operators
     self%pressure%space = operators%space
     call new_shear_system(self%shear, operators)
-    self%dragging = abs(problem%pair%lambda_2) > 0.0_wp
-    self%pressing = self%dragging .and. problem%friction%resists() .and. .not. problem%goodman
+    self%shear_feels_pressure = abs(problem%pair%lambda_2) > 0.0_wp
+    self%pressure_feels_shear = self%shear_feels_pressure .and. problem%friction%resists() .and. .not. problem%goodman
     highest = huge(1.0_wp)
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-    if (target%control(normal) /= force_control .and. .not. self%pressing) highest = target%value(normal)
+    if (target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) highest = target%value(normal)
     allocate (self%h(n), self%origin(2*n), self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
     allocate (self%candidate(n), self%contact(n))
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
@@ -170,7 +161,7 @@ contains
 
   !> Displacements of the present tractions, from scratch.
   subroutine refresh(self, error)
-    class(iterate_t), intent(inout) :: self
+    class(friction_iterate_t), intent(inout) :: self
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: moved(:)
@@ -182,7 +173,7 @@ contains
     self%cut = .false.
     self%joint = .false.
     allocate (moved(3*n))
-    if (self%dragging .and. .not. (self%cold .and. self%first)) then
+    if (self%shear_feels_pressure .and. .not. (self%cold .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
       call space%copy(moved(:n), self%w)
@@ -194,7 +185,7 @@ contains
     end if
     call space%fill(self%closing, 0.0_wp)
     if (all_zero(self%q)) return
-    if (self%pressing) then
+    if (self%pressure_feels_shear) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
       call space%copy(moved(:n), self%closing)
@@ -212,7 +203,7 @@ contains
 
   !> Gap of the present tractions and approach.
   subroutine find_gap(self, gap)
-    class(iterate_t), intent(in) :: self
+    class(friction_iterate_t), intent(in) :: self
     !> The gap (n) [m]
     real(wp), allocatable, intent(out) :: gap(:)
     integer :: i
@@ -227,7 +218,7 @@ contains
 
   !> ds of the present tractions and motions at the nodes of a row in contact, zero elsewhere.
   pure subroutine slip_row(self, row, dsx, dsy)
-    class(iterate_t), intent(in) :: self
+    class(friction_iterate_t), intent(in) :: self
     integer, intent(in) :: row
     !> Components along x and y (n_col)
     real(wp), intent(out), contiguous :: dsx(:), dsy(:)
@@ -247,43 +238,44 @@ contains
 
   !> Largest shear traction that there can be.
   real(wp) function traction_scale(self)
-    class(iterate_t), intent(in) :: self
+    class(friction_iterate_t), intent(in) :: self
     real(wp) :: largest
     integer :: n
 
     n = size(self%p)
     largest = 0.0_wp
     traction_scale = self%operators%space%max(self%p)
-    if (self%problem%friction%no_slip) largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
+    if (.not. self%problem%friction%is_bounded()) then
+      largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
+    end if
     traction_scale = tangential_scale(self%problem%friction, largest)*traction_scale
   end function traction_scale
 
   !> Shear traction cut to the cone.
   subroutine cut_to_cone(self, q)
-    class(iterate_t), intent(in) :: self
+    class(friction_iterate_t), intent(in) :: self
     !> The traction, components along x and y (2 n) [Pa]
     real(wp), allocatable, intent(out) :: q(:)
-    real(wp) :: unit, slope
+    real(wp) :: unit
     integer :: n, n_col, row, from, to
 
     n = size(self%p)
     n_col = self%problem%lattice%extent(1)
     allocate (q(2*n))
     unit = pressure_unit(self)
-    slope = self%problem%friction%slope()
     !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(from, to)
     do row = 1, n/n_col
       from = (row - 1)*n_col + 1
       to = row*n_col
-      call cone_row(n_col, unit, slope, self%p(from:to), self%q(from:to), self%q(n + from:n + to), q(from:to), &
-                    q(n + from:n + to))
+      call self%problem%friction%project(from, unit, self%p(from:to), self%q(from:to), self%q(n + from:n + to), q(from:to), &
+                                         q(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine cut_to_cone
 
   !> Inverse of the largest pressure, 0 without pressure [1/Pa].
   real(wp) function pressure_unit(self)
-    class(iterate_t), intent(in) :: self
+    class(friction_iterate_t), intent(in) :: self
 
     pressure_unit = max(self%operators%space%max(self%p), 0.0_wp)
     if (pressure_unit > 0.0_wp) pressure_unit = 1.0_wp/pressure_unit
@@ -291,7 +283,7 @@ contains
 
   !> Residuals of the present tractions; nothing is multiplied for them.
   subroutine find_residuals(self)
-    class(iterate_t), intent(inout) :: self
+    class(friction_iterate_t), intent(inout) :: self
     real(wp), allocatable :: gap(:)
 
     call self%find_gap(gap)
@@ -301,14 +293,13 @@ contains
 
   !> R_t alone.
   subroutine find_tangential_residual(self)
-    class(iterate_t), intent(inout) :: self
-    real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, slope, largest, worst
+    class(friction_iterate_t), intent(inout) :: self
+    real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, largest, worst
     integer :: n, row, from, to
 
     n = size(self%p)
     self%residual_tangential = 0.0_wp
     unit = pressure_unit(self)
-    slope = self%problem%friction%slope()
     if (.not. (unit > 0.0_wp .and. self%problem%friction%resists())) return
     largest = 0.0_wp
     worst = 0.0_wp
@@ -318,8 +309,8 @@ contains
       from = (row - 1)*size(ds, 1) + 1
       to = row*size(ds, 1)
       call self%slip_row(row, ds(:, 1), ds(:, 2))
-      call residual_row(size(ds, 1), unit, slope, 1.0_wp/self%problem%tangential_compliance, self%p(from:to), &
-                        self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
+      call self%problem%friction%violation(from, unit, 1.0_wp/self%problem%tangential_compliance, self%p(from:to), &
+                                           self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
     end do
     !$omp end parallel do
     self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, largest)
@@ -327,7 +318,7 @@ contains
 
   !> Are all tractions and motions finite numbers?
   logical function is_finite(self)
-    class(iterate_t), intent(in) :: self
+    class(friction_iterate_t), intent(in) :: self
     integer :: n, i
 
     n = size(self%p)
@@ -342,18 +333,18 @@ contains
   !> Fail where `w`, `closing` and `u` are not what the tractions cause: every step of the algorithm has to
   !> leave them so. The products are not counted.
   subroutine check_displacements(self, error)
-    class(iterate_t), intent(inout) :: self
+    class(friction_iterate_t), intent(inout) :: self
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: applications, largest
     real(wp), allocatable :: q(:), moved(:), dragged(:), w(:), u(:), closing(:)
 
-    associate (n => size(self%p))
+    associate (n => size(self%p), rounding => self%problem%options%newton%displacement_rounding)
       allocate (moved(3*n), dragged(3*n), source=0.0_wp)
       applications = self%operators%flexibility%applications
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], dragged, error)
       if (allocated(error)) return
-      if (.not. self%dragging) dragged(n + 1:) = 0.0_wp
+      if (.not. self%shear_feels_pressure) dragged(n + 1:) = 0.0_wp
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
       u = dragged(n + 1:) + moved(n + 1:)
@@ -362,32 +353,34 @@ contains
         call self%operators%apply([along_x, along_y], q, [normal], moved(:n), error)
         if (allocated(error)) return
       end if
-      if (.not. self%pressing) moved(:n) = 0.0_wp
+      if (.not. self%pressure_feels_shear) moved(:n) = 0.0_wp
       w = dragged(:n) + merge(moved(:n), 0.0_wp, self%joint)
       closing = merge(0.0_wp, moved(:n), self%joint)
       self%operators%flexibility%applications = applications
       ! what sticks moves little: pressure and shear traction cancel there
       largest = maxval(abs(dragged(n + 1:))) + maxval(abs(moved(n + 1:)))
-      if (.not. (agree(self%w, w, maxval(abs(w))) .and. &
-                 agree(self%closing, closing, maxval(abs(w))) .and. &
-                 (agree(self%u, u, largest) .or. .not. self%problem%friction%resists()))) then
+      if (.not. (agree(self%w, w, maxval(abs(w)), rounding) .and. &
+                 agree(self%closing, closing, maxval(abs(w)), rounding) .and. &
+                 (agree(self%u, u, largest, rounding) .or. .not. self%problem%friction%resists()))) then
         call raise(error, status%no_convergence, 'friction: displacements are not those of the tractions')
       end if
     end associate
   end subroutine check_displacements
 
   !> Do two fields agree but for rounding errors?
-  pure logical function agree(one, other, scale)
+  pure logical function agree(one, other, scale, rounding)
     real(wp), intent(in) :: one(:), other(:)
     !> Size of what they belong to
     real(wp), intent(in) :: scale
+    !> Share of it that rounding errors may make up
+    real(wp), intent(in) :: rounding
 
     agree = all(abs(one - other) <= rounding*scale)
   end function agree
 
   !> R_n of a gap under the present pressure.
   real(wp) function gap_residual(self, gap)
-    class(iterate_t), intent(in), target :: self
+    class(friction_iterate_t), intent(in), target :: self
     !> Gap (n) [m]
     real(wp), intent(in), contiguous, target :: gap(:)
     real(wp), pointer, contiguous :: p(:, :), g(:, :)
@@ -396,7 +389,8 @@ contains
       p(1:n(1), 1:n(2)) => self%p
       g(1:n(1), 1:n(2)) => gap
     end associate
-    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%space)
+    gap_residual = normal_residual(p, g, self%problem%candidate, self%problem%normal_compliance, self%operators%space, &
+                                   self%problem%normal_law)
   end function gap_residual
 
 end module hc_friction_iterate

@@ -3,6 +3,8 @@
 !> Sweeps of a semismooth Newton method (see lattice_solver) lead from the last
 !> state to the next, after coarser lattices have told what will change (see
 !> friction_predictor). Without an earlier state the first guess comes from them, too.
+!>
+!> Theory: docs/theory/multilevel.md.
 module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -10,9 +12,10 @@ module hc_frictional_contact
   use hc_field_space, only: space_over
   use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_elastic_operators, only: operators_t, new_operators, operators_memory
-  use hc_lattice_solver, only: solve_level
+  use hc_lattice_solver, only: solve_on_lattice
   use hc_fas_predictor, only: predict
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_transfer, only: prolong_edge, prolong_shear, restrict_vector, level_count
@@ -20,11 +23,6 @@ module hc_frictional_contact
   private
 
   public :: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
-
-  !> Windows below this many nodes a side are not coarsened any further.
-  integer, parameter :: smallest_side = 20
-  !> Coarse lattices only have to give a start.
-  real(wp), parameter :: coarse_tolerance = 1.0e-3_wp
 
   !> A contact problem with friction on a hierarchy of lattices.
   type, extends(friction_solver_t) :: frictional_contact_t
@@ -57,13 +55,13 @@ contains
     call check_operator(problem%lattice, problem%pair, error, n_threads)
     if (allocated(error)) return
     self%problem = problem
-    n_level = level_count(problem%lattice%extent, smallest_side)
+    n_level = level_count(problem%lattice%extent, problem%options%multilevel%smallest_side)
     allocate (self%operators(n_level), self%coarse(2:n_level))
     do l = 1, n_level
       if (l == 2) then
-        self%coarse(l) = problem%coarsened()
+        call problem%coarsen(self%coarse(l))
       else if (l > 2) then
-        self%coarse(l) = self%coarse(l - 1)%coarsened()
+        call self%coarse(l - 1)%coarsen(self%coarse(l))
       end if
       if (l == 1) then
         self%problem%space = space_over(problem%lattice%extent, n_threads)
@@ -104,7 +102,7 @@ contains
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
     !> Directions of GMRES: so many are enough as a rule
-    integer, parameter :: n_direction = 5
+    integer, parameter :: n_direction = 4
     integer(long) :: n, everywhere, inside
 
     n = int(extent(1), long)*extent(2)
@@ -192,7 +190,7 @@ contains
       !> State to start from
       type(contact_state_t), intent(in) :: from
 
-      call solve_level(self%problem, self%operators(1), from, reference, target, tolerance, max_sweeps, state, error)
+      call solve_on_lattice(self%problem, self%operators(1), from, reference, target, tolerance, max_sweeps, state, error)
       sweeps = sweeps + state%sweeps
       work = work + state%operator_applications
     end subroutine attempt
@@ -234,8 +232,8 @@ contains
         call new_friction_state(state, problem%lattice, problem%space)
         state%motion = guess%motion
         if (allocated(coarser%pressure)) call prolong_state(self%coarse(l + 1), coarser, problem, state)
-        call solve_level(problem, self%operators(l), state, origin(l)%value, target, coarse_tolerance, max_sweeps, &
-                         coarser, error)
+        call solve_on_lattice(problem, self%operators(l), state, origin(l)%value, target, &
+                              problem%options%multilevel%nested_tolerance, max_sweeps, coarser, error)
         if (allocated(error)) return
         work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()
         ! what is no solution is no start

@@ -1,35 +1,33 @@
 !> A load step with friction on one lattice.
 !>
-!> Sweeps that find pressure and shear traction one after the other (staggered_newton),
-!> and where that is not enough both together (coupled_newton).
+!> Sweeps that find pressure and shear traction one after the other (staggered_newton, which states the equations),
+!> and where that is not enough both together (coupled_newton), until the residuals of what is recorded are within the
+!> tolerance.
+!>
+!> Equations: docs/theory/friction.md, (F2) to (F4).
 module hc_lattice_solver
   use hc_precision, only: wp
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
+  use hc_options, only: newton_options_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
   use hc_elastic_operators, only: operators_t
-  use hc_friction_iterate, only: iterate_t, cautious
+  use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: staggered_sweep
   use hc_coupled_newton, only: coupled_sweep
   use hc_krylov, only: solution_broke_off
   implicit none
   private
 
-  public :: solve_level
+  public :: solve_on_lattice
 
-  !> Sweeps in which nodes had to be held, after which no more are made.
-  integer, parameter :: max_held = 12
-  !> Sweeps after which tractions that do not settle one after the other are found together, unless they act on
-  !> each other so strongly that it is done sooner: once residuals are near, or a few sweeps later all the same.
-  integer, parameter :: most_apart = 12, patience = 4
-  real(wp), parameter :: near = 0.6_wp
 contains
 
   !> Sweeps on one lattice.
-  subroutine solve_level(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
+  subroutine solve_on_lattice(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners
@@ -49,11 +47,13 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    type(iterate_t) :: now
+    type(friction_iterate_t) :: now
     real(wp), allocatable :: displacement(:, :, :)
+    type(newton_options_t) :: options
     integer :: sweep, held, apart
     logical :: failed
 
+    options = problem%options%newton
     held = 0
     operators%flexibility%applications = 0.0_wp
     operators%preconditioning = 0.0_wp
@@ -63,14 +63,15 @@ contains
     if (allocated(error)) return
     ! sweeps that find pressure and shear traction one after the other
     apart = max_sweeps
-    if (now%pressing) apart = most_apart
+    if (now%pressure_feels_shear) apart = options%staggered_sweeps
     if (problem%couples_strongly()) then
-      apart = 1
-      now%caution = cautious
+      apart = options%staggered_sweeps_strong
+      call now%globalization%cut(options%cautious_share, options)
     end if
     do sweep = 1, max_sweeps
       failed = .true.
-      if (sweep > apart .and. (max(now%residual_normal, now%residual_tangential) < near .or. sweep > apart + patience)) then
+      if (sweep > apart .and. (max(now%residual_normal, now%residual_tangential) < options%coupled_residual .or. &
+                              sweep > apart + options%coupled_delay)) then
         call coupled_sweep(now, failed, error)
         if (allocated(error)) return
       end if
@@ -82,11 +83,11 @@ contains
       if (now%held) then
         held = held + 1
         state%sliding = overloads(problem, target, reshape(now%p, problem%lattice%extent), now%residual_normal)
-        if (state%sliding) held = max_held
+        if (state%sliding) held = options%max_held_sweeps
       end if
       state%sweeps = sweep
       if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
-          .and. .not. now%adrift .and. held < max_held) cycle
+          .and. .not. now%unsupported .and. held < options%max_held_sweeps) cycle
 
       ! what is recorded fulfils the bounds exactly, and is judged by a product of its own
       call record(now, state)
@@ -94,7 +95,7 @@ contains
       call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
       if (allocated(error)) return
       call problem%conclude(target, tolerance, reference, displacement, state)
-      if (state%converged .or. now%adrift .or. held >= max_held) exit
+      if (state%converged .or. now%unsupported .or. held >= options%max_held_sweeps) exit
       call now%refresh(error)
       if (allocated(error)) return
     end do
@@ -107,11 +108,11 @@ contains
     state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)
     if (state%sliding) state%stopped = loads_not_carried
     if (.not. now%is_finite()) state%stopped = out_of_range
-  end subroutine solve_level
+  end subroutine solve_on_lattice
 
   !> Tractions of an iterate, without tension and cut to the cone.
   subroutine record(now, state)
-    type(iterate_t), intent(in) :: now
+    type(friction_iterate_t), intent(in) :: now
     type(contact_state_t), intent(inout) :: state
     real(wp), allocatable :: q(:)
     integer :: n, row, from, to
@@ -122,7 +123,7 @@ contains
     do row = 1, size(state%pressure, 2)
       to = row*size(state%pressure, 1)
       from = to - size(state%pressure, 1) + 1
-      state%pressure(:, row) = max(now%p(from:to), 0.0_wp)
+      call now%problem%normal_law%project(from, now%p(from:to), state%pressure(:, row))
       state%traction(:, row, 1) = q(from:to)
       state%traction(:, row, 2) = q(n + from:n + to)
     end do

@@ -1,52 +1,46 @@
-!> A sweep over pressure and shear traction.
+!> A staggered sweep: a step of Newton's method for the pressure, then one for the shear traction.
 !>
-!> Two steps of a semismooth Newton method: the pressure under the present shear
-!> traction, by active sets as without friction; then the shear traction under that
-!> pressure, with stick, slip and the direction of slip taken from the last
-!> iterate (see friction_law). Both linear problems are solved by projected
-!> conjugate gradients, no more accurately than the sets deserve; the rigid motions
-!> come out as multipliers of the prescribed loads.
+!> Both methods on FFTs, this one and coupled_newton, solve F(p, q, motions) = 0 at the end of a load step
+!> (docs/theory/friction.md),
+!>
+!>     F_p = p - max(0, p - r' g),     g = h + w(p, q) - approach,                      (F1), (F2)
+!>     F_q = q - P(q - r ds),         ds = u(p, q) - shift - twist x r - s^n,           (F1), (F3)
+!>     F_m = (sum A p - P,  sum A q - Q,  sum A (x q_y - y q_x) - M_z),                 (F4)
+!>
+!> with P the projection on what the law of friction allows under p (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
+!> 1991); a motion that is prescribed has no component of F_m. The linearisation is that of the branch on which each node
+!> lies (semismooth Newton: Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003): g = 0 on the contact, ds = 0 in stick,
+!> and in slip q = mu p e + tau t with t.ds + D tau = 0, (F5), (F6). A sweep is one pass of block Gauss-Seidel over it:
+!>
+!> 1. `solve_pressure`: the contact C by (F5), and (F9), T_pp p - approach = -h - T_pq q on C with sum A p = P, the approach its
+!>    multiplier, by conjugate gradients that keep the load (Polonsky & Keer, Wear 231, 1999, with a preconditioner);
+!> 2. `solve_shear`: stick, slip, directions e and compliances D by (F5), (F6), with r of (F8);
+!> 3. and (F10), (E^T T_qq E + D) (q, tau) - E^T B motions = E^T (s^n - T_qp p - T_qq mu p e), with the prescribed loads, by the
+!>    same conjugate gradients; where nothing resists a load, nodes are held; where the residual does not fall, the
+!>    step is damped (hc_globalization);
+!> 4. the closing of the gap by the shear traction, cut to the cone, and the residuals R_n and R_t, which take no product more.
+!>
+!> Linear problems are solved no more accurately than the sets deserve; the numbers are those of `newton_options_t`.
 module hc_staggered_newton
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, classify, find_constraints, find_wanted
-  use hc_friction_iterate, only: iterate_t, cautious, rounding
+  use hc_active_zones, only: find_contact, classify, find_constraints, find_prescribed_displacement
+  use hc_friction_iterate, only: friction_iterate_t
   use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
   implicit none
   private
 
-  public :: staggered_sweep, lift_pressure, drag_shear, inner_accuracy, final_accuracy, beyond_reason
-
-  !> Accuracy of a linear solution, relative to the residual at its start.
-  real(wp), parameter :: inner_accuracy = 0.1_wp
-  !> The same once residuals are small, and of the pressure: its iterations are the cheaper ones.
-  real(wp), parameter :: late_accuracy = 0.03_wp, press_accuracy = 0.05_wp
-  !> Accuracy of the last linear solution, relative to the tolerance.
-  real(wp), parameter :: final_accuracy = 0.2_wp
-  !> Component across the direction of slip, relative to the largest traction, that is taken for an answer.
-  real(wp), parameter :: beyond_reason = 5.0_wp
-  !> Sweeps after which a residual that falls less than this is taken for a circle.
-  integer, parameter :: patience = 6
-  real(wp), parameter :: stalling = 0.7_wp
-  !> The share of a step that is taken then falls by this factor from 1/2 on, down to this.
-  real(wp), parameter :: less = 0.9_wp, least_share = 0.1_wp
-  !> Residual from which on Newton's method is left alone.
-  real(wp), parameter :: settled = 1.0e-2_wp
-  !> Sweeps after which a whole step is taken again with half the classification parameter, and how small that gets.
-  integer, parameter :: tired = 10
-  real(wp), parameter :: least_caution = 1.0e-3_wp
-  integer, parameter :: max_iterations = 400
-  !> Contact areas that are tried before the shear traction is looked at again.
-  integer, parameter :: max_areas = 1, max_areas_alone = 60
+  public :: staggered_sweep, find_punch_pressure, find_rigid_traction
 
 contains
 
   !> One sweep: pressure, then shear traction, each with what it does to the other.
   subroutine staggered_sweep(now, error)
     !> Tractions and motions
-    type(iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout) :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: q(:)
@@ -55,17 +49,20 @@ contains
     ! the pressure is found under the shear traction: what each of them causes has to be known
     if (now%joint) call now%refresh(error)
     if (allocated(error)) return
-    call press(now, error)
+    ! 1.
+    call solve_pressure(now, error)
     if (allocated(error)) return
-    if (now%dragging .and. now%cold .and. now%first) then
+    if (now%shear_feels_pressure .and. now%cold .and. now%first) then
       call now%operators%apply([normal], now%p, [along_x, along_y], now%u, error)
       if (allocated(error)) return
     end if
     ! what the new pressure makes of the old shear traction is what has to be mended
     if (.not. now%first) call now%find_tangential_residual()
-    call shear_off(now, error)
+    ! 2. and 3.
+    call solve_shear(now, error)
     if (allocated(error)) return
-    if (now%pressing) then
+    ! 4.
+    if (now%pressure_feels_shear) then
       call now%cut_to_cone(q)
       call now%operators%apply([along_x, along_y], q, [normal], now%closing, error)
       if (allocated(error)) return
@@ -75,44 +72,46 @@ contains
     now%first = .false.
   end subroutine staggered_sweep
 
-  !> Pressure under the present shear traction.
-  subroutine press(now, error)
+  !> Pressure under the present shear traction, (F9).
+  subroutine solve_pressure(now, error)
     !> Tractions and motions
-    type(iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout) :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
     real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
     logical, allocatable :: contact(:)
+    type(newton_options_t) :: options
     real(wp) :: goal, scale, residual, drift, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations, outcome
     logical :: changed, independent, searching
 
     n = size(now%p)
+    options = now%problem%options%newton
     ! a start that knows of no contact: the one without shear has to be found before stick and slip can be
     searching = now%cold .and. now%first
     cell_area = now%problem%lattice%cell_area()
     n_constraint = merge(1, 0, now%target%control(normal) == force_control)
     allocate (constraint(n, n_constraint), rhs(n))
     level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
-    do area = 1, merge(max_areas, max_areas_alone, now%pressing .and. .not. searching)
+    do area = 1, merge(options%max_areas, options%max_areas_uncoupled, now%pressure_feels_shear .and. .not. searching)
       call now%find_gap(gap)
       now%residual_normal = now%gap_residual(gap)
       missing = 0.0_wp
       carried = now%pressure%space%sum(now%p)
       if (n_constraint == 1) missing = now%target%value(normal)/cell_area - carried
-      if (now%residual_normal <= final_accuracy*now%tolerance .and. &
-          abs(missing(1)) <= final_accuracy*now%tolerance*carried) return
+      if (now%residual_normal <= options%final_accuracy*now%tolerance .and. &
+          abs(missing(1)) <= options%final_accuracy*now%tolerance*carried) return
       changed = now%first .and. area == 1
       if (.not. (changed .and. now%cold)) then
         call find_contact(now, gap, contact)
         if (.not. changed) changed = count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if
-      if (searching .and. now%pressing .and. .not. changed) return
+      if (searching .and. now%pressure_feels_shear .and. .not. changed) return
 
       if (changed) call now%pressure%take(now%contact)
-      if (searching .and. now%pressing .and. allocated(now%lift)) deallocate (now%lift)
+      if (searching .and. now%pressure_feels_shear .and. allocated(now%punch_pressure)) deallocate (now%punch_pressure)
       !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, n
         if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))
@@ -120,7 +119,7 @@ contains
         if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
       end do
       !$omp end parallel do
-      call lift_pressure(now, constraint, mb, error)
+      call find_punch_pressure(now, constraint, mb, error)
       if (allocated(error)) return
       if (changed) then
         if (n_constraint == 1) then
@@ -130,23 +129,23 @@ contains
         call now%pressure%product(now%p, now%w, error)
         if (allocated(error)) return
       end if
-      goal = final_accuracy*now%tolerance
-      if (changed .or. now%pressing) goal = max(press_accuracy*min(now%residual_normal, 1.0_wp), goal)
+      goal = options%final_accuracy*now%tolerance
+      if (changed .or. now%pressure_feels_shear) goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
       scale = now%problem%normal_compliance*now%pressure%space%max(now%p)
-      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, goal*scale, max_iterations, &
+      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
                         multiplier(:n_constraint), residual, iterations, outcome, error, drift)
       if (allocated(error)) return
-      if (drift > rounding*scale) call now%pressure%product(now%p, now%w, error)
+      if (drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
       if (allocated(error)) return
       now%outcome = max(now%outcome, outcome)
       if (n_constraint == 1) now%motion(normal) = multiplier(1)
     end do
-  end subroutine press
+  end subroutine solve_pressure
 
-  !> Shear traction under the present pressure.
-  subroutine shear_off(now, error)
+  !> Shear traction under the present pressure, (F10).
+  subroutine solve_shear(now, error)
     !> Tractions and motions
-    type(iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout) :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -154,11 +153,13 @@ contains
     logical, allocatable :: active(:)
     real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
-    real(wp) :: goal, scale, residual, drift, motion(n_motion)
+    type(newton_options_t) :: options
+    real(wp) :: goal, scale, residual, drift, share, motion(n_motion)
     integer :: n, iterations, outcome
     logical :: independent, holding
 
     n = size(now%p)
+    options = now%problem%options%newton
     if (.not. now%problem%friction%resists()) then
       now%q = 0.0_wp
       return
@@ -171,11 +172,11 @@ contains
       call now%shear%to_frame(now%q, x)
       call find_constraints(now, active, driven, constraint, missing)
       multiplier = driven%multipliers(now%motion)
-      call drag_shear(now, active, constraint, .false., mb, error)
+      call find_rigid_traction(now, active, constraint, .false., mb, error)
       if (allocated(error)) return
       call fulfil(constraint, mb, missing, x, independent, now%shear%space)
       if (.not. independent) then
-        call drag_shear(now, active, constraint, .true., mb, error)
+        call find_rigid_traction(now, active, constraint, .true., mb, error)
         if (allocated(error)) return
         call fulfil(constraint, mb, missing, x, independent, now%shear%space)
       end if
@@ -183,31 +184,32 @@ contains
         call displace(now, x, ax, error)
         if (allocated(error)) return
         ! motions that are prescribed are known; the others are multipliers
-        call find_wanted(now, rhs)
+        call find_prescribed_displacement(now, rhs)
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
-        goal = goal*min(inner_accuracy, max(goal, merge(late_accuracy, 1.0e-3_wp, now%pressing)))
-        goal = max(goal, final_accuracy*now%tolerance)
+        goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, &
+                                                              now%pressure_feels_shear)))
+        goal = max(goal, options%final_accuracy*now%tolerance)
         scale = now%problem%tangential_compliance*now%traction_scale()
-        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal*scale, max_iterations, multiplier, &
+        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
                           residual, iterations, outcome, error, drift)
         if (allocated(error)) return
-        if (drift > rounding*scale) call displace(now, x, ax, error)
+        if (drift > options%displacement_rounding*scale) call displace(now, x, ax, error)
         if (allocated(error)) return
         now%outcome = max(now%outcome, outcome)
       end if
-      now%adrift = .not. independent
+      now%unsupported = .not. independent
       if (size(missing) == 0 .or. holding) exit
       ! where all nodes slip, only their directions resist a load: not beyond reason
       if (independent) then
         if (any(active(n + 1:))) exit
-        if (maxval(abs(x(:n))) <= beyond_reason*now%traction_scale()) exit
+        if (maxval(abs(x(:n))) <= options%most_across*now%traction_scale()) exit
       end if
       holding = .true.
-      now%caution = max(cautious*now%caution, least_caution)
+      call now%globalization%cut(options%cautious_share, options)
       now%q = q
     end do
-    if (now%adrift) then
+    if (now%unsupported) then
       now%q = q
       call now%refresh(error)
       return
@@ -218,31 +220,23 @@ contains
     call now%shear%take_springs_off(x, ax)
     call now%shear%to_plane(ax, now%u)
     call now%find_tangential_residual()
-    now%n_sweep = now%n_sweep + 1
-    if (mod(now%n_sweep, tired) == 0) then
-      now%caution = max(0.5_wp*now%caution, least_caution)
-      now%best = huge(1.0_wp)
-    end if
-    if (now%n_sweep <= patience .or. now%residual_tangential <= max(stalling*now%best, settled)) then
-      now%best = min(now%best, now%residual_tangential)
-      now%share = 0.5_wp
-    else
+    call now%globalization%step_share(now%residual_tangential, options, share)
+    if (share < 1.0_wp) then
       ! Newton's method goes in circles: what lies between carries the same loads
-      now%q = merge(q + now%share*(now%q - q), 0.0_wp, [now%contact, now%contact])
-      now%motion = motion + now%share*(now%motion - motion)
-      now%share = max(less*now%share, least_share)
+      now%q = merge(q + share*(now%q - q), 0.0_wp, [now%contact, now%contact])
+      now%motion = motion + share*(now%motion - motion)
       call now%shear%to_frame(now%q, x)
       call displace(now, x, ax, error)
       if (allocated(error)) return
       call now%shear%take_springs_off(x, ax)
       call now%shear%to_plane(ax, now%u)
     end if
-  end subroutine shear_off
+  end subroutine solve_shear
 
   !> What a shear traction and the pressure displace together, springs included.
   subroutine displace(now, x, ax, error)
     !> Tractions and motions
-    type(iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout) :: now
     !> Shear traction, in the frames (2 n)
     real(wp), intent(in), contiguous, target :: x(:)
     !> Tangential displacement, in the frames (2 n)
@@ -252,7 +246,7 @@ contains
     real(wp), allocatable :: traction(:), moved(:)
     integer :: n, i
 
-    if (.not. now%dragging) then
+    if (.not. now%shear_feels_pressure) then
       call now%shear%product(x, ax, error)
       return
     end if
@@ -270,10 +264,10 @@ contains
     !$omp end parallel do
   end subroutine displace
 
-  !> About the pressure that an approach of the nodes in contact causes: worked out once a step.
-  subroutine lift_pressure(now, constraint, mb, error)
+  !> Estimate of the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
+  subroutine find_punch_pressure(now, constraint, mb, error)
     !> Tractions and motions
-    type(iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout) :: now
     !> One on the nodes in contact; or no constraint at all (n, 1 or 0)
     real(wp), intent(in) :: constraint(:, :)
     !> The pressure, zero off the contact (n, 1 or 0)
@@ -282,29 +276,29 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: i, k
 
-    if (.not. allocated(now%lift)) then
-      call precondition_constraints(now%pressure, now%contact, constraint, now%lift, error)
+    if (.not. allocated(now%punch_pressure)) then
+      call precondition_constraints(now%pressure, now%contact, constraint, now%punch_pressure, error)
       if (allocated(error)) return
     end if
-    allocate (mb, mold=now%lift)
+    allocate (mb, mold=now%punch_pressure)
     do k = 1, size(mb, 2)
       !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, size(mb, 1)
-        mb(i, k) = merge(now%lift(i, k), 0.0_wp, now%contact(i))
+        mb(i, k) = merge(now%punch_pressure(i, k), 0.0_wp, now%contact(i))
       end do
       !$omp end parallel do
     end do
-  end subroutine lift_pressure
+  end subroutine find_punch_pressure
 
-  !> About the shear traction that rigid motions of the unknowns cause: worked out once a step, if it serves.
-  subroutine drag_shear(now, active, constraint, afresh, mb, error)
+  !> Estimate of the shear traction that rigid motions of the unknowns cause, V of (F11): made once a step, if it serves.
+  subroutine find_rigid_traction(now, active, constraint, afresh, mb, error)
     !> Tractions and motions
-    type(iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout) :: now
     !> Unknowns, in the frames (2 n)
     logical, intent(in), contiguous :: active(:)
     !> Constraint vectors, in the frames (2 n, number of constraints)
     real(wp), intent(in), contiguous :: constraint(:, :)
-    !> Work it out again
+    !> Make it again
     logical, intent(in) :: afresh
     !> The traction, in the frames (2 n, number of constraints)
     real(wp), allocatable, intent(out) :: mb(:, :)
@@ -313,22 +307,22 @@ contains
     integer :: k
     logical :: known
 
-    known = allocated(now%drag) .and. .not. afresh
-    if (known) known = size(now%drag, 2) == size(constraint, 2)
+    known = allocated(now%rigid_traction) .and. .not. afresh
+    if (known) known = size(now%rigid_traction, 2) == size(constraint, 2)
     if (known) then
       allocate (mb, mold=constraint)
       do k = 1, size(mb, 2)
-        call now%shear%soften(constraint(:, k), now%drag(:, k), active, mb(:, k))
+        call now%shear%soften(constraint(:, k), now%rigid_traction(:, k), active, mb(:, k))
       end do
     else
       call precondition_constraints(now%shear, active, constraint, mb, error)
       if (allocated(error)) return
-      if (allocated(now%drag)) deallocate (now%drag)
-      allocate (now%drag, mold=mb)
+      if (allocated(now%rigid_traction)) deallocate (now%rigid_traction)
+      allocate (now%rigid_traction, mold=mb)
       do k = 1, size(mb, 2)
-        call now%shear%to_plane(mb(:, k), now%drag(:, k))
+        call now%shear%to_plane(mb(:, k), now%rigid_traction(:, k))
       end do
     end if
-  end subroutine drag_shear
+  end subroutine find_rigid_traction
 
 end module hc_staggered_newton

@@ -2,23 +2,22 @@
 !>
 !> A contact that is small in its window (the first steps of one that grows, wide
 !> windows) is solved on the part around it. What the tractions do elsewhere follows from one
-!> product over the window, which also judges the state. Should the contact reach
-!> the rim of the part, or the bodies overlap outside, the step is solved on the whole window.
+!> product over the window, which also judges the state; hc_subwindow says what follows if it fails.
+!>
+!> Theory: docs/theory/multilevel.md.
 module hc_subwindow_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_window_part, only: frame, is_worth, part_of, worth
+  use hc_subwindow, only: next_part
   implicit none
   private
 
   public :: windowed_friction_t, new_windowed_friction, windowed_friction_memory
-
-  !> The part has to leave something for the product over the window, which sees other roundings.
-  real(wp), parameter :: part_tolerance = 0.9_wp
 
   !> A contact problem with friction, on its window and on a part of it.
   type, extends(friction_solver_t) :: windowed_friction_t
@@ -59,7 +58,8 @@ contains
     self%problem%space = self%whole%problem%space
   end subroutine new_windowed_friction
 
-  !> Bytes that a problem takes while a step is solved on the window; on a part alone it is less.
+  !> Bytes that a problem takes while a step is solved on the window; parts, and spectra that are kept of them, take
+  !> more the more steps the contact grows in.
   pure integer(selected_int_kind(18)) function windowed_friction_memory(extent, n_contact, n_force, coupled, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -72,17 +72,11 @@ contains
     !> Threads to use
     integer, intent(in) :: threads
     integer, parameter :: long = selected_int_kind(18)
-    real(wp) :: share
 
     ! what is given is there twice
     windowed_friction_memory = frictional_contact_memory(extent, threads) &
                                + friction_step_memory(extent, n_contact, n_force, coupled) &
                                + 28*int(extent(1), long)*extent(2)
-    if (.not. coupled) return
-    ! steps that move the edge of the contact are tried on a part first, about as large as the contact will be;
-    ! its operators stay meanwhile
-    share = min(worth, n_contact/(real(extent(1), wp)*extent(2)))
-    windowed_friction_memory = windowed_friction_memory + frictional_contact_memory(int(sqrt(share)*extent), threads)
   end function windowed_friction_memory
 
   subroutine displacements(self, pressure, traction, displacement, error)
@@ -104,22 +98,37 @@ contains
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
 
-    integer :: low(2), high(2)
+    integer :: low(2), high(2), try, sweeps
     real(wp) :: work
+    logical :: found, solved
 
     work = 0.0_wp
+    sweeps = 0
     if (any(start%pressure > 0.0_wp) .and. self%problem%is_pressed(target)) then
-      call frame(start%pressure > 0.0_wp, low, high)
-      if (is_worth(low, high, self%problem%lattice)) then
+      do try = 1, self%problem%options%multilevel%max_parts + 1
+        associate (problem => self%problem, options => self%problem%options%multilevel)
+          if (try == 1) then
+            call next_part(try, options, problem%lattice, problem%candidate, start, low, high, found)
+          else
+            call next_part(try, options, problem%lattice, problem%candidate, state, low, high, found)
+          end if
+        end associate
+        if (.not. found) exit
         call take_part(self, low, high, error)
         if (allocated(error)) return
-        call solve_part(self, start, reference, target, tolerance, max_sweeps, state, work, error)
+        call solve_part(self, start, reference, target, tolerance, max_sweeps, state, solved, error)
         if (allocated(error)) return
+        work = work + state%operator_applications
+        sweeps = sweeps + state%sweeps
+        state%operator_applications = work
+        state%sweeps = sweeps
         if (state%converged) return
-      end if
+        if (.not. solved) exit
+      end do
     end if
     call self%whole%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
     state%operator_applications = state%operator_applications + work
+    state%sweeps = state%sweeps + sweeps
   end subroutine solve_step
 
   !> Solver on the part of the window between some columns and rows, unless it is at hand.
@@ -136,20 +145,13 @@ contains
     end if
     self%low = low
     self%high = high
-    problem = self%problem
-    associate (c => [low(1), high(1)], r => [low(2), high(2)])
-      problem%lattice = part_of(self%problem%lattice, low, high)
-      problem%initial_gap = self%problem%initial_gap(c(1):c(2), r(1):r(2))
-      problem%candidate = self%problem%candidate(c(1):c(2), r(1):r(2))
-      problem%x = self%problem%x(c(1):c(2), r(1):r(2))
-      problem%y = self%problem%y(c(1):c(2), r(1):r(2))
-    end associate
+    call self%problem%take_part(low, high, problem)
     allocate (self%part)
     call new_frictional_contact(self%part, problem, error, self%n_threads, self%cache)
   end subroutine take_part
 
-  !> A step on the part; not converged: it has to be solved on the window.
-  subroutine solve_part(self, start, reference, target, tolerance, max_sweeps, state, work, error)
+  !> A step on the part, judged on the window.
+  subroutine solve_part(self, start, reference, target, tolerance, max_sweeps, state, solved, error)
     class(windowed_friction_t), intent(inout) :: self
     type(contact_state_t), intent(in) :: start
     real(wp), intent(in) :: reference(:, :, :)
@@ -158,14 +160,14 @@ contains
     integer, intent(in) :: max_sweeps
     !> State on the window
     type(contact_state_t), intent(out) :: state
-    !> Work, in applications of the full operator over the window
-    real(wp), intent(out) :: work
+    !> There is a solution on the part
+    logical, intent(out) :: solved
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(contact_state_t) :: before, after
     real(wp), allocatable :: displacement(:, :, :)
 
-    work = 0.0_wp
+    solved = .false.
     call new_friction_state(state, self%problem%lattice, self%problem%space)
     associate (lattice => self%part%problem%lattice, c => [self%low(1), self%high(1)], r => [self%low(2), self%high(2)])
       call new_friction_state(before, lattice, self%problem%space)
@@ -176,34 +178,22 @@ contains
       before%motion = start%motion
       before%load = start%load
       if (.not. self%part%problem%is_pressed(target)) return
-      call self%part%solve_step(before, reference(c(1):c(2), r(1):r(2), :), target, part_tolerance*tolerance, max_sweeps, &
-                                after, error)
+      call self%part%solve_step(before, reference(c(1):c(2), r(1):r(2), :), target, &
+                                self%problem%options%multilevel%part_tolerance*tolerance, max_sweeps, after, error)
       if (allocated(error)) return
-      work = after%operator_applications*lattice%size()/self%problem%lattice%size()
-      if (.not. after%converged .or. reaches_rim(self, after%pressure > 0.0_wp)) return
+      state%operator_applications = after%operator_applications*lattice%size()/self%problem%lattice%size()
+      state%sweeps = after%sweeps
+      solved = after%converged
+      if (.not. solved) return
       state%pressure(c(1):c(2), r(1):r(2)) = after%pressure
       state%traction(c(1):c(2), r(1):r(2), :) = after%traction
     end associate
     state%motion = after%motion
-    state%sweeps = after%sweeps
     allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
     call self%whole%displacements(state%pressure, state%traction, displacement, error)
     if (allocated(error)) return
     call self%problem%conclude(target, tolerance, reference, displacement, state)
-    work = work + 1.0_wp
-    state%operator_applications = work
+    state%operator_applications = state%operator_applications + 1.0_wp
   end subroutine solve_part
-
-  !> Does the contact reach a rim of the part that is not one of the window?
-  pure logical function reaches_rim(self, contact)
-    class(windowed_friction_t), intent(in) :: self
-    !> Nodes in contact on the part
-    logical, intent(in) :: contact(:, :)
-
-    associate (n => shape(contact), extent => self%problem%lattice%extent)
-      reaches_rim = (self%low(1) > 1 .and. any(contact(1, :))) .or. (self%high(1) < extent(1) .and. any(contact(n(1), :))) &
-                    .or. (self%low(2) > 1 .and. any(contact(:, 1))) .or. (self%high(2) < extent(2) .and. any(contact(:, n(2))))
-    end associate
-  end function reaches_rim
 
 end module hc_subwindow_solver

@@ -2,9 +2,12 @@
 !>
 !> The first guess comes from the solution on the lattice of every second node,
 !> and so on down to a few nodes.
+!>
+!> Theory: docs/theory/normal_contact.md.
 module hc_normal_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: multilevel_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
@@ -13,12 +16,14 @@ module hc_normal_contact
   use hc_flexibility_fft, only: fft_memory
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_contact_state, only: contact_state_t, new_contact_state, check_problem, check_target
+  use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, normal
+  use hc_contact_solver, only: contact_solver_t
   use hc_symbol_preconditioner, only: preconditioner_memory
   use hc_normal_lattice, only: normal_level_t
   use hc_normal_iterate, only: iterate_t
   use hc_normal_lattice_solver, only: solve_level
-  use hc_window_part, only: frame, is_worth, part_of
+  use hc_subwindow, only: next_part
+  use hc_window_part, only: part_of
   use hc_transfer, only: level_count, prolong_edge, restrict_field, restrict_mask
   implicit none
   private
@@ -32,12 +37,11 @@ module hc_normal_contact
 
   !> Lattices with fewer nodes are left to one thread.
   integer, parameter :: worth_sharing = 150000
-  !> Parts of the window that are tried, and their tolerance.
-  integer, parameter :: part_tries = 3
+  !> Tolerance on a part of the window, relative to that on the whole.
   real(wp), parameter :: part_tolerance = 0.8_wp
 
   !> A frictionless contact problem on a hierarchy of lattices.
-  type :: normal_contact_t
+  type, extends(contact_solver_t) :: normal_contact_t
     private
     !> From the finest to the coarsest lattice
     type(normal_level_t), allocatable :: level(:)
@@ -54,6 +58,7 @@ module hc_normal_contact
     !> Threads that were asked for; 0: as many as OpenMP would take
     integer :: n_threads = 0
   contains
+    procedure :: solve_step
     !> Solve for a normal load or an approach
     procedure :: solve
   end type normal_contact_t
@@ -129,6 +134,22 @@ contains
                             + field*int(maxval(extent), long)**2 + n*(2*field + half + 2*field + 4*half)
   end function normal_contact_memory
 
+  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+    class(normal_contact_t), intent(inout), target :: self
+    type(contact_state_t), intent(in) :: start
+    real(wp), intent(in) :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+
+    ! the first guess is that of the coarser lattices: a load gives the same bits whatever came before it
+    associate (start => start, reference => reference)
+      call self%solve(target%control(normal), target%value(normal), tolerance, max_sweeps, state, error)
+    end associate
+  end subroutine solve_step
+
   !> Solve for a normal load or an approach.
   subroutine solve(self, control, target, tolerance, max_sweeps, state, error)
     class(normal_contact_t), intent(inout), target :: self
@@ -192,8 +213,7 @@ contains
 
   !> Solve on the finest lattice: on the part around the contact, if that is much smaller than the window.
   !>
-  !> The gap elsewhere follows from one product over the window; should the bodies overlap there,
-  !> the part grows.
+  !> The gap elsewhere follows from one product over the window.
   subroutine solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
     class(normal_contact_t), intent(inout), target :: self
     !> force_control or displacement_control
@@ -212,14 +232,15 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: part
+    type(multilevel_options_t) :: options
     integer :: low(2), high(2), sweeps, try
+    logical :: found
 
     associate (whole => self%level(1))
       sweeps = 0
-      do try = 1, part_tries
-        call frame(state%pressure > 0.0_wp, low, high)
-        if (try > 1) call frame(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. whole%candidate), low, high)
-        if (.not. is_worth(low, high, whole%lattice)) exit
+      do try = 1, options%max_parts + 1
+        call next_part(try, options, whole%lattice, whole%candidate, state, low, high, found)
+        if (.not. found) exit
         call take_part(self, low, high, error)
         if (allocated(error)) return
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
@@ -238,7 +259,8 @@ contains
         if (allocated(error)) return
         work = work + whole%work()
         state%sweeps = sweeps
-        if (state%converged .or. .not. part%converged) return
+        if (state%converged) return
+        if (.not. part%converged) exit
       end do
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
       call whole%prepare(self%pair, self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)

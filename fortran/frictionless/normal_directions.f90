@@ -1,4 +1,6 @@
 !> Steps of an iteration for frictionless contact: where to go, and how far.
+!>
+!> Equations: docs/theory/normal_contact.md, (N3) to (N5).
 module hc_normal_directions
   use hc_precision, only: wp, sp
   use hc_normal_lattice, only: normal_level_t

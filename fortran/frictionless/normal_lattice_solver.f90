@@ -11,6 +11,8 @@
 !> What is added to the pressure is multiplied in single precision, and pressure and gap are
 !> summed up in double precision. The error that this can have left in the gap is kept
 !> account of; before it matters the gap is found anew from the pressure, in double precision.
+!>
+!> Equations: docs/theory/normal_contact.md, (N2) to (N5).
 module hc_normal_lattice_solver
   use hc_precision, only: wp
   use hc_error, only: error_t

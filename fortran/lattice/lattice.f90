@@ -9,6 +9,8 @@
 !> The 60-degree lattice of the dissertation, eq. (5.1), is the default; no
 !> other module knows its angle. A window is the rhombus of nodes that is kept
 !> in memory; a field over it is an array of shape (n_col, n_row).
+!>
+!> Equations: docs/theory/discretisation.md, (D1), (D2).
 module hc_lattice
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp

@@ -15,6 +15,8 @@
 !>
 !> For a matrix that is not symmetric, and constraints C^T x whose multipliers act
 !> along other vectors B, GMRES does the same with (C^T M B)^-1 C^T.
+!>
+!> Equations: docs/theory/friction.md, (F11).
 module hc_krylov
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp

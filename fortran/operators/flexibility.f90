@@ -9,6 +9,8 @@
 !>     s_y = -lambda_2 K_y * p  + lambda_5 K_xy * q_x + (lambda_1 K1 + lambda_5 K_yy) * q_y
 !>
 !> The complete operator is symmetric (Betti) and positive definite.
+!>
+!> Equations: docs/theory/discretisation.md, (D4).
 module hc_flexibility
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise

@@ -82,13 +82,13 @@ contains
   pure integer(selected_int_kind(18)) function dense_memory(extent, n_contact, normal_only)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
-    !> Nodes in contact; with friction all stick
+    !> Nodes in contact
     integer, intent(in) :: n_contact
     !> Contact without friction
     logical, intent(in) :: normal_only
     integer, parameter :: long = selected_int_kind(18)
-    !> What BLAS packs matrices into
-    integer(long), parameter :: buffers = 15000000
+    !> What BLAS packs matrices into: 2 to 15 MB, as it was built and for what processor
+    integer(long), parameter :: buffers = 8500000
     integer(long) :: n
 
     n = n_contact
@@ -97,8 +97,8 @@ contains
       ! the first guess is where undeformed bodies would overlap, twice the contact and more; half of the matrix is touched
       dense_memory = dense_memory + 8*min(15*n/7, int(extent(1), long)*extent(2))**2/2
     else
-      ! beside the matrix its factors of single precision; on its way the area may be a seventh larger
-      dense_memory = dense_memory + (8 + 4)*(3*(n + n/7))**2
+      ! beside the matrix its factors of single precision; mostly some nodes slip, which have two unknowns
+      dense_memory = dense_memory + (8 + 4)*(14*n/5)**2
     end if
   end function dense_memory
 

@@ -9,6 +9,8 @@
 !>
 !> in which sin((k + G).d_q/2) is that of k up to a sign. It diverges at k = 0:
 !> there the kernel is summed over a disc with the area of the grid instead.
+!>
+!> Equations: docs/theory/preconditioner.md, (P1), (P4).
 module hc_lattice_symbol
   use hc_precision, only: wp, pi
   implicit none

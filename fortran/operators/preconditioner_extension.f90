@@ -13,6 +13,8 @@
 !> the waves along the edge are. Here each ring of nodes around the active ones takes the
 !> mean of its neighbours in the ring before, smoothed along the ring, and falls off like
 !> 1 - sqrt(ring/(rings + 1)).
+!>
+!> Equations: docs/theory/preconditioner.md, (P2), (P3).
 module hc_preconditioner_extension
   use hc_precision, only: wp, sp
   use hc_lattice, only: neighbors

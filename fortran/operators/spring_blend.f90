@@ -7,6 +7,8 @@
 !> inverse symbol is taken of the body on springs of one compliance. The three go over into each other with log D,
 !>
 !>     M = sqrt(chi_1) T^-1 sqrt(chi_1) + sqrt(chi_2) (T + D_soft)^-1 sqrt(chi_2) + chi_3/D,     sum of chi = 1.
+!>
+!> Equations: docs/theory/preconditioner.md, (P5), (P6).
 module hc_spring_blend
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t

@@ -6,6 +6,8 @@
 !>
 !> For shear tractions there is a second one, of a body whose every node has a soft
 !> spring (see spring_blend).
+!>
+!> Equations: docs/theory/preconditioner.md, (P1), (P4).
 module hc_symbol_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t

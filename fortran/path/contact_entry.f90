@@ -10,12 +10,14 @@
 !> s_e - s^n is a sum of a part that is linear in the distance d from it, as the edge slips, and one with
 !> d^(3/2), C, as it sticks. The gap at the beginning of the step measures both without any geometry: m_1 is its power
 !> 2/3, m_2 the gap itself; M_1, M_2 are what they lose during the step outside. How much there is of C shows in how D
-!> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory.md, section 11).
+!> changes outwards. D belongs to the solution, so that both are iterated (see docs/theory/load_path.md, (L1), (L2)).
 module hc_contact_entry
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: entry_options_t
   use hc_contact_state, only: contact_state_t, load_target_t, normal, force_control
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   implicit none
   private
 
@@ -24,23 +26,6 @@ module hc_contact_entry
   !> The six neighbors of a node.
   integer, parameter :: n_neighbor = 6
   integer, parameter :: neighbor(2, n_neighbor) = reshape([1, 0, -1, 0, 0, 1, 0, -1, 1, -1, -1, 1], [2, n_neighbor])
-
-  !> Near an edge on a lattice gap^(2/3) closes as (gap + g_0)^(2/3), g_0 this times the closing that
-  !> the pressure at the edge makes at a node. Found from the moments at which nodes enter a Hertzian contact.
-  real(wp), parameter :: edge_gap = 0.11_wp
-  !> The part C is found too small by this much of D, which is known from the first node outside on.
-  real(wp), parameter :: missed_share = 0.12_wp
-  !> Spacings along the edge over which C is found.
-  integer, parameter :: along_edge = 3
-
-  !> Corrections of the entry state in one load step.
-  integer, parameter :: max_corrections = 40
-  !> Corrections that the next one is extrapolated from.
-  integer, parameter :: depth = 5
-  !> A linear combination of corrections counts as dependent below this.
-  real(wp), parameter :: dependent = 1.0e-7_wp
-  !> Accuracy of a solution: at the beginning; relative to the residual that the entry state leaves; of the last one.
-  real(wp), parameter :: first_tolerance = 1.0e-3_wp, relative_tolerance = 0.05_wp, last_tolerance = 0.5_wp
 
   !> What is carried inwards from the nodes outside.
   type :: carried_t
@@ -74,6 +59,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
+    type(entry_options_t) :: options
     type(contact_state_t) :: from
     real(wp), allocatable :: entry(:, :, :), correction(:, :, :), before(:, :, :), previous(:, :, :)
     real(wp), allocatable :: changes(:, :), corrections(:, :)
@@ -81,19 +67,20 @@ contains
     integer :: i, n, kept, sweeps
     logical :: again
 
+    options = solver%problem%options%entry
     n = size(start%relative_displacement)
-    allocate (changes(n, depth), corrections(n, depth))
+    allocate (changes(n, options%depth), corrections(n, options%depth))
     allocate (entry, mold=start%relative_displacement)
     allocate (before, previous, mold=entry)
     entry = 0.0_wp
-    accuracy = last_tolerance*tolerance
-    if (grows(start, target)) accuracy = max(accuracy, first_tolerance)
+    accuracy = options%last_tolerance*tolerance
+    if (grows(start, target)) accuracy = max(accuracy, options%first_tolerance)
     from = start
     work = 0.0_wp
     sweeps = 0
     kept = -1
     again = .false.
-    do i = 1, max_corrections
+    do i = 1, options%max_corrections
       call solver%solve_step(from, start%relative_displacement + entry, target, accuracy, max_sweeps, state, error)
       if (allocated(error)) return
       work = work + state%operator_applications
@@ -102,16 +89,16 @@ contains
         ! an inaccurate solution may lead astray: once more from the beginning
         if (again) exit
         again = .true.
-        accuracy = last_tolerance*tolerance
+        accuracy = options%last_tolerance*tolerance
         from = start
         cycle
       end if
       correction = entry_displacement(solver%problem, start, state) - entry
       call judge(solver%problem, start%relative_displacement + entry + correction, target, tolerance, state)
       if (state%converged) exit
-      if (i == max_corrections) exit
-      accuracy = max(min(accuracy, relative_tolerance*state%residual_tangential), last_tolerance*tolerance)
-      kept = min(kept + 1, depth)
+      if (i == options%max_corrections) exit
+      accuracy = max(min(accuracy, options%relative_tolerance*state%residual_tangential), options%last_tolerance*tolerance)
+      kept = min(kept + 1, options%depth)
       if (kept > 0) then
         changes(:, 2:kept) = changes(:, 1:kept - 1)
         corrections(:, 2:kept) = corrections(:, 1:kept - 1)
@@ -120,8 +107,8 @@ contains
       end if
       before = entry
       previous = correction
-      entry = entry + correction - reshape(extrapolated(changes(:, :kept), corrections(:, :kept), reshape(correction, [n])), &
-                                           shape(entry))
+      entry = entry + correction - reshape(extrapolated(changes(:, :kept), corrections(:, :kept), reshape(correction, [n]), &
+                                                        options%dependent_corrections), shape(entry))
       ! nodes that have left again take nothing along
       where (spread(state%pressure <= 0.0_wp, 3, 2)) entry = 0.0_wp
       from = state
@@ -160,11 +147,13 @@ contains
 
   !> What Anderson's extrapolation takes from a corrected entry state: (changes + corrections) y, where
   !> y makes |corrections y - correction| least. Combinations that depend on newer ones are left out.
-  pure function extrapolated(changes, corrections, correction) result(less)
+  pure function extrapolated(changes, corrections, correction, dependent) result(less)
     !> Changes of the entry state and of its correction, the newest first
     real(wp), intent(in) :: changes(:, :), corrections(:, :)
     !> The last correction
     real(wp), intent(in) :: correction(:)
+    !> Share of its length below which a combination counts as dependent
+    real(wp), intent(in) :: dependent
     real(wp) :: less(size(correction))
     real(wp) :: direction(size(correction), size(changes, 2)), move(size(correction), size(changes, 2)), length, part
     integer :: k, m, j
@@ -231,7 +220,7 @@ contains
         if (before%pressure(c, r) > 0.0_wp .or. attached(c, r)) attached(node(1, i), node(2, i)) = .true.
         if (outside(c, r)) then
           known(c, r) = .true.
-          carried(c, r) = seen_from(c, r, problem%normal_compliance*edge_gap*edge_pressure(c, r))
+          carried(c, r) = seen_from(c, r, problem%normal_compliance*problem%options%entry%edge_gap*edge_pressure(c, r))
         end if
       end do
     end do
@@ -320,7 +309,7 @@ contains
           end associate
         end do
       end do
-      do k = 1, along_edge
+      do k = 1, problem%options%entry%along_edge
         squares = with_neighbors(squares)
         products(:, :, 1) = with_neighbors(products(:, :, 1))
         products(:, :, 2) = with_neighbors(products(:, :, 2))
@@ -331,7 +320,7 @@ contains
           associate (here => carried(col, row))
             here%curved = here%moved
             if (squares(col, row) <= 0.0_wp) cycle
-            here%curved = products(col, row, :)/squares(col, row) + missed_share*here%moved
+            here%curved = products(col, row, :)/squares(col, row) + problem%options%entry%missed_share*here%moved
             ! no more than all there is
             here%curved = here%curved*min(1.0_wp, norm2(here%moved)/max(norm2(here%curved), tiny(1.0_wp)))
           end associate

@@ -8,12 +8,15 @@
 !> A static load is applied at once: parts only serve as starts, and the relative
 !> displacement counts from the undeformed bodies. So it is tried with a step that begins without contact, which no
 !> path precedes: it is the same problem as a static load.
+!>
+!> Theory: docs/theory/load_path.md.
 module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached
   use hc_contact_residuals, only: tangential_residual
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t
+  use hc_contact_solver, only: friction_solver_t
   use hc_contact_entry, only: solve_with_entry
   implicit none
   private

@@ -6,11 +6,12 @@ module hc_f2py_friction
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
+    kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
-  use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: friction_solver_t
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_field_space, only: space_over
@@ -91,13 +92,10 @@ contains
     type(slot_t), pointer :: slot
     type(error_t), allocatable :: error
     type(friction_problem_t) :: problem
-    type(coulomb_t) :: friction
     type(windowed_friction_t), pointer :: fft
     type(direct_friction_t), pointer :: dense
     integer(c_int64_t) :: bytes
 
-    friction%no_slip = coefficient > 0.5_wp*huge(1.0_wp)
-    if (.not. friction%no_slip) friction%coefficient = coefficient
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
     if (.not. allocated(error)) call check_size(slot, n_node, error)
@@ -110,16 +108,16 @@ contains
     end if
     if (.not. allocated(error)) then
       call new_friction_problem(problem, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
-                                reshape(candidate /= 0, extent), friction, goodman /= 0, error)
+                                reshape(candidate /= 0, extent), friction_of(coefficient), goodman /= 0, error)
     end if
     if (.not. allocated(error)) then
       if (method == direct) then
         allocate (dense)
-        slot%friction => dense
+        slot%solver => dense
         call new_direct_friction(dense, problem, error)
       else
         allocate (fft)
-        slot%friction => fft
+        slot%solver => fft
         call new_windowed_friction(fft, problem, error, n_threads, kernel_cache)
       end if
     end if
@@ -166,6 +164,7 @@ contains
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
     type(slot_t), pointer :: slot
+    class(friction_solver_t), pointer :: solver
     type(error_t), allocatable :: error
     type(contact_state_t) :: state, next
 
@@ -173,12 +172,11 @@ contains
     zone = 0
     call enter(handle, n_node, slot, error, merge(entry_fields*8_c_int64_t*n_node, 0_c_int64_t, interpolated /= 0))
     if (.not. allocated(error)) then
-      if (associated(slot%friction)) then
+      call with_friction(slot, solver, error)
+      if (.not. allocated(error)) then
         call unpack_state(slot%lattice, fields, numbers, state)
-        call advance(slot%friction, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
+        call advance(solver, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
                      next, error, interpolated /= 0)
-      else
-        call raise(error, status%bad_handle, 'the handle is not that of a contact problem with friction')
       end if
       call leave(slot)
     end if
@@ -215,26 +213,45 @@ contains
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
     type(slot_t), pointer :: slot
+    class(friction_solver_t), pointer :: solver
     type(error_t), allocatable :: error
     real(wp), allocatable :: field(:, :, :), u(:, :, :)
 
     displacement = 0.0_c_double
     call enter(handle, n_node, slot, error)
     if (.not. allocated(error)) then
-      if (associated(slot%friction)) then
+      call with_friction(slot, solver, error)
+      if (.not. allocated(error)) then
         field = reshape(traction, [slot%lattice%extent, 3])
         allocate (u, mold=field)
-        call slot%friction%displacements(field(:, :, 1), field(:, :, 2:), u, error)
+        call solver%displacements(field(:, :, 1), field(:, :, 2:), u, error)
         u(:, :, 1) = u(:, :, 1) - motion(1)
-        u(:, :, 2:) = u(:, :, 2:) - slot%friction%problem%rigid_displacement(motion)
+        u(:, :, 2:) = u(:, :, 2:) - solver%problem%rigid_displacement(motion)
         displacement = reshape(u, [n_node, 3])
-      else
-        call raise(error, status%bad_handle, 'the handle is not that of a contact problem with friction')
       end if
       call leave(slot)
     end if
     call report(error, code, message)
   end subroutine relative_displacement
+
+  !> The solver of a slot, if it is one with friction.
+  subroutine with_friction(slot, solver, error)
+    type(slot_t), intent(in) :: slot
+    class(friction_solver_t), pointer, intent(out) :: solver
+    !> Allocated on failure: the object is another one
+    type(error_t), allocatable, intent(out) :: error
+
+    solver => null()
+    if (associated(slot%solver)) then
+      select type (found => slot%solver)
+      class is (friction_solver_t)
+        solver => found
+      end select
+    end if
+    if (.not. associated(solver)) then
+      call raise(error, status%bad_handle, 'the handle is not that of a contact problem with friction')
+    end if
+  end subroutine with_friction
 
   !> A state from its arrays.
   subroutine unpack_state(lattice, fields, numbers, state)

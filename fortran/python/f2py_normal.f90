@@ -13,9 +13,10 @@ module hc_f2py_normal
   use hc_field_space, only: space_over
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
-  use hc_contact_state, only: contact_state_t, normal
-  use hc_normal_contact, only: new_normal_contact, normal_contact_memory
-  use hc_direct_contact, only: new_direct_contact
+  use hc_contact_state, only: contact_state_t, load_target_t, normal
+  use hc_contact_solver, only: friction_solver_t
+  use hc_normal_contact, only: normal_contact_t, new_normal_contact, normal_contact_memory
+  use hc_direct_contact, only: direct_contact_t, new_direct_contact
   implicit none
   private
 
@@ -196,6 +197,8 @@ contains
     character(len=512), intent(out) :: message
     type(slot_t), pointer :: slot
     type(error_t), allocatable :: error
+    type(direct_contact_t), pointer :: dense
+    type(normal_contact_t), pointer :: fft
     integer(c_int64_t) :: bytes
 
     call take_slot(slot, handle, error)
@@ -209,12 +212,14 @@ contains
     end if
     if (.not. allocated(error)) then
       if (method == direct) then
-        allocate (slot%direct_contact)
-        call new_direct_contact(slot%direct_contact, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
+        allocate (dense)
+        slot%solver => dense
+        call new_direct_contact(dense, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
                                 reshape(candidate /= 0, extent), error)
       else
-        allocate (slot%normal_contact)
-        call new_normal_contact(slot%normal_contact, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
+        allocate (fft)
+        slot%solver => fft
+        call new_normal_contact(fft, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
                                 reshape(candidate /= 0, extent), error, n_threads, kernel_cache)
       end if
     end if
@@ -256,17 +261,27 @@ contains
     character(len=512), intent(out) :: message
     type(slot_t), pointer :: slot
     type(error_t), allocatable :: error
-    type(contact_state_t) :: state
+    type(contact_state_t) :: none, state
+    type(load_target_t) :: goal
+    real(wp) :: no_reference(0, 0, 0)
+    logical :: is_frictionless
 
     pressure = 0.0_c_double
     gap = 0.0_c_double
     zone = 0
     call enter(handle, n_node, slot, error)
     if (.not. allocated(error)) then
-      if (associated(slot%direct_contact)) then
-        call slot%direct_contact%solve(control, target, tolerance, max_sweeps, state, error)
-      else if (associated(slot%normal_contact)) then
-        call slot%normal_contact%solve(control, target, tolerance, max_sweeps, state, error)
+      is_frictionless = associated(slot%solver)
+      if (is_frictionless) then
+        select type (solver => slot%solver)
+        class is (friction_solver_t)
+          is_frictionless = .false.
+        end select
+      end if
+      if (is_frictionless) then
+        goal%control(normal) = control
+        goal%value(normal) = target
+        call slot%solver%solve_step(none, no_reference, goal, tolerance, max_sweeps, state, error)
       else
         call raise(error, status%bad_handle, 'the handle is not that of a contact problem')
       end if

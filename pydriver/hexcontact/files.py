@@ -108,6 +108,7 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
         The name, in the same file system; by default one beside it that other processes do not use.
     """
     temporary = temporary or target.with_name(f"{target.name}.{os.getpid()}.tmp")
+    make_anew(temporary)
     try:
         yield temporary
         flush(temporary)
@@ -117,6 +118,12 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             temporary.unlink()
         raise
+
+
+def make_anew(path: Path) -> None:
+    """Make an empty file; what had its name is gone: a link would be followed to another file."""
+    path.unlink(missing_ok=True)
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
 
 
 def flush(path: Path) -> None:

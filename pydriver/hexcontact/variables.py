@@ -322,9 +322,12 @@ def grouped(column: Callable[[str, Variable], str]) -> dict[str, tuple[str, ...]
 
 FIELDS = names_where(lambda v: v.is_field)
 FRICTIONLESS_FIELDS = names_where(lambda v: v.is_field and not v.frictional)
-STATE = names_where(lambda v: v.is_field and v.core)
-"""Fields that are the state of a contact; without friction those of them in `FRICTIONLESS_FIELDS`."""
-DISPLACEMENTS = tuple(name for name in FIELDS if name not in STATE)
+STATE = {
+    False: names_where(lambda v: v.is_field and v.core and not v.frictional),
+    True: names_where(lambda v: v.is_field and v.core),
+}
+"""Fields of every step, without and with friction: the state from which the next step starts."""
+DISPLACEMENTS = names_where(lambda v: v.is_field and not v.core)
 """Fields that are computed if a deck names them."""
 
 LOADS = grouped(lambda name, v: v.motion)

@@ -10,9 +10,10 @@ module test_direct_friction
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
     stick, slip, normal, along_x, along_y, about_z
   use hc_coulomb, only: coulomb_t
-  use hc_contact_problem, only: friction_problem_t, new_friction_problem, friction_solver_t
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
-  use hc_direct_contact, only: direct_contact_t, new_direct_contact, exchange, patience
+  use hc_direct_contact, only: direct_contact_t, new_direct_contact, exchange
   use hc_block_cholesky, only: solve_blocks
   use hc_direct_friction, only: direct_friction_t, new_direct_friction, ring
   use testing, only: test_t, new_test, check, check_true, largest
@@ -151,23 +152,24 @@ contains
   subroutine test_exchange(error)
     type(error_t), allocatable, intent(out) :: error
     logical :: active(4), wrong(4)
+    integer, parameter :: most = 10
     integer :: fewest, left, i
 
     active = [.true., .true., .false., .false.]
     wrong = [.false., .true., .true., .false.]
     fewest = huge(1)
-    left = patience
-    call exchange(wrong, fewest, left, active)
+    left = most
+    call exchange(wrong, most, fewest, left, active)
     call check_true(error, all(active .eqv. [.true., .false., .true., .false.]), 'all wrong nodes')
     if (allocated(error)) return
-    do i = 1, patience
+    do i = 1, most
       active = [.true., .true., .false., .false.]
-      call exchange(wrong, fewest, left, active)
+      call exchange(wrong, most, fewest, left, active)
     end do
-    call check_true(error, all(active .eqv. [.true., .true., .true., .false.]), 'one node after the patience is gone')
+    call check_true(error, all(active .eqv. [.true., .true., .true., .false.]), 'one node after all exchanges of sets')
     if (allocated(error)) return
-    call exchange([.false., .true., .false., .false.], fewest, left, active)
-    call check(error, left, patience, 'fewer wrong nodes than ever')
+    call exchange([.false., .true., .false., .false.], most, fewest, left, active)
+    call check(error, left, most, 'fewer wrong nodes than ever')
   end subroutine test_exchange
 
   !> Solutions to rounding of any size, none where the coupling is strong, one block alone.

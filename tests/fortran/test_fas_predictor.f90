@@ -7,7 +7,7 @@ module test_fas_predictor
   use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t
   use hc_elastic_operators, only: operators_t, new_operators
-  use hc_lattice_solver, only: solve_level
+  use hc_lattice_solver, only: solve_on_lattice
   use hc_fas_predictor, only: predict
   use hc_frictional_contact, only: frictional_contact_t
   use test_friction, only: new_sphere
@@ -47,7 +47,7 @@ contains
 
     call new_sphere(contact, n, 0.4_wp, -0.2_wp, coulomb_t(mu), error, n_threads=1)
     if (allocated(error)) return
-    coarse(1) = contact%problem%coarsened()
+    call contact%problem%coarsen(coarse(1))
     call new_operators(operators(1), coarse(1)%lattice, coarse(1)%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
@@ -183,7 +183,7 @@ contains
     if (allocated(error)) return
     call new_operators(operators(1), contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
-    call solve_level(contact%problem, operators(1), state, state%relative_displacement, target, unreachable, 1, alone, error)
+    call solve_on_lattice(contact%problem, operators(1), state, state%relative_displacement, target, unreachable, 1, alone, error)
     if (allocated(error)) return
     call check_true(error, .not. next%converged, 'one sweep is not enough')
     if (allocated(error)) return
@@ -210,7 +210,7 @@ contains
     if (allocated(error)) return
     call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
-    call solve_level(contact%problem, operators, virgin, virgin%relative_displacement, target, 1.0e-9_wp, 60, alone, error)
+    call solve_on_lattice(contact%problem, operators, virgin, virgin%relative_displacement, target, 1.0e-9_wp, 60, alone, error)
     if (allocated(error)) return
     call check_true(error, cold%converged .and. alone%converged, 'converged')
     if (allocated(error)) return

@@ -16,7 +16,7 @@ module test_friction
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_krylov, only: projected_cg
   use hc_elastic_operators, only: operators_t, new_operators
-  use hc_friction_systems, only: shear_system_t, new_shear_system
+  use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none

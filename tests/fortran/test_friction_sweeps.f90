@@ -6,7 +6,7 @@ module test_friction_sweeps
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
   use hc_coulomb, only: coulomb_t
   use hc_elastic_operators, only: operators_t, new_operators
-  use hc_friction_iterate, only: iterate_t
+  use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: staggered_sweep
   use hc_coupled_newton, only: coupled_sweep
   use hc_load_constraints, only: overloads
@@ -41,7 +41,7 @@ contains
     type(frictional_contact_t) :: contact
     type(operators_t) :: operators
     type(contact_state_t) :: state
-    type(iterate_t) :: now
+    type(friction_iterate_t) :: now
     real(wp) :: before
     integer :: sweep
     logical :: failed

@@ -9,7 +9,8 @@ module test_load_path
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, touches_rim, rim_reached, &
     force_control, displacement_control, normal, along_x, along_y, about_z
   use hc_coulomb, only: coulomb_t
-  use hc_contact_problem, only: friction_problem_t, friction_solver_t, new_friction_problem
+  use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction
   use hc_contact_entry, only: entry_displacement

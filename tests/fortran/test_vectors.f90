@@ -4,8 +4,8 @@ module test_vectors
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
-  use hc_coulomb, only: coulomb_t, linearize, on_cone
-  use hc_friction_rows, only: cone_row, residual_row, soften_row, zone_row
+  use hc_coulomb, only: coulomb_t, cone_row, linearize, on_cone, residual_row, zone_row
+  use hc_shear_system, only: soften_row
   use hc_contact_state, only: separated
   use hc_active_set, only: packing_t, new_packing
   use testing, only: test_t, new_test, check, check_true, largest

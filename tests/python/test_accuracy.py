@@ -75,7 +75,7 @@ def test_trend_without_scatter(order: float) -> None:
     """q + c h^p: the extrapolation is exact, so that only the safety factor is left."""
     for scale in (1e-9, 1e9):
         values = scale * (3.0 + 0.1 * SPACINGS**order)[:, None]
-        assert_allclose(accuracy.limits_of_error(SPACINGS, values), accuracy.SAFETY * 0.1 * scale, rtol=1e-6)
+        assert_allclose(accuracy.limits_of_error(SPACINGS, values), 1.25 * 0.1 * scale, rtol=1e-6)
 
 
 def test_orders_beyond_the_bounds_are_not_believed() -> None:

@@ -69,6 +69,21 @@ atexit.register(lambda: (os.kill(os.getpid(), number), sys.stderr.write(" ".join
 cli.main()
 """
 
+LATE_CASE = """
+import os, sys, time
+from hexcontact.cli import app
+from hexcontact.study.folder import StudyFolder
+
+note = StudyFolder.note
+def late(*arguments):
+    os.kill(os.getpid(), {sent})
+    time.sleep(0.3)  # for the thread that waits for it
+    sys.stderr.write("sent")
+    return note(*arguments)
+StudyFolder.note = late
+app.main()
+"""
+
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
 @pytest.mark.parametrize("command", ["run", "resume"])
@@ -86,6 +101,19 @@ def test_a_complete_run_exits_with_0_whatever_comes(
     assert done.stderr.split() == ["write", "remove", "close", "close", "overview", "conclude", "write"]
     assert open_result(out).complete
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.nc", "sphere.png", "sphere.toml"]
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGUSR1])
+def test_a_case_of_a_study_whose_file_is_in_place_exits_with_0(tmp_path: Path, sent: signal.Signals) -> None:
+    (tmp_path / "sphere.toml").write_text(DECK)
+    (tmp_path / "study.toml").write_text(
+        'deck = "sphere.toml"\n[[parameter]]\nkey = "solver.tolerance"\nvalues = [1e-6]\n'
+    )
+    program = LATE_CASE.format(sent=int(sent))
+    words = [sys.executable, "-c", program, "study", "study.toml", "--case", "1", "-q"]
+    done = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "sent")
+    assert open_result(next(tmp_path.glob("study/0001.nc"))).complete
 
 
 def stopped(out: Path, after: int) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fuzz.harness import time_limit
+from numpy.typing import NDArray
 
 from hexcontact import (
     Case,
@@ -339,3 +340,39 @@ def test_a_deck_that_holds_itself_is_refused() -> None:
     deck["load"].append(deck["load"])
     with pytest.raises(DeckError, match="nested too deeply"):
         Case.from_dict(deck)
+
+
+def odd_gap(seed: int) -> tuple[Lattice, NDArray[Any], NDArray[Any], dict[str, float]]:
+    """Return noise, spikes, a cap or many decades, nodes that can touch, and a load or an approach."""
+    rng = np.random.default_rng(seed)
+    half = int(rng.integers(2, 10))
+    lattice = Lattice(1.0, -half, -half, 2 * half + 1, 2 * half + 1)
+    squared = lattice.x**2 + lattice.y**2
+    noise, height = rng.random(lattice.shape), 10 ** rng.uniform(-4, 2)
+    gap = (
+        squared / 20 + height * noise,
+        np.where(rng.random(lattice.shape) < 0.1, 0.0, height) * noise,
+        squared.max() - squared,
+        10 ** rng.uniform(-8, 4, lattice.shape),
+    )[seed % 4]
+    candidate = rng.random(lattice.shape) < rng.choice([0.8, 1.0])
+    candidate[half, half] = True
+    if rng.random() < 0.5:
+        return lattice, gap, candidate, {"normal_load": 10 ** rng.uniform(-4, 4)}
+    return lattice, gap, candidate, {"approach": gap[candidate].min() + 10 ** rng.uniform(-4, 3)}
+
+
+@pytest.mark.parametrize("block", range(4))
+def test_both_methods_find_the_same_contact_of_odd_gaps(block: int) -> None:
+    pair = ElasticPair(1 / np.pi, 0.0, 0.0)
+    for seed in range(40 * block, 40 * block + 40):
+        lattice, gap, candidate, driven = odd_gap(seed)
+        methods: tuple[native.Method, ...] = ("fft", "direct")
+        solvers = [NormalContact(lattice, pair, gap, candidate, method, threads=1) for method in methods]
+        found, expected = (solver.solve(**driven, tolerance=1e-10) for solver in solvers)
+        assert found.converged and expected.converged, seed
+        assert np.abs(found.pressure - expected.pressure).max() < 1e-9 * expected.pressure.max(), seed
+        hopeless = solvers[0].solve(**driven, tolerance=1e-17)  # ends, and says why
+        worst = max(hopeless.residual_normal, hopeless.residual_force)
+        assert hopeless.converged == (worst <= 1e-17)
+        assert hopeless.converged or hopeless.stopped

@@ -23,7 +23,8 @@ FORTRAN = [
     for ending in ("*.f90", "*.inc")
     for path in sorted((ROOT / folder).rglob(ending))
 ]
-PAGES = [page for folder in (".", "docs", "cases") for page in sorted((ROOT / folder).glob("*.md"))]
+FOLDERS = (".", "docs", "docs/theory", "cases")
+PAGES = [page for folder in FOLDERS for page in sorted((ROOT / folder).glob("*.md"))]
 
 NUMBER = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+|\d+(?=[ed][+-]?\d))(?:[ed][+-]?\d+)?(\w*)", re.IGNORECASE)
 

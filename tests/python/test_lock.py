@@ -8,11 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fuzz.file_made import made_step
 
 from hexcontact import DeckError
+from hexcontact.files import replacing
 from hexcontact.lock import Lock
+from hexcontact.result.journal import Journal
 from hexcontact.result.result import Metadata
 from hexcontact.result.store import Store, journal_of
+from hexcontact.result.trials import TrialFolder
 
 THESIS = "what somebody wrote\n"
 
@@ -95,3 +99,25 @@ def test_no_descriptor_is_left_by_a_lock_that_was_refused(tmp_path: Path) -> Non
             Lock(tmp_path / "lock", tmp_path / "out.nc")
     assert len(os.listdir("/proc/self/fd")) == len(before)
     assert not journal_of(tmp_path / "out.nc").exists()
+
+
+@pytest.mark.parametrize("put", [symbolic, dangling, hard, written])
+def test_files_on_their_way_go_through_no_link(tmp_path: Path, put: Callable[[Path, Path], None]) -> None:
+    victim, out = tmp_path / "thesis.txt", tmp_path / "out.nc"
+    victim.write_text(THESIS)
+    journal, trials = journal_of(out), TrialFolder(journal_of(out))
+    with Store(out, Metadata(planned_steps=3)) as store:
+        trials.folder.mkdir(exist_ok=True)
+        for name in ("000001.npz.tmp", "stopped.txt"):
+            put(journal / name, victim)
+        put(trials.ledger.with_name(f"{trials.ledger.name}.tmp"), victim)
+        store.append(made_step(0))
+        trials.write(Metadata(), [])
+        store.close("by hand")
+    assert (journal / "stopped.txt").read_text() == "by hand"
+    assert len(Journal(journal)) == 1 and trials.read()[1] == []
+    put(tmp_path / "own.tmp", victim)
+    with replacing(out, tmp_path / "own.tmp") as path:
+        path.write_text("new")
+    assert out.read_text() == "new" and not out.is_symlink()
+    assert victim.read_text() == THESIS and not victim.with_name("nowhere").exists()

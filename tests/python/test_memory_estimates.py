@@ -13,11 +13,15 @@ MOVED = '[output]\nfields = ["displacement_1_z"]\n'
         ("frictionless", 48, {}),
         ("frictionless", 256, {}),
         ("frictionless", 256, {"more": MOVED}),
+        ("frictionless", 256, {"steps": 16}),
         ("frictionless", 64, {"more": DIRECT}),
         ("friction, alike", 128, {}),
         ("friction, alike", 256, {"steps": 4}),
+        ("friction, alike", 256, {"steps": 16}),
         ("friction, unlike", 128, {"share": 0.4}),
+        ("friction, unlike", 256, {"share": 0.4}),
         ("friction, unlike", 256, {}),
+        ("friction, unlike", 256, {"steps": 8}),
     ],
 )
 def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, options: dict[str, object]) -> None:
@@ -27,7 +31,7 @@ def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, option
 
 
 @pytest.mark.parametrize("problem", ["friction, alike", "friction, unlike"])
-def test_the_estimate_of_matrices_with_friction_is_a_bound(problem: str) -> None:
-    """How many nodes stick at once while the zones are found is not known; a third fewer were measured."""
+def test_the_estimate_of_matrices_with_friction(problem: str) -> None:
+    """How many nodes stick at once while the zones are found is not known, nor what buffers BLAS takes."""
     memory = measured(deck(problem, 44, more=DIRECT))
-    assert -0.1 < memory.error < 0.4, f"{memory.peak / 1e6:.1f} MB, estimated {memory.estimate / 1e6:.1f}"
+    assert abs(memory.error) < 0.12, f"{memory.peak / 1e6:.1f} MB, estimated {memory.estimate / 1e6:.1f}"

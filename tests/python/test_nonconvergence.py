@@ -45,7 +45,7 @@ def _names() -> list[str]:
 
 
 def compliance(case: Case, lattice: Any) -> float:
-    """d_n of theory, section 7."""
+    """d_n of docs/theory/residuals.md, (R1)."""
     return case.pair.lambda_1 * float(influence.pyramid_kernels(0.0, 0.0).K1) * lattice.spacing
 
 

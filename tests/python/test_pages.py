@@ -125,11 +125,55 @@ def test_log_of_a_page_is_that_of_its_case(tmp_path: Path) -> None:
 
 
 def test_every_page_is_in_the_contents() -> None:
-    entries = re.findall(
-        r"^(?:.*<)?([\w*]+)>?$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
-    pages = {page.stem for page in DOCS.glob("*.md")} - {"index", "ford"}
+    contents = "".join((DOCS / name).read_text(encoding="utf-8") for name in ("index.md", "theory.md"))
+    entries = re.findall(r"^(?:.*<)?([\w*/]+)>?$", contents, re.MULTILINE)
+    names = (page.relative_to(DOCS).with_suffix("") for page in DOCS.rglob("*.md"))
+    pages = {name.as_posix() for name in names} - {"index", "ford"}
     assert {page for page in pages if not any(Path(page).match(entry) for entry in entries)} == set()
+
+
+def equations() -> dict[str, list[str]]:
+    """Numbers of the equations of each page of the theory."""
+    pages = sorted((DOCS / "theory").glob("*.md"))
+    number = re.compile(r"\\tag\{(\w+)\}|^\| \((\w+)\) \|", re.MULTILINE)
+    return {page.stem: ["".join(found) for found in number.findall(page.read_text())] for page in pages}
+
+
+def test_equations_of_the_theory_have_the_letter_of_their_page_and_their_order() -> None:
+    contents = (DOCS / "theory.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w?) ?\| \[.*?\]\(theory/(\w+)\.md\)", contents, re.MULTILINE)
+    letters = {page: letter for letter, page in rows}
+    assert len(set(letters.values())) == len(letters)
+    for page, numbers in equations().items():
+        assert numbers == [f"{letters[page]}{n}" for n in range(1, len(numbers) + 1)], page
+
+
+def test_equations_that_pages_and_sources_cite_are_there() -> None:
+    numbers = equations()
+    everywhere = {number for found in numbers.values() for number in found}
+    pages = [page for page in DOCS.rglob("*.md") if page.name != "theory.md"]
+    assert {
+        f"{page.name}: {cited}"
+        for page in pages
+        for cited in re.findall(r"\(([A-Z]\d+)\)", page.read_text())
+        if cited not in everywhere
+    } == set()
+    sources = [path for top in ("fortran", "pydriver", "tests") for path in sorted((ROOT / top).rglob("*.*"))]
+    after = re.compile(r"docs/theory/(\w+)\.md((?:,? (?:and |to )?\(\w+\))*)")
+    before = re.compile(r"\(([A-Z]\d+)\) of\s+(?:!> )?docs/theory/(\w+)\.md")
+    heading = re.compile(r"docs/theory/(\w+)\.md((?:, \"[^\"]+\")+)")
+    for path in (path for path in sources if path.suffix in (".f90", ".py")):
+        text = path.read_text()
+        for page, cited in after.findall(text):
+            assert set(re.findall(r"\((\w+)\)", cited)) <= set(numbers[page]), path
+        assert {
+            (page, number) for number, page in before.findall(text) if number not in numbers[page]
+        } == set()
+        for page, titles in heading.findall(text):
+            found = (DOCS / f"theory/{page}.md").read_text()
+            assert [title for title in re.findall(r'"(.+?)"', titles) if f"# {title}\n" not in found] == [], (
+                path
+            )
 
 
 def test_every_public_name_is_in_the_python_reference() -> None:

@@ -31,7 +31,7 @@ from hexcontact.deck.kinds import Whole
 from hexcontact.deck.model import extended, meaning
 from hexcontact.deck.toml import with_overrides
 from hexcontact.result.store import Store
-from hexcontact.solve.events import Callback
+from hexcontact.solve.events import Callback, Listener
 from hexcontact.solve.run import metadata_of, run_into
 from hexcontact.study import backend as backend_registry
 from hexcontact.study import backends
@@ -686,9 +686,9 @@ def test_on_dask_a_killed_worker_loses_nothing(folder: Path) -> None:
         pids = {worker.pid for worker in cluster.workers.values()}
         killed: list[int] = []
 
-        class Killer(hexcontact.study.study.StudyWatcher):
-            def finished(self, case: Any, outcome: Any) -> None:
-                if killed:
+        class Killer(Listener):
+            def said(self, event: str, /, *arguments: Any, **values: Any) -> None:
+                if killed or not event.startswith("case="):
                     return
                 for _ in range(200):  # the worker at the long case, by the lock it holds on its journal
                     for lock in Path().glob("study/0003.*.nc.d/lock"):
@@ -700,7 +700,7 @@ def test_on_dask_a_killed_worker_loses_nothing(folder: Path) -> None:
                                 return
                     time.sleep(0.05)
 
-        dataset = study.run(dask=cluster.scheduler_address, watcher=Killer())
+        dataset = study.run(dask=cluster.scheduler_address, listener=Killer())
     assert pids
     assert len(killed) == 1
     assert dataset is not None

@@ -38,7 +38,8 @@ def test_the_arrays_of_the_core_hold_a_contact_state_in_its_order() -> None:
     assert set(known) - set(names) == {
         *("converged", "sliding", "touches_rim", "sweeps", "cuts", "operator_applications", "stopped"),
     }
-    assert set(STATE) == {*CORE["fields"], *CORE["zone"]}
+    assert set(STATE[True]) == {*CORE["fields"], *CORE["zone"]}
+    assert STATE[False] == ("pressure", "gap", "zone")
 
 
 def test_each_rigid_motion_has_a_load_and_a_displacement() -> None:

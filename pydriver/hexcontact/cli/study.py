@@ -57,9 +57,9 @@ def study(
     log_level: Level = None,
 ) -> Content:
     """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    from ..study.progress import study_reporter
     from ..study.study import Study
     from .messages import Messages
-    from .study_progress import watcher
 
     if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:
         raise DeckError("expected only one of --jobs, --dask, --slurm, --case and --collect")
@@ -83,8 +83,8 @@ def study(
         if collect:
             planned.collect()
         else:
-            shown = watcher(messages.silent)
-            _run_missing(planned, context, jobs=jobs, dask=dask, retry=retry, watcher=shown)
+            shown = study_reporter(messages.silent)
+            _run_missing(planned, context, jobs=jobs, dask=dask, retry=retry, listener=shown)
     state = _State.of(planned)
     state.report(quiet or as_json)
     if as_json:
@@ -162,7 +162,7 @@ def _run_case(study: Study, number: int, retry: bool, messages: Messages, contex
         in_background(
             lambda: outcomes.append(study.run_case(number, retry, shown)),
             context.with_resource(signal_pipe()),
-            lambda _: not outcomes,
+            lambda _: not (outcomes or study.has(number)),
         )
     except Interrupted as signaled:
         kept = f"the finished load steps of case {number} are kept; the same command goes on after them"

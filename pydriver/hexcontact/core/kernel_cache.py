@@ -135,6 +135,12 @@ def configure(
         _open_folder()
 
 
+def bound() -> int:
+    """Return the bytes of spectra in memory at most."""
+    take_settings()
+    return _settings.bound or 0
+
+
 def clear() -> None:
     """Drop the spectra that are kept in memory; those that a problem uses stay until it is gone."""
     take_settings()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import mmap
 import os
 import threading
@@ -76,6 +78,12 @@ def require(needed: int, what: str, advice: str) -> None:
         raise ResourceError(
             f"{what} needs {needed / GB:.3g} GB of memory and {there / GB:.3g} GB are available; {advice}"
         )
+
+
+def give_back() -> None:
+    """Let the system have the memory that solving has freed; the C library may keep most of it otherwise."""
+    with contextlib.suppress(AttributeError, OSError):  # glibc alone has this
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def claim(needed: int) -> None:

@@ -13,7 +13,6 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, PartialSlip
-from ..core.edges import NEIGHBORS
 from ..result.view import StepView, as_list, dataset_of
 from .plane import FEWER_ARROWS, Part, map_panels, views_of
 from .registry import figure
@@ -27,7 +26,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# The corner of a node's cell before each of `NEIGHBORS`: the middle of a triangle, as (1 for an upper one,
+# Steps (row, col) to the neighbors of a node, counterclockwise.
+_NEIGHBORS = np.array([(0, 1), (1, 0), (1, -1), (0, -1), (-1, 0), (-1, 1)])
+# The corner of a node's cell before each of them: the middle of a triangle, as (1 for an upper one,
 # row, col).
 _CORNERS = ((1, -1, 0), (0, 0, 0), (1, 0, -1), (0, 0, -1), (1, -1, -1), (0, -1, 0))
 
@@ -56,7 +57,7 @@ def cell_outline(zone: Mask, basis: Array, start: tuple[float, float]) -> list[A
     n_col = padded.shape[1]
     begins: list[NDArray[np.int64]] = []
     ends: list[NDArray[np.int64]] = []
-    for number, step in enumerate(NEIGHBORS):
+    for number, step in enumerate(_NEIGHBORS):
         nodes = np.argwhere(padded & ~np.roll(padded, -step, axis=(0, 1)))
         for ids, (up, j, i) in ((begins, _CORNERS[number]), (ends, _CORNERS[(number + 1) % 6])):
             ids.append(((nodes[:, 0] + j) * n_col + nodes[:, 1] + i) * 2 + up)

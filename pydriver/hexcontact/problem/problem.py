@@ -254,11 +254,14 @@ class Problem:
             return "direct" if lattice.size <= MOST_DIRECT_NODES and not self.frictional else "fft"
         return "direct" if self.solver.method == "direct" else "fft"
 
+    def contact_nodes(self, lattice: Lattice) -> int:
+        """Return the nodes in contact at the largest load, as estimated; all where there is no estimate."""
+        return math.ceil(min(math.pi * self._contact_radius**2 / lattice.cell_area, lattice.size))
+
     def memory_needed(self, lattice: Lattice) -> int:
         """Return the memory (bytes) that solving on a window takes, with a contact as large as estimated."""
         method, shape = self.method_for(lattice), lattice.shape
-        disc = math.pi * self._contact_radius**2 / lattice.cell_area
-        contact = math.ceil(min(disc, lattice.size))
+        contact = self.contact_nodes(lattice)
         if not self.frictional:
             return native.memory_needed(method, *shape, contact=contact, threads=memory.threads())
         return native_friction.memory_needed(

@@ -1,7 +1,7 @@
 """Lattices on which a problem is solved until its accuracy is reached: each finer by the square root of two.
 
 Shifted copies of a lattice have its spacing and origins moved by fractions of it; they serve to estimate
-errors (theory, section 12).
+errors (docs/theory/error_bars.md, (A2)).
 """
 
 from __future__ import annotations

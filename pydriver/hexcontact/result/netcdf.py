@@ -103,6 +103,7 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     """Create a file; in the end close it and add its checksum."""
     import netCDF4
 
+    memory.give_back()
     memory.claim(memory.WRITING)  # it crashes without
     try:
         with _alone():

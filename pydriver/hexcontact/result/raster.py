@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .interpolate import nearest
+from ..core.interpolation import nearest
 from .view import StepView
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
-from ..files import flush, reading, replacing, require_utf8
+from ..files import flush, make_anew, reading, replacing, require_utf8
 from ..lock import Lock, names_a_run
 from .journal import STOPPED, SUFFIX, write_record
 from .journal import Journal as Journal
@@ -420,6 +420,7 @@ class Store:
             self._closed = True
             if reason and (self.heads or TrialFolder(self.folder)):
                 with contextlib.suppress(OSError):
+                    make_anew(self.folder / STOPPED)
                     (self.folder / STOPPED).write_text(reason, encoding="utf-8")
             self._lock.release()
             with contextlib.suppress(OSError):  # unless there are records in it

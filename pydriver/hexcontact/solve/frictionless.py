@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -14,16 +15,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import contact, memory
+from ..core import contact, kernel_cache, memory
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
 from ..core.edges import ContactEdges
 from ..core.estimators import area_radius, pressure_center
+from ..core.measures import elastic_energy
 from ..deck.series import LOADS
 from ..errors import DeckError
 from ..problem.loads import MOTIONS
 from ..result.step import Step
 from ..text import listed
-from ..variables import FIELDS
+from ..variables import DISPLACEMENTS, STATE
 from .events import Listener
 
 if TYPE_CHECKING:
@@ -34,25 +36,21 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-STATE = {  # fields of every step, without and with friction; the next step needs no others
-    False: ("pressure", "gap", "zone"),
-    True: (
-        *("pressure", "traction_x", "traction_y", "gap", "zone"),
-        *("relative_displacement_x", "relative_displacement_y"),
-        *("slip_increment_x", "slip_increment_y", "accumulated_slip"),
-    ),
-}
 # Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap,
 # zones, on their way through the core. With friction: the state before, itself and on its way through the
 # core both ways, gaps, coordinates.
 ARRAYS = {False: 8, True: 34}
-DISPLACEMENTS = tuple(name for name in FIELDS if name.startswith("displacement_"))
 S = TypeVar("S", NormalSolution, "ContactState")  # how a load step ends
 
 _ITEM = 8  # bytes of a float
-_WRITING = 16 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
+# Measured by tests/bench/memory.py.
+_WRITING = 18 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
 _LOADED = 3 * 2**20  # bytes of modules that a run imports on its way
-_LEFT = 0.7  # share of what solving takes that the system does not have back by then, as measured
+_LEFT = 0.5  # share of what solving takes that operators and states have when the output is written
+_PART = {
+    False: 60,
+    True: 500,
+}  # bytes of a node in contact for parts of the window; with friction
 _COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
 _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
 
@@ -62,13 +60,14 @@ _ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when 
 
 def peak_memory(case: Problem, lattice: Lattice) -> int:
     """Return the memory (bytes) that a run on a window takes at most, with interpreter and libraries."""
-    return memory.resident() + memory_needed(case, lattice)
+    return memory.resident() + memory_needed(case, lattice, _parts(case, lattice))
 
 
-def memory_needed(case: Problem, lattice: Lattice) -> int:
+def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     """Return the memory (bytes) that solving and writing load steps on a window takes.
 
     The contact is taken as large as estimated at the largest load; as the window where there is no estimate.
+    `kept` are further bytes, which could be done without.
     """
     from ..core import contact as native
 
@@ -82,11 +81,27 @@ def memory_needed(case: Problem, lattice: Lattice) -> int:
         arrays += _ENTRY_ARRAYS
     if case.adaptive:
         arrays += _COMPANION_ARRAYS
-    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size
+    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size + kept
     if bodies:
         # beside a solver with friction, whose vectors are gone by then, the set-up needs nothing more
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
     return _LOADED + max(needed, int(_LEFT * needed) + _WRITING)
+
+
+def _parts(case: Problem, lattice: Lattice) -> int:
+    """Return the bytes of operators on parts of the window around a growing contact, and of kept spectra.
+
+    Of n steps in which it grows, about log2(n) need a part that is larger by much.
+    """
+    if case.method_for(lattice) == "direct":
+        return 0
+    most, growing = 0.0, 0
+    for step in case.load_steps:
+        if step.z.value > most:
+            most, growing = step.z.value, growing + 1
+    doublings = min(math.log2(max(growing, 1)), 5.0) - case.frictional
+    kept = int(_PART[case.frictional] * max(doublings, 0.0) * case.contact_nodes(lattice))
+    return min(kept, kernel_cache.bound())
 
 
 def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
@@ -196,14 +211,6 @@ class Window(ABC, Generic[S]):
     def _more_history(self, solution: S, before: S | None, edges: ContactEdges) -> dict[str, float]:
         """Return what has one value by step beyond load, approach and contact area."""
 
-    def _work(self, solution: S, inside: NDArray[np.bool_]) -> float:
-        """Return the work of the tractions at the nodes in contact, by unit of cell area."""
-        return float(solution.pressure[inside] @ self.closing(solution)[inside])
-
-    def _elastic_energy(self, solution: S) -> float:
-        """Return U = sum A_p (p w + q . (u1 - u2))/2."""
-        return 0.5 * self.lattice.cell_area * self._work(solution, solution.zone > 0)
-
     def outgrown(self, solution: S) -> bool:
         """Tell whether the contact reached the rim of the window, be it in a part of the step only."""
         return solution.touches_rim
@@ -282,11 +289,6 @@ class Window(ABC, Generic[S]):
             solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
         )
 
-    def closing(self, solution: S) -> Array:
-        """Return u_1z + u_2z (m), by which the deformation opens the gap; NaN where nothing can touch."""
-        with np.errstate(invalid="ignore"):  # inf - NaN there
-            return np.asarray(solution.gap - self.initial_gap + solution.approach)
-
     def _contact_measures(self, solution: S, edges: ContactEdges) -> dict[str, float]:
         """Return load, approach and the size of the contact."""
         inside, edge = solution.zone > 0, edges.contact()
@@ -344,7 +346,7 @@ class NormalWindow(Window[NormalSolution]):
         self, solution: NormalSolution, before: NormalSolution | None, edges: ContactEdges
     ) -> dict[str, float]:
         return {
-            "elastic_energy": self._elastic_energy(solution),
+            "elastic_energy": elastic_energy(self.lattice, self.initial_gap, solution),
             "sweeps": solution.sweeps,
             "operator_applications": solution.operator_applications,
             "residual_normal": solution.residual_normal,

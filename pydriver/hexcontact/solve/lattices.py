@@ -22,7 +22,7 @@ from ..errors import DeckError, ResourceError
 from ..problem.refinement import LEAST_LEVELS, RATIO, SHIFTS, Trial
 from ..result.history import spelled
 from ..result.journal import Journal, journal_of
-from ..result.result import Metadata
+from ..result.layout import Metadata
 from ..result.step import Step
 from ..result.store import Store
 from ..result.trials import Solution, TrialFolder

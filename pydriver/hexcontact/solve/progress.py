@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import sys
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from ..result.history import describe
 from ..text import quantity, visible
@@ -70,24 +70,31 @@ class Bar(Listener):
 
     def begun(self, title: str, steps: int) -> None:
         """Show the bar."""
-        from rich import progress
         from rich.console import Console, Group
         from rich.live import Live
+        from rich.progress import Progress
         from rich.text import Text
 
         self._counted = steps > 0  # else by the share of the load history
-        self._bar = progress.Progress(
-            progress.SpinnerColumn(),
-            progress.TextColumn("{task.description}", markup=False),
-            progress.BarColumn(),
-            progress.MofNCompleteColumn() if steps else progress.TextColumn("{task.percentage:.0f} %"),
-            progress.TimeElapsedColumn(),
-        )
+        self._bar = Progress(*self._columns())
         self._title = visible(title)
         self._task = self._bar.add_task(self._title, total=steps or 1.0)
         self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
         self._live = Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True)
         self._live.start(refresh=True)
+
+    def _columns(self) -> list[Any]:
+        from rich import progress
+
+        return [
+            progress.SpinnerColumn(),
+            progress.TextColumn("{task.description}", markup=False),
+            progress.BarColumn(),
+            progress.MofNCompleteColumn()
+            if self._counted
+            else progress.TextColumn("{task.percentage:.0f} %"),
+            progress.TimeElapsedColumn(),
+        ]
 
     def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
         """Start the bar again, with the name of the lattice."""

@@ -16,8 +16,9 @@ from .._version import __version__
 from ..errors import DeckError, HexcontactError
 from ..problem.problem import Problem
 from ..result.journal import PHYSICS, physics
+from ..result.layout import Metadata, now
 from ..result.netcdf import read_output
-from ..result.result import Metadata, Result, now
+from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, journal_of, open_result
 from ..result.trials import TrialFolder

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from ..errors import AccuracyWarning, HexcontactError
 from ..problem.overview import parameters_of
-from ..result.result import Metadata, Result, assemble
+from ..result.layout import Metadata, assemble
+from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..text import visible

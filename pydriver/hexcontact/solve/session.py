@@ -22,7 +22,8 @@ from ..errors import DeckError
 from ..problem.arguments import middle_of, with_radians
 from ..problem.loads import LoadStep, load_steps
 from ..problem.problem import Problem
-from ..result.result import Result, assemble
+from ..result.layout import assemble
+from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
 from . import steps as solving

@@ -9,11 +9,11 @@ Examples
 
 from __future__ import annotations
 
-import contextlib
 import json
+import logging
 import os
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -22,7 +22,9 @@ from ..deck.faults import Source, deck_error
 from ..deck.read import assemble
 from ..deck.toml import read_toml
 from ..errors import DeckError
-from ..solve import log
+from ..solve.events import Listener, Listeners
+from ..solve.log import Log
+from ..text import quantity
 from . import plan as study_plan
 from .backend import BACKENDS, Backend
 from .backends.dask import Dask, DaskPool
@@ -35,21 +37,7 @@ from .tables import StudyFile
 if TYPE_CHECKING:
     import xarray
 
-    from ..solve.events import Listener
-
-__all__ = ["Outcome", "PlannedCase", "Study", "StudyWatcher", "run_study"]
-
-
-class StudyWatcher:
-    """Is told how a study goes on; this one says nothing."""
-
-    @contextlib.contextmanager
-    def watching(self, study: Study, missing: int) -> Iterator[None]:
-        """Be there for a study of which so many cases are missing."""
-        yield
-
-    def finished(self, case: PlannedCase, outcome: Outcome) -> None:
-        """Hear of a case that was run."""
+__all__ = ["Outcome", "PlannedCase", "Study", "run_study"]
 
 
 class Study:
@@ -180,7 +168,7 @@ class Study:
         jobs: int | None = None,
         dask: str | None = None,
         retry: bool = False,
-        watcher: StudyWatcher | None = None,
+        listener: Listener | None = None,
         cancel: threading.Event | None = None,
     ) -> xarray.Dataset | None:
         """Run the cases that are missing and put all together.
@@ -195,8 +183,8 @@ class Study:
             Address of a Dask scheduler to run them on instead.
         retry : bool
             Run cases again that did not converge, or outgrew their window.
-        watcher : StudyWatcher, optional
-            Who is told of each case.
+        listener : Listener, optional
+            Follows the study, besides the log.
         cancel : threading.Event, optional
             Set by another thread, it ends the run; finished cases are kept.
 
@@ -214,48 +202,53 @@ class Study:
         """
         from .collect import refuse_foreign
 
-        watcher, cancel = watcher or StudyWatcher(), cancel or threading.Event()
+        listener, cancel = Listeners(Log(), listener or Listener()), cancel or threading.Event()
         refuse_foreign(self.output)
         lock = self.folder.lock()
         try:
             missing = self.missing(retry)
             kind, settings = self.backend(jobs, dask)
             pool = kind(settings, len(missing)) if missing else None
-            log.logger.info(
-                log.words(
-                    "study", title=self.title, cases=len(self), missing=len(missing), output=self.output
-                )
-            )
-            with watcher.watching(self, len(missing)):
+            with listener.following(self.title, len(missing)):
+                cases = f"{len(self)} case{'s' * (len(self) != 1)}"
+                to_run = "" if len(missing) == len(self) else f", {len(missing)} to run"
+                about: dict[str, Any] = {
+                    "title": self.title,
+                    "cases": len(self),
+                    "missing": len(missing),
+                    "output": self.output,
+                }
+                listener.said("study", f"{self.title}: {cases}{to_run}", **about)
                 if pool is not None:
-                    self._work(pool, missing, watcher, cancel)
+                    self._work(pool, missing, listener, cancel)
             return None if cancel.is_set() else self.collect()
         finally:
             lock.release()
 
     def _work(
-        self, pool: Backend, missing: Sequence[PlannedCase], watcher: StudyWatcher, cancel: threading.Event
+        self, pool: Backend, missing: Sequence[PlannedCase], listener: Listener, cancel: threading.Event
     ) -> None:
         by_hash = {case.hash: case for case in missing}
         try:
             for outcome in pool.outcomes([self._job(case) for case in missing], cancel):
                 case = by_hash[outcome.hash]
                 self.folder.note(case, outcome)
-                self._log(case, outcome)
-                watcher.finished(case, outcome)
+                self._say(case, outcome, listener)
         finally:
             pool.stop()
 
     def _job(self, case: PlannedCase) -> Job:
         return Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))
 
-    def _log(self, case: PlannedCase, outcome: Outcome) -> None:
-        place = f"case={self.folder.number(case)}/{len(self)}"
-        about = {"parameters": str(case), "seconds": outcome.seconds}
+    def _say(self, case: PlannedCase, outcome: Outcome, listener: Listener) -> None:
+        """Say how a case ended."""
+        number, level = self.folder.number(case), logging.INFO
+        values: dict[str, Any] = {"parameters": str(case), "seconds": outcome.seconds}
+        ending = f"done in {quantity(outcome.seconds, 's', 3)}"
         if outcome.exit_code:
-            log.logger.error(log.words(place, **about, exit_code=outcome.exit_code, reason=outcome.message))
-        else:
-            log.logger.info(log.words(place, **about))
+            level, ending = logging.ERROR, f"failed: {outcome.message.splitlines()[0]}"
+            values |= {"exit_code": outcome.exit_code, "reason": outcome.message}
+        listener.said(f"case={number}/{len(self)}", f"case {number} ({case}): {ending}", level, **values)
 
     def backend(self, jobs: int | None = None, dask: str | None = None) -> tuple[type[Backend], Any]:
         """Return what `run` would run cases with, and its settings."""
@@ -294,6 +287,10 @@ class Study:
         outcome = solve_case(self._job(case), listener=listener)
         self.folder.note(case, outcome)
         return outcome
+
+    def has(self, number: int) -> bool:
+        """Tell whether the result of a case is in place."""
+        return any(self.folder.number(case) == number and self.folder.done(case) for case in self.cases)
 
     def collect(self) -> xarray.Dataset:
         """Put together what is there, write it to `output`, and return it.

@@ -1,46 +1,35 @@
-!> The two linear problems inside a frictional contact, for conjugate gradients.
+!> The linear problem of the shear traction on the nodes in contact, for conjugate gradients ((F10) of
+!> docs/theory/friction.md).
 !>
-!> Pressure: w = K p on the nodes in contact. Shear: every node in contact has
-!> a frame (t, e); a sticking node carries both components of q, a slipping one
-!> tau in q = mu p e + tau t and the compliance D along t. The matrix
+!> Every node in contact has a frame (t, e); a sticking node carries both components of q, a slipping one tau in
+!> q = mu p e + tau t and the compliance D along t. The matrix
 !>
 !>     R^T T R + D,     R: frame -> (x, y)
 !>
-!> is symmetric positive definite on these unknowns. Its preconditioner is the inverse symbol in
-!> stick, and goes over to 1/D where a node slips far (see spring_blend).
+!> is symmetric positive definite on these unknowns. Its preconditioner is the inverse symbol in stick, and goes
+!> over to 1/D where a node slips far (see spring_blend).
 !>
 !> A field with two components is one vector, first the one, then the other.
-module hc_friction_systems
+module hc_shear_system
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
-  use hc_flexibility, only: normal, along_x, along_y
+  use hc_flexibility, only: along_x, along_y
   use hc_spring_blend, only: node_compliance, blend
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
   use hc_elastic_operators, only: operators_t
-  use hc_friction_rows, only: soften_row
   use hc_krylov, only: linear_system_t
   use hc_active_set, only: packing_t, new_packing
   implicit none
   private
 
-  public :: pressure_system_t, shear_system_t, new_shear_system, coupled_system_t
+  public :: shear_system_t, new_shear_system, soften_row
 
+  !> Squares below this count as nothing.
+  real(wp), parameter :: nothing = 1.0e-200_wp
   !> Components of the shear traction
   integer, parameter :: shear(2) = [along_x, along_y]
   !> Nodes that one thread takes at a time
   integer, parameter :: row_block = 4096
-
-  !> Pressure on the nodes in contact.
-  type, extends(linear_system_t) :: pressure_system_t
-    type(operators_t), pointer :: operators => null()
-    !> Continuation of displacements beyond the contact
-    type(edge_extension_t) :: edge
-  contains
-    !> Take the nodes in contact
-    procedure :: take => take_contact
-    procedure :: product => pressure_product
-    procedure :: precondition => pressure_precondition
-  end type pressure_system_t
 
   !> Shear traction in the frames of the nodes.
   type, extends(linear_system_t) :: shear_system_t
@@ -75,50 +64,7 @@ module hc_friction_systems
     procedure :: take_springs_off
   end type shear_system_t
 
-  !> Pressure and shear traction together: the pressure of a slipping node carries mu p e along.
-  !>
-  !> Its matrix is not symmetric. A vector is the pressure, then the shear in the frames.
-  type, extends(linear_system_t) :: coupled_system_t
-    type(operators_t), pointer :: operators => null()
-    !> Frames and compliances of the nodes
-    type(shear_system_t), pointer :: shear => null()
-    !> Continuation of displacements beyond the contact
-    type(edge_extension_t) :: edge
-    !> mu at slipping nodes, 0 elsewhere
-    real(wp), allocatable :: slope(:)
-  contains
-    procedure :: product => coupled_product
-    procedure :: precondition => coupled_precondition
-  end type coupled_system_t
-
 contains
-
-  !> Take the nodes in contact.
-  subroutine take_contact(self, contact)
-    class(pressure_system_t), intent(inout) :: self
-    !> Nodes in contact (n)
-    logical, intent(in) :: contact(:)
-
-    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%operators%space)
-  end subroutine take_contact
-
-  subroutine pressure_product(self, x, y, error)
-    class(pressure_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-
-    call self%operators%apply([normal], x, [normal], y, error)
-  end subroutine pressure_product
-
-  subroutine pressure_precondition(self, x, y, error)
-    class(pressure_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-
-    call self%operators%precondition_pressure(self%edge, x, y)
-  end subroutine pressure_precondition
 
   !> A shear system in which every node sticks.
   subroutine new_shear_system(self, operators)
@@ -333,45 +279,26 @@ contains
     end do
   end subroutine shear_precondition
 
-  subroutine coupled_product(self, x, y, error)
-    class(coupled_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: frame(:), traction(:), moved(:)
-    integer :: n, i
+  !> A spring in series with the stiffness that each node was found to have in stick: what it leaves of the traction.
+  pure subroutine soften_row(n, compliance, ux, uy, qx, qy)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Compliance of the springs, and displacements
+    real(wp), intent(in) :: compliance(n), ux(n), uy(n)
+    !> Tractions if all nodes stuck, and what is left of them
+    real(wp), intent(inout) :: qx(n), qy(n)
+    real(wp) :: moved, stretch, left
+    integer :: i
 
-    n = size(x)/3
-    allocate (frame(2*n), traction(3*n), moved(3*n))
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    !$omp simd private(moved, stretch, left)
     do i = 1, n
-      frame(i) = x(n + i)
-      frame(n + i) = x(2*n + i) + self%slope(i)*x(i)
-      traction(i) = x(i)
+      ! what the spring gives way under that traction
+      stretch = compliance(i)*sqrt(qx(i)**2 + qy(i)**2)
+      moved = sqrt(ux(i)**2 + uy(i)**2)
+      left = merge(moved/max(moved + stretch, nothing), 1.0_wp, stretch > 0.0_wp)
+      qx(i) = left*qx(i)
+      qy(i) = left*qy(i)
     end do
-    !$omp end parallel do
-    call self%shear%to_plane(frame, traction(n + 1:))
-    call self%operators%apply([normal, along_x, along_y], traction, [normal, along_x, along_y], moved, error)
-    if (allocated(error)) return
-    call self%space%copy(moved(:n), y(:n))
-    call self%shear%to_frame(moved(n + 1:), y(n + 1:))
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, n
-      y(n + i) = y(n + i) + self%shear%compliance(i)*x(n + i)
-    end do
-    !$omp end parallel do
-  end subroutine coupled_product
+  end subroutine soften_row
 
-  subroutine coupled_precondition(self, x, y, error)
-    class(coupled_system_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-    integer :: n
-
-    n = size(x)/3
-    call self%operators%precondition_pressure(self%edge, x(:n), y(:n))
-    call self%shear%precondition(x(n + 1:), y(n + 1:), error)
-  end subroutine coupled_precondition
-
-end module hc_friction_systems
+end module hc_shear_system

@@ -1,0 +1,64 @@
+!> What all solvers look like from outside: frictionless and with friction, on LAPACK and on FFTs.
+module hc_contact_solver
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_contact_state, only: contact_state_t, load_target_t
+  use hc_contact_problem, only: friction_problem_t
+  implicit none
+  private
+
+  public :: contact_solver_t, friction_solver_t
+
+  !> A method of solving contact problems.
+  type, abstract :: contact_solver_t
+  contains
+    !> One load step
+    procedure(solve_step), deferred :: solve_step
+  end type contact_solver_t
+
+  !> A method of solving one with friction.
+  type, abstract, extends(contact_solver_t) :: friction_solver_t
+    type(friction_problem_t) :: problem
+  contains
+    !> Relative displacements (w, u_x, u_y) of given tractions
+    procedure(solver_displacements), deferred :: displacements
+  end type friction_solver_t
+
+  abstract interface
+    !> Tractions and motions at the end of a load step.
+    !>
+    !> `state%converged` tells whether all residuals are within the tolerance. The
+    !> accumulated quantities (slip path, dissipated energy) are left alone.
+    subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+      import :: contact_solver_t, contact_state_t, load_target_t, wp, error_t
+      class(contact_solver_t), intent(inout), target :: self
+      !> State to start the iteration from; without pressure anywhere, or without fields: none
+      type(contact_state_t), intent(in) :: start
+      !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]; of no use without friction
+      real(wp), intent(in) :: reference(:, :, :)
+      !> Loads or motions to be reached
+      type(load_target_t), intent(in) :: target
+      !> Bound of all residuals
+      real(wp), intent(in) :: tolerance
+      !> Active sets that may be tried
+      integer, intent(in) :: max_sweeps
+      !> State at the end of the step, converged or not
+      type(contact_state_t), intent(out) :: state
+      !> Allocated on failure: memory, an operator that is not positive definite
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine solve_step
+
+    !> Relative displacements (w, u_x, u_y) of given tractions.
+    subroutine solver_displacements(self, pressure, traction, displacement, error)
+      import :: friction_solver_t, wp, error_t
+      class(friction_solver_t), intent(inout) :: self
+      !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
+      real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+      !> w, u_x, u_y (n_col, n_row, 3) [m]
+      real(wp), intent(out), contiguous :: displacement(:, :, :)
+      !> Allocated on failure
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine solver_displacements
+  end interface
+
+end module hc_contact_solver

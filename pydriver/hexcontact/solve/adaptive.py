@@ -1,8 +1,8 @@
 """Paths through load steps that are given, or chosen on the way, ``steps = "auto"``.
 
-What a chosen load step may change is bounded, and measured. Each load step is solved as a whole and in two halves, on two paths that never meet. The halves are recorded.
-What they change decides whether the step is taken, and how large the next one is; see
-`hexcontact.core.steps`.
+What a chosen load step may change is bounded, and measured: it is solved as a whole and in two halves, on two
+paths that never meet. The halves are recorded. What they change decides whether the step is taken, and how
+large the next one is; see `hexcontact.core.steps`.
 """
 
 from __future__ import annotations

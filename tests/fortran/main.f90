@@ -19,6 +19,7 @@ program tester
   use test_friction, only: collect_friction
   use test_fas_predictor, only: collect_fas_predictor
   use test_friction_sweeps, only: collect_friction_sweeps
+  use test_laws, only: collect_laws
   use test_load_path, only: collect_load_path
   use test_direct_friction, only: collect_direct_friction
   use test_edges, only: collect_edges
@@ -44,6 +45,7 @@ program tester
     new_suite('friction', collect_friction), &
     new_suite('fas_predictor', collect_fas_predictor), &
     new_suite('friction_sweeps', collect_friction_sweeps), &
+    new_suite('laws', collect_laws), &
     new_suite('load_path', collect_load_path), &
     new_suite('direct_friction', collect_direct_friction), &
     new_suite('edges', collect_edges), &

@@ -18,8 +18,8 @@ from validation.error_bars import PROBLEMS, estimates_over_errors
 import hexcontact
 from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError
 from hexcontact.cli.app import app
+from hexcontact.cli.report import report
 from hexcontact.deck.surfaces import Sphere
-from hexcontact.plotting.report import report
 from hexcontact.problem import refinement
 from hexcontact.problem.refinement import RATIO, SHIFTS
 from hexcontact.result.trials import TrialFolder

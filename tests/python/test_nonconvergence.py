@@ -39,7 +39,7 @@ def failed(case: Case, **changed: Any) -> tuple[ConvergenceError, Any, Any]:
 
 
 def _names() -> list[str]:
-    from hexcontact.deck.series import LOADS
+    from hexcontact.variables import LOADS
 
     return [name for pair in LOADS.values() for name in pair]
 

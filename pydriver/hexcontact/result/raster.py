@@ -15,6 +15,9 @@ from .view import StepView
 
 Array = NDArray[np.float64]
 
+# of zones in all pictures: dark and light, so that they differ in black and white too
+STICK, SLIP = "#0072b2", "#f0c05a"
+
 
 @dataclass(frozen=True)
 class Plane:

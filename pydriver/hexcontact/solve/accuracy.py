@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.estimators import limits_of_error
-from ..deck.series import LOADS
 from ..result.trials import Solution
-from ..variables import ESTIMATED
+from ..variables import ESTIMATED, LOADS
 
 if TYPE_CHECKING:
     from ..problem.loads import LoadStep

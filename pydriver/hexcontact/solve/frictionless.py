@@ -20,12 +20,11 @@ from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
 from ..core.edges import ContactEdges
 from ..core.estimators import area_radius, pressure_center
 from ..core.measures import elastic_energy
-from ..deck.series import LOADS
 from ..errors import DeckError
 from ..problem.loads import MOTIONS
 from ..result.step import Step
 from ..text import listed
-from ..variables import DISPLACEMENTS, STATE
+from ..variables import DISPLACEMENTS, LOADS, STATE
 from .events import Listener
 
 if TYPE_CHECKING:

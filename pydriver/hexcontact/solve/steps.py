@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._version import __version__
-from ..deck.series import LOADS
 from ..errors import DeckError, PathWarning
 from ..problem.overview import parameters_of
 from ..result.history import unasked_path
 from ..result.step import Step
+from ..variables import LOADS
 from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
 from .frictional import FrictionWindow

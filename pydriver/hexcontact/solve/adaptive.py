@@ -1,8 +1,8 @@
-"""Load steps that are chosen on the way, ``steps = "auto"``: what one may change is bounded, and measured.
+"""Paths through load steps that are given, or chosen on the way, ``steps = "auto"``.
 
-Each load step is solved as a whole and in two halves, on two paths that never meet. The halves are recorded.
-What they change decides whether the step is taken, and how large the next one is; see
-`hexcontact.core.steps`.
+What a chosen load step may change is bounded, and measured: it is solved as a whole and in two halves, on two
+paths that never meet. The halves are recorded. What they change decides whether the step is taken, and how
+large the next one is; see `hexcontact.core.steps`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,59 @@ class _Solved:
     change: Change
 
 
-class AdaptivePath:
+class GivenPath:
+    """A path through load steps that are given.
+
+    Parameters
+    ----------
+    case : Problem
+        The problem.
+    window : Window
+        Window to start with.
+    before : sequence of Step
+        The steps that are solved already.
+
+    Attributes
+    ----------
+    window : Window
+        The present window.
+    position : int
+        Load step of the case that is at hand.
+    """
+
+    def __init__(self, case: Problem, window: Any, before: Sequence[Step]) -> None:
+        self.case, self.window = case, window
+        self.position = len(before)
+
+    def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
+        """Solve a load step; one that reached the rim again on a larger window, from where it began.
+
+        Parameters
+        ----------
+        state : state of the solver or None
+            End of the last load step.
+        target : LoadStep
+            The load step.
+        begun : mapping of str to float
+            Loads and motions when its segment began.
+
+        Yields
+        ------
+        step : Step
+            The finished step.
+        state : state of the solver
+            Its end.
+        """
+        started, values = time.perf_counter(), target.values(begun)
+        while self.window.outgrown(reached := self.window.advance(state, target, values)):
+            smaller, self.window = self.window.lattice, self.window.grown(reached, target)
+            state = self.window.carried(state, smaller)
+        if not reached.converged:
+            raise nonconvergence.error(self.case, self.window.lattice, reached, target, values)
+        yield self.window.step(target, reached, state, started), reached
+
+
+class AdaptivePath(GivenPath):
     """The two paths through a load history, and what chooses their load steps.
 
     Parameters
@@ -75,8 +127,8 @@ class AdaptivePath:
     """
 
     def __init__(self, case: Problem, window: FrictionWindow, before: Sequence[Step]) -> None:
-        self.case, self.window = case, window
-        self.position, self.fraction = 0, 0.0
+        super().__init__(case, window, ())
+        self.fraction = 0.0
         self._number = len(before)
         self._before: ContactState | None = None  # the path in halves, where a load step begins
         self._work: dict[str, Any] = {}
@@ -93,11 +145,11 @@ class AdaptivePath:
         else:
             self._area = window.largest_contact_area()
 
-    def numbered(self, target: LoadStep) -> LoadStep:
+    def _numbered(self, target: LoadStep) -> LoadStep:
         """Return a load step under the number that it has among those that are recorded."""
         return dataclasses.replace(target, index=self._number)
 
-    def given(self, step: Step) -> Step:
+    def _given(self, step: Step) -> Step:
         """Return a load step whose size was given, with its place in the history."""
         self._size.forget()
         self._whole = None
@@ -106,7 +158,7 @@ class AdaptivePath:
     def steps(
         self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float]
     ) -> Iterator[tuple[Step, ContactState]]:
-        """Solve the rest of an adaptive segment.
+        """Solve the rest of an adaptive segment, or a load step whose size is given.
 
         Parameters
         ----------
@@ -124,7 +176,10 @@ class AdaptivePath:
         state : ContactState
             Its end.
         """
-        assert target.ramp is not None
+        if target.ramp is None:
+            for step, reached in super().steps(state, self._numbered(target), begun):
+                yield self._given(step), reached
+            return
         place, tolerance = self.position, self.case.solver.step_tolerance
         while self.position == place:
             started = time.perf_counter()
@@ -132,7 +187,7 @@ class AdaptivePath:
             found = taken.change
             bound = self._size.accept(attempt, found, tolerance, verdict)
             reached = dataclasses.replace(taken.halves, **self._work)
-            part = dataclasses.replace(self.numbered(target.until(attempt.end)), ramp=target.ramp)
+            part = dataclasses.replace(self._numbered(target.until(attempt.end)), ramp=target.ramp)
             step = self.window.step(part, reached, self._before, started)
             contact = float(step.history["contact_area_fit"])
             self._area = max(self._area, contact)
@@ -205,7 +260,7 @@ class AdaptivePath:
                 return self._solved(target, begun, end)
             except _Rim as rim:
                 smaller = self.window.lattice
-                self.window = self.window.grown(rim.solution, self.numbered(target))
+                self.window = self.window.grown(rim.solution, self._numbered(target))
                 self._before = self.window.carried(self._before, smaller)
                 self._whole = self.window.carried(self._whole, smaller)
 
@@ -237,7 +292,7 @@ class AdaptivePath:
     def _advanced(
         self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float], fraction: float
     ) -> ContactState | None:
-        part = self.numbered(target.until(fraction))
+        part = self._numbered(target.until(fraction))
         values = part.values(begun)
         solution = self.window.advance(state, part, values)
         self._work["sweeps"] += solution.sweeps

@@ -17,7 +17,7 @@ module hc_shear_system
   use hc_spring_blend, only: node_compliance, blend
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
   use hc_elastic_operators, only: operators_t
-  use hc_krylov, only: linear_system_t
+  use hc_linear_system, only: linear_system_t
   use hc_active_set, only: packing_t, new_packing
   implicit none
   private

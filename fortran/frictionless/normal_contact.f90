@@ -11,7 +11,7 @@ module hc_normal_contact
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
-  use hc_convolution_single, only: convolution_memory
+  use hc_fft_layout_single, only: convolution_memory
   use hc_flexibility_fft, only: fft_memory
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t

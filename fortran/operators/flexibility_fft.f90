@@ -8,7 +8,8 @@ module hc_flexibility_fft
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility, only: flexibility_t, check_operator, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
-  use hc_convolution, only: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t
+  use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
+  use hc_fft_layout, only: convolution_memory, transform_memory
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_pressure_kernel, only: normal_kernel_t

@@ -15,7 +15,8 @@ module hc_symbol_preconditioner
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
-  use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
+  use hc_convolution_single, only: convolution_t, new_convolution
+  use hc_fft_layout_single, only: convolution_memory
   use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_preconditioner_extension, only: edge_extension_t

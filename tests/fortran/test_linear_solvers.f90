@@ -3,7 +3,9 @@ module test_linear_solvers
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
-  use hc_krylov, only: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, solution_accurate, &
+  use hc_projected_cg, only: projected_cg
+  use hc_projected_gmres, only: projected_gmres
+  use hc_linear_system, only: linear_system_t, precondition_constraints, fulfil, solution_accurate, &
     iterations_used_up, solution_broke_off
   use testing, only: test_t, new_test, check, check_true
   implicit none

@@ -14,7 +14,6 @@ module hc_subwindow_solver
   use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_window_part, only: frame, is_worth
   implicit none
   private
 
@@ -28,7 +27,7 @@ module hc_subwindow_solver
     !> First and last column and row of the part
     integer :: low(2) = 0, high(2) = 0
     !> Threads that were asked for; 0: as many as OpenMP would take
-    integer :: n_threads = 0
+    integer :: threads = 0
     !> Spectra that are kept
     type(kernel_cache_t), pointer :: cache => null()
   contains
@@ -52,7 +51,7 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     self%problem = problem
-    if (present(n_threads)) self%n_threads = n_threads
+    if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
     call new_frictional_contact(self%whole, problem, error, n_threads, self%cache)
     if (allocated(error)) return
@@ -104,8 +103,8 @@ contains
 
     work = 0.0_wp
     if (any(start%pressure > 0.0_wp) .and. self%problem%is_pressed(target)) then
-      call frame(start%pressure > 0.0_wp, low, high)
-      if (is_worth(low, high, self%problem%lattice)) then
+      call self%problem%lattice%enclose(start%pressure > 0.0_wp, low, high)
+      if (self%problem%lattice%is_worth_parting(low, high)) then
         call take_part(self, low, high, error)
         if (allocated(error)) return
         call solve_part(self, start, reference, target, tolerance, max_sweeps, state, work, error)
@@ -133,7 +132,7 @@ contains
     self%high = high
     call self%problem%take_part(low, high, problem)
     allocate (self%part)
-    call new_frictional_contact(self%part, problem, error, self%n_threads, self%cache)
+    call new_frictional_contact(self%part, problem, error, self%threads, self%cache)
   end subroutine take_part
 
   !> A step on the part; not converged: it has to be solved on the window.

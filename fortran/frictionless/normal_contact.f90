@@ -18,11 +18,10 @@ module hc_normal_contact
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, normal
   use hc_contact_solver, only: contact_solver_t
   use hc_symbol_preconditioner, only: preconditioner_memory
-  use hc_normal_lattice, only: normal_level_t
-  use hc_normal_iterate, only: iterate_t
-  use hc_normal_lattice_solver, only: solve_level
-  use hc_window_part, only: frame, is_worth, part_of
-  use hc_transfer, only: level_count, prolong_edge, restrict_field, restrict_mask
+  use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_iterate, only: normal_iterate_t
+  use hc_normal_lattice_solver, only: solve_on_normal_lattice
+  use hc_transfer, only: level_count, prolong_edge, coarsen_bodies
   implicit none
   private
 
@@ -43,11 +42,11 @@ module hc_normal_contact
   type, extends(contact_solver_t) :: normal_contact_t
     private
     !> From the finest to the coarsest lattice
-    type(normal_level_t), allocatable :: level(:)
+    type(normal_lattice_t), allocatable :: level(:)
     !> Fields of the iterations on each of them, from one solution to the next
-    type(iterate_t), allocatable :: iterate(:)
+    type(normal_iterate_t), allocatable :: iterate(:)
     !> The part of the finest lattice around the contact, and its first column and row there
-    type(normal_level_t), allocatable :: inner
+    type(normal_lattice_t), allocatable :: inner
     integer :: corner(2) = 0
     type(elastic_pair_t) :: pair
     !> The kernel, as far as it was needed
@@ -55,7 +54,7 @@ module hc_normal_contact
     !> Spectra that are kept
     type(kernel_cache_t), pointer :: cache => null()
     !> Threads that were asked for; 0: as many as OpenMP would take
-    integer :: n_threads = 0
+    integer :: threads = 0
   contains
     procedure :: solve_step
     !> Solve for a normal load or an approach
@@ -86,7 +85,7 @@ contains
     integer :: l
 
     self%pair = pair
-    if (present(n_threads)) self%n_threads = n_threads
+    if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
     call check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
     if (allocated(error)) return
@@ -100,9 +99,8 @@ contains
           level%candidate = candidate
         else
           associate (finer => self%level(l - 1))
-            level%lattice = finer%lattice%coarsened()
-            level%initial_gap = restrict_field(finer%lattice, finer%initial_gap, level%lattice)
-            level%candidate = restrict_mask(finer%lattice, finer%candidate, level%lattice)
+            call coarsen_bodies(finer%lattice, finer%initial_gap, finer%candidate, level%lattice, level%initial_gap, &
+                                level%candidate)
           end associate
         end if
         ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
@@ -182,7 +180,8 @@ contains
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
-          call solve_level(level, self%iterate(l), control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          call solve_on_normal_lattice(level, self%iterate(l), control, target, max(tolerance, coarse_tolerance), &
+                                       max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
@@ -201,12 +200,12 @@ contains
     type(lattice_t), intent(in) :: lattice
 
     space_of%threads = 1
-    if (self%n_threads > 0 .or. lattice%size() >= worth_sharing) space_of = space_over(lattice%extent, self%n_threads)
+    if (self%threads > 0 .or. lattice%size() >= worth_sharing) space_of = space_over(lattice%extent, self%threads)
   end function space_of
 
   !> Nodes of a part of a lattice over those of the whole.
   pure real(wp) function share_of(part, whole)
-    type(normal_level_t), intent(in) :: part, whole
+    type(normal_lattice_t), intent(in) :: part, whole
     share_of = real(part%lattice%size(), wp)/whole%lattice%size()
   end function share_of
 
@@ -237,15 +236,17 @@ contains
     associate (whole => self%level(1))
       sweeps = 0
       do try = 1, part_tries
-        call frame(state%pressure > 0.0_wp, low, high)
-        if (try > 1) call frame(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. whole%candidate), low, high)
-        if (.not. is_worth(low, high, whole%lattice)) exit
+        call whole%lattice%enclose(state%pressure > 0.0_wp, low, high)
+        if (try > 1) then
+          call whole%lattice%enclose(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. whole%candidate), low, high)
+        end if
+        if (.not. whole%lattice%is_worth_parting(low, high)) exit
         call take_part(self, low, high, error)
         if (allocated(error)) return
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
           part%pressure = state%pressure(first(1):last(1), first(2):last(2))
           ! the product over the window sees what single precision left
-          call solve_level(inner, self%iterate(1), control, target, part_tolerance*tolerance, max_sweeps, part, error)
+          call solve_on_normal_lattice(inner, self%iterate(1), control, target, part_tolerance*tolerance, max_sweeps, part, error)
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
           sweeps = sweeps + part%sweeps
@@ -263,7 +264,7 @@ contains
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
       call whole%prepare(self%pair, self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)
       if (allocated(error)) return
-      call solve_level(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
+      call solve_on_normal_lattice(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
       state%sweeps = state%sweeps + sweeps
       work = work + whole%work()
@@ -286,7 +287,7 @@ contains
     allocate (self%inner)
     self%corner = low
     associate (inner => self%inner, whole => self%level(1))
-      inner%lattice = part_of(whole%lattice, low, high)
+      inner%lattice = whole%lattice%subwindow(low, high)
       inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
       inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
       call inner%prepare(self%pair, self%kernel, .true., .true., space_of(self, inner%lattice), error, self%cache)

@@ -9,7 +9,8 @@ module hc_projected_cg
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_active_set, only: packing_t, new_packing
+  use hc_active_set, only: active_set_t, new_active_set
+  use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_field_space, only: field_space_t, sum_block
   use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
   implicit none
@@ -50,19 +51,20 @@ contains
     !> (Greenbaum, SIAM J. Matrix Anal. Appl. 18, 1997, 535-551)
     real(wp), intent(out), optional :: drift
 
-    type(packing_t) :: nodes
+    type(active_set_t) :: nodes
     !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
     real(wp), allocatable :: from(:), onto(:)
     !> On the active nodes
     real(wp), allocatable :: r(:), z(:), d(:), ad(:), x_active(:), ax_active(:), rhs_active(:), b(:, :), m_b(:, :)
-    real(wp) :: rz, rz_old, curvature, step, largest
+    type(conjugate_gradient_t) :: recurrence
+    real(wp) :: step, largest
     real(wp) :: inverse(size(constraint, 2), size(constraint, 2))
     integer :: i, m
     type(field_space_t) :: space
-    logical :: independent
+    logical :: independent, anew
 
     space = system%space
-    call new_packing(nodes, active, space)
+    call new_active_set(nodes, active, space)
     associate (n => nodes%n_active)
       allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
     end associate
@@ -77,7 +79,6 @@ contains
     iterations = 0
     largest = 0.0_wp
     outcome = iterations_used_up
-    rz_old = 0.0_wp
     multiplier = 0.0_wp
     if (size(multiplier) > 0) then
       call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
@@ -103,16 +104,13 @@ contains
       call nodes%pack(onto, z)
       call space%add_columns(m_b, -matmul(inverse, space%dots(b, z)), z)
 
-      rz = space%dot(r, z)
-      step = 0.0_wp
-      if (iterations > 0) step = rz/rz_old
-      rz_old = rz
+      call recurrence%last_share(space%dot(r, z), step, anew)
       !$omp parallel do schedule(static) num_threads(space%threads)
       do i = 1, size(d)
-        if (iterations > 0) then
-          d(i) = z(i) + step*d(i)
-        else
+        if (anew) then
           d(i) = z(i)
+        else
+          d(i) = z(i) + step*d(i)
         end if
       end do
       !$omp end parallel do
@@ -120,13 +118,11 @@ contains
       call system%product(from, onto, error)
       if (allocated(error)) return
       call nodes%pack(onto, ad)
-      curvature = space%dot(d, ad)
-      ! nothing is left to gain in working precision
-      if (.not. curvature > 0.0_wp) then
+      step = recurrence%step_length(space%dot(d, ad))
+      if (.not. step > 0.0_wp) then
         outcome = solution_broke_off
         exit
       end if
-      step = rz/curvature
       !$omp parallel num_threads(space%threads)
       !$omp do schedule(static)
       do i = 1, size(d)

@@ -9,7 +9,7 @@
 module hc_projected_gmres
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_active_set, only: packing_t, new_packing
+  use hc_active_set, only: active_set_t, new_active_set
   use hc_field_space, only: field_space_t
   use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
   implicit none
@@ -60,7 +60,7 @@ contains
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
-    type(packing_t) :: nodes
+    type(active_set_t) :: nodes
     !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
     real(wp), allocatable :: from(:), onto(:)
     !> On the active nodes
@@ -76,7 +76,7 @@ contains
     if (present(drift)) drift = 0.0_wp
     outcome = solution_broke_off
     space = system%space
-    call new_packing(nodes, active, space)
+    call new_active_set(nodes, active, space)
     call nodes%pack_columns(columns, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack_columns(rows, c_rows)

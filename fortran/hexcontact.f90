@@ -37,6 +37,15 @@ module hexcontact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_load_path, only: advance
+  use hc_adaptive_path, only: adaptive_path_t
+  use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed
+  use hc_step_error, only: step_change_t, compare_halves
+  use hc_discretization_error, only: limits_of_error
+  use hc_zone_estimators, only: boundary, boundary_circle, circle_fit_t, area_radius, edge_radius, pressure_center, &
+                                moment_ellipse, edge_ellipse, ellipse_t
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
+  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   implicit none
   public
 end module hexcontact

@@ -84,6 +84,8 @@ module hc_options
     integer :: least_contact = 100
     !> Tolerance on a part of the window: the product over the window sees other rounding errors
     real(wp) :: part_tolerance = 0.9_wp
+    !> Parts of the window that are tried: each sees where the bodies overlap outside of the last
+    integer :: max_parts = 3
   end type multilevel_options_t
 
   !> Explicit matrices (docs/theory/friction.md, "Direct method").

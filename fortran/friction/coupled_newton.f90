@@ -1,12 +1,23 @@
-!> Newton's method for pressure and shear traction at once.
+!> A coupled sweep: a step of Newton's method for pressure, shear traction and motions at once.
 !>
-!> Where the two act strongly on each other (dissimilar materials and much
-!> friction), sweeps that find one after the other keep exchanging nodes at the
-!> edge of the contact. Here contact area, stick, slip and both tractions come from
-!> one linear problem with the rigid motions, solved by GMRES. It is not
-!> symmetric, because the pressure of a slipping node carries mu p e along.
+!> Where pressure and shear traction act strongly on each other (dissimilar materials and much friction), staggered sweeps
+!> keep exchanging nodes at the edge of the contact. Here F(p, q, motions) = 0, (F2) to (F4) of docs/theory/friction.md as they
+!> stand at the top of staggered_newton, is linearised as a whole (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
+!> 1991; Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003):
 !>
-!> Equations: docs/theory/friction.md, (F7).
+!>     ( E_t^T T E + D   -E_t^T B ) ( p, q_stick, tau )   ( E_t^T (-h, s^n) )
+!>     (  A B^T E            0    ) (     motions     ) = ( P, Q_x, Q_y, M_z ),                    (F7)
+!>
+!> with q = mu p e + tau t in E and q = tau t in E_t where a node slips: the pressure carries mu p e along, and the matrix is
+!> not symmetric. The steps, in their order below:
+!>
+!> 1. contact, stick, slip, directions e and compliances D by (F5), (F6), with r' and r of (F8);
+!> 2. unknowns in the frames of the nodes, without mu p e, which belongs to p;
+!> 3. loads as rows A B^T E, motions as columns E_t^T B, and the start corrected so that it carries the loads;
+!> 4. (F7) by GMRES, preconditioned block by block and projected as in (F11);
+!> 5. tractions and motions of the solution, and the residuals R_n and R_t from the product that GMRES carries along.
+!>
+!> If nothing resists the loads, `failed` is true, and a staggered sweep follows.
 module hc_coupled_newton
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -49,11 +60,13 @@ contains
 
     n = size(now%p)
     options = now%problem%options%newton
+    ! 1.
     call now%find_gap(gap)
     call find_contact(now, gap, contact)
     call move_alloc(contact, now%contact)
     now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
     call classify(now, .false., shear_active)
+    ! 2.
     system%operators => now%operators
     system%shear => now%shear
     call now%pressure%take(now%contact)
@@ -73,6 +86,7 @@ contains
     x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
     where (.not. shear_active) x(n + 1:) = 0.0_wp
 
+    ! 3.
     call find_constraints(now, shear_active, driven, shear_columns, shear_missing)
     n_shear = size(shear_missing)
     m = n_shear
@@ -103,6 +117,7 @@ contains
       mb(:n, m:) = part
     end if
     call fulfil(rows, mb, missing(:m), x, independent, system%space)
+    ! 4.
     if (independent) then
       call system%product(x, ax, error)
       if (allocated(error)) return
@@ -129,6 +144,7 @@ contains
       return
     end if
 
+    ! 5.
     call driven%set_motions(multiplier(:n_shear), now%motion)
     if (m > n_shear) now%motion(normal) = multiplier(m)
     now%p = x(:n)

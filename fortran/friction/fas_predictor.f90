@@ -7,7 +7,7 @@
 !>
 !>     h_c = g + approach - w_c,     s_c = u_c - shift - twist x r - (s - s^n).
 !>
-!> The new loads are then applied to it (full approximation scheme), after a
+!> The new loads are then applied to it (full approximation scheme, Brandt, Math. Comput. 31, 1977), after a
 !> still coarser lattice has been asked in the same way, and the change of its
 !> tractions and motions is added to the fine ones. Nodes between coarse ones that slip are put
 !> onto the cone. The fronts of contact, stick and slip are where

@@ -54,8 +54,8 @@ module hc_friction_iterate
     !> Initial gap; relative displacement at the beginning of the step
     real(wp), allocatable :: h(:), origin(:)
     logical, allocatable :: candidate(:)
-    !> Pressure drags tangentially; shear tractions move the pressure
-    logical :: dragging = .false., pressing = .false.
+    !> Pressure moves nodes tangentially; shear tractions move them along the normal, and so the pressure
+    logical :: shear_feels_pressure = .false., pressure_feels_shear = .false.
     !> Damping and cuts of the classification parameter
     type(globalization_t) :: globalization
     !> Estimates, with the preconditioner, of the pressure that an approach of the contact causes, and of the shear traction of
@@ -119,11 +119,11 @@ contains
     self%pressure%operators => operators
     self%pressure%space = operators%space
     call new_shear_system(self%shear, operators)
-    self%dragging = abs(problem%pair%lambda_2) > 0.0_wp
-    self%pressing = self%dragging .and. problem%friction%resists() .and. .not. problem%goodman
+    self%shear_feels_pressure = abs(problem%pair%lambda_2) > 0.0_wp
+    self%pressure_feels_shear = self%shear_feels_pressure .and. problem%friction%resists() .and. .not. problem%goodman
     highest = huge(1.0_wp)
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-    if (target%control(normal) /= force_control .and. .not. self%pressing) highest = target%value(normal)
+    if (target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) highest = target%value(normal)
     allocate (self%h(n), self%origin(2*n), self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
     allocate (self%candidate(n), self%contact(n))
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
@@ -173,7 +173,7 @@ contains
     self%cut = .false.
     self%joint = .false.
     allocate (moved(3*n))
-    if (self%dragging .and. .not. (self%cold .and. self%first)) then
+    if (self%shear_feels_pressure .and. .not. (self%cold .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
       call space%copy(moved(:n), self%w)
@@ -185,7 +185,7 @@ contains
     end if
     call space%fill(self%closing, 0.0_wp)
     if (all_zero(self%q)) return
-    if (self%pressing) then
+    if (self%pressure_feels_shear) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
       call space%copy(moved(:n), self%closing)
@@ -344,7 +344,7 @@ contains
       applications = self%operators%flexibility%applications
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], dragged, error)
       if (allocated(error)) return
-      if (.not. self%dragging) dragged(n + 1:) = 0.0_wp
+      if (.not. self%shear_feels_pressure) dragged(n + 1:) = 0.0_wp
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
       u = dragged(n + 1:) + moved(n + 1:)
@@ -353,7 +353,7 @@ contains
         call self%operators%apply([along_x, along_y], q, [normal], moved(:n), error)
         if (allocated(error)) return
       end if
-      if (.not. self%pressing) moved(:n) = 0.0_wp
+      if (.not. self%pressure_feels_shear) moved(:n) = 0.0_wp
       w = dragged(:n) + merge(moved(:n), 0.0_wp, self%joint)
       closing = merge(0.0_wp, moved(:n), self%joint)
       self%operators%flexibility%applications = applications

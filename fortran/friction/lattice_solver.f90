@@ -1,7 +1,8 @@
 !> A load step with friction on one lattice.
 !>
-!> Sweeps that find pressure and shear traction one after the other (staggered_newton),
-!> and where that is not enough both together (coupled_newton).
+!> Sweeps that find pressure and shear traction one after the other (staggered_newton, which states the equations),
+!> and where that is not enough both together (coupled_newton), until the residuals of what is recorded are within the
+!> tolerance.
 !>
 !> Equations: docs/theory/friction.md, (F2) to (F4).
 module hc_lattice_solver
@@ -62,7 +63,7 @@ contains
     if (allocated(error)) return
     ! sweeps that find pressure and shear traction one after the other
     apart = max_sweeps
-    if (now%pressing) apart = options%staggered_sweeps
+    if (now%pressure_feels_shear) apart = options%staggered_sweeps
     if (problem%couples_strongly()) then
       apart = options%staggered_sweeps_strong
       call now%globalization%cut(options%cautious_share, options)

@@ -1,13 +1,26 @@
-!> A sweep over pressure and shear traction.
+!> A staggered sweep: a step of Newton's method for the pressure, then one for the shear traction.
 !>
-!> Two steps of a semismooth Newton method: the pressure under the present shear
-!> traction, by active sets as without friction; then the shear traction under that
-!> pressure, with stick, slip and the direction of slip taken from the last
-!> iterate (see friction_law). Both linear problems are solved by projected
-!> conjugate gradients, no more accurately than the sets deserve; the rigid motions
-!> come out as multipliers of the prescribed loads.
+!> Both methods on FFTs, this one and coupled_newton, solve F(p, q, motions) = 0 at the end of a load step
+!> (docs/theory/friction.md),
 !>
-!> Equations: docs/theory/friction.md, (F9), (F10).
+!>     F_p = p - max(0, p - r' g),     g = h + w(p, q) - approach,                      (F1), (F2)
+!>     F_q = q - P(q - r ds),         ds = u(p, q) - shift - twist x r - s^n,           (F1), (F3)
+!>     F_m = (sum A p - P,  sum A q - Q,  sum A (x q_y - y q_x) - M_z),                 (F4)
+!>
+!> with P the projection on what the law of friction allows under p (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
+!> 1991); a motion that is prescribed has no component of F_m. The linearisation is that of the branch on which each node
+!> lies (semismooth Newton: Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003): g = 0 on the contact, ds = 0 in stick,
+!> and in slip q = mu p e + tau t with t.ds + D tau = 0, (F5), (F6). A sweep is one pass of block Gauss-Seidel over it:
+!>
+!> 1. `solve_pressure`: the contact C by (F5), and (F9), T_pp p - approach = -h - T_pq q on C with sum A p = P, the approach its
+!>    multiplier, by conjugate gradients that keep the load (Polonsky & Keer, Wear 231, 1999, with a preconditioner);
+!> 2. `solve_shear`: stick, slip, directions e and compliances D by (F5), (F6), with r of (F8);
+!> 3. and (F10), (E^T T_qq E + D) (q, tau) - E^T B motions = E^T (s^n - T_qp p - T_qq mu p e), with the prescribed loads, by the
+!>    same conjugate gradients; where nothing resists a load, nodes are held; where the residual does not fall, the
+!>    step is damped (hc_globalization);
+!> 4. the closing of the gap by the shear traction, cut to the cone, and the residuals R_n and R_t, which take no product more.
+!>
+!> Linear problems are solved no more accurately than the sets deserve; the numbers are those of `newton_options_t`.
 module hc_staggered_newton
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -37,17 +50,20 @@ contains
     ! the pressure is found under the shear traction: what each of them causes has to be known
     if (now%joint) call now%refresh(error)
     if (allocated(error)) return
+    ! 1.
     call solve_pressure(now, error)
     if (allocated(error)) return
-    if (now%dragging .and. now%cold .and. now%first) then
+    if (now%shear_feels_pressure .and. now%cold .and. now%first) then
       call now%operators%apply([normal], now%p, [along_x, along_y], now%u, error)
       if (allocated(error)) return
     end if
     ! what the new pressure makes of the old shear traction is what has to be mended
     if (.not. now%first) call now%find_tangential_residual()
+    ! 2. and 3.
     call solve_shear(now, error)
     if (allocated(error)) return
-    if (now%pressing) then
+    ! 4.
+    if (now%pressure_feels_shear) then
       call now%cut_to_cone(q)
       call now%operators%apply([along_x, along_y], q, [normal], now%closing, error)
       if (allocated(error)) return
@@ -57,7 +73,7 @@ contains
     now%first = .false.
   end subroutine staggered_sweep
 
-  !> Pressure under the present shear traction.
+  !> Pressure under the present shear traction, (F9).
   subroutine solve_pressure(now, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -79,7 +95,7 @@ contains
     n_constraint = merge(1, 0, now%target%control(normal) == force_control)
     allocate (constraint(n, n_constraint), rhs(n))
     level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
-    do area = 1, merge(options%max_areas, options%max_areas_uncoupled, now%pressing .and. .not. searching)
+    do area = 1, merge(options%max_areas, options%max_areas_uncoupled, now%pressure_feels_shear .and. .not. searching)
       call now%find_gap(gap)
       now%residual_normal = now%gap_residual(gap)
       missing = 0.0_wp
@@ -93,10 +109,10 @@ contains
         if (.not. changed) changed = count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if
-      if (searching .and. now%pressing .and. .not. changed) return
+      if (searching .and. now%pressure_feels_shear .and. .not. changed) return
 
       if (changed) call now%pressure%take(now%contact)
-      if (searching .and. now%pressing .and. allocated(now%punch_pressure)) deallocate (now%punch_pressure)
+      if (searching .and. now%pressure_feels_shear .and. allocated(now%punch_pressure)) deallocate (now%punch_pressure)
       !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, n
         if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))
@@ -115,7 +131,7 @@ contains
         if (allocated(error)) return
       end if
       goal = options%final_accuracy*now%tolerance
-      if (changed .or. now%pressing) goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
+      if (changed .or. now%pressure_feels_shear) goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
       scale = now%problem%normal_compliance*now%pressure%space%max(now%p)
       call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
                         multiplier(:n_constraint), residual, iterations, outcome, error, drift)
@@ -127,7 +143,7 @@ contains
     end do
   end subroutine solve_pressure
 
-  !> Shear traction under the present pressure.
+  !> Shear traction under the present pressure, (F10).
   subroutine solve_shear(now, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -172,7 +188,8 @@ contains
         call find_prescribed_displacement(now, rhs)
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
-        goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, now%pressing)))
+        goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, &
+                                                              now%pressure_feels_shear)))
         goal = max(goal, options%final_accuracy*now%tolerance)
         scale = now%problem%tangential_compliance*now%traction_scale()
         call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
@@ -230,7 +247,7 @@ contains
     real(wp), allocatable :: traction(:), moved(:)
     integer :: n, i
 
-    if (.not. now%dragging) then
+    if (.not. now%shear_feels_pressure) then
       call now%shear%product(x, ax, error)
       return
     end if
@@ -248,7 +265,7 @@ contains
     !$omp end parallel do
   end subroutine displace
 
-  !> About the pressure that an approach of the nodes in contact causes: worked out once a step.
+  !> Estimate of the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
   subroutine find_punch_pressure(now, constraint, mb, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -274,7 +291,7 @@ contains
     end do
   end subroutine find_punch_pressure
 
-  !> About the shear traction that rigid motions of the unknowns cause: worked out once a step, if it serves.
+  !> Estimate of the shear traction that rigid motions of the unknowns cause, V of (F11): made once a step, if it serves.
   subroutine find_rigid_traction(now, active, constraint, afresh, mb, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -282,7 +299,7 @@ contains
     logical, intent(in), contiguous :: active(:)
     !> Constraint vectors, in the frames (2 n, number of constraints)
     real(wp), intent(in), contiguous :: constraint(:, :)
-    !> Work it out again
+    !> Make it again
     logical, intent(in) :: afresh
     !> The traction, in the frames (2 n, number of constraints)
     real(wp), allocatable, intent(out) :: mb(:, :)

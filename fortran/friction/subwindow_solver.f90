@@ -2,8 +2,7 @@
 !>
 !> A contact that is small in its window (the first steps of one that grows, wide
 !> windows) is solved on the part around it. What the tractions do elsewhere follows from one
-!> product over the window, which also judges the state. Should the contact reach
-!> the rim of the part, or the bodies overlap outside, the step is solved on the whole window.
+!> product over the window, which also judges the state; hc_subwindow says what follows if it fails.
 !>
 !> Theory: docs/theory/multilevel.md.
 module hc_subwindow_solver
@@ -14,6 +13,7 @@ module hc_subwindow_solver
   use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact, frictional_contact_memory, friction_step_memory
   use hc_spectrum_cache, only: kernel_cache_t
+  use hc_subwindow, only: next_part
   implicit none
   private
 
@@ -98,22 +98,37 @@ contains
     type(contact_state_t), intent(out) :: state
     type(error_t), allocatable, intent(out) :: error
 
-    integer :: low(2), high(2)
+    integer :: low(2), high(2), try, sweeps
     real(wp) :: work
+    logical :: found, solved
 
     work = 0.0_wp
+    sweeps = 0
     if (any(start%pressure > 0.0_wp) .and. self%problem%is_pressed(target)) then
-      call self%problem%lattice%enclose(start%pressure > 0.0_wp, low, high)
-      if (self%problem%lattice%is_worth_parting(low, high)) then
+      do try = 1, self%problem%options%multilevel%max_parts + 1
+        associate (problem => self%problem, options => self%problem%options%multilevel)
+          if (try == 1) then
+            call next_part(try, options, problem%lattice, problem%candidate, start, low, high, found)
+          else
+            call next_part(try, options, problem%lattice, problem%candidate, state, low, high, found)
+          end if
+        end associate
+        if (.not. found) exit
         call take_part(self, low, high, error)
         if (allocated(error)) return
-        call solve_part(self, start, reference, target, tolerance, max_sweeps, state, work, error)
+        call solve_part(self, start, reference, target, tolerance, max_sweeps, state, solved, error)
         if (allocated(error)) return
+        work = work + state%operator_applications
+        sweeps = sweeps + state%sweeps
+        state%operator_applications = work
+        state%sweeps = sweeps
         if (state%converged) return
-      end if
+        if (.not. solved) exit
+      end do
     end if
     call self%whole%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
     state%operator_applications = state%operator_applications + work
+    state%sweeps = state%sweeps + sweeps
   end subroutine solve_step
 
   !> Solver on the part of the window between some columns and rows, unless it is at hand.
@@ -135,8 +150,8 @@ contains
     call new_frictional_contact(self%part, problem, error, self%threads, self%cache)
   end subroutine take_part
 
-  !> A step on the part; not converged: it has to be solved on the window.
-  subroutine solve_part(self, start, reference, target, tolerance, max_sweeps, state, work, error)
+  !> A step on the part, judged on the window.
+  subroutine solve_part(self, start, reference, target, tolerance, max_sweeps, state, solved, error)
     class(windowed_friction_t), intent(inout) :: self
     type(contact_state_t), intent(in) :: start
     real(wp), intent(in) :: reference(:, :, :)
@@ -145,14 +160,14 @@ contains
     integer, intent(in) :: max_sweeps
     !> State on the window
     type(contact_state_t), intent(out) :: state
-    !> Work, in applications of the full operator over the window
-    real(wp), intent(out) :: work
+    !> There is a solution on the part
+    logical, intent(out) :: solved
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     type(contact_state_t) :: before, after
     real(wp), allocatable :: displacement(:, :, :)
 
-    work = 0.0_wp
+    solved = .false.
     call new_friction_state(state, self%problem%lattice, self%problem%space)
     associate (lattice => self%part%problem%lattice, c => [self%low(1), self%high(1)], r => [self%low(2), self%high(2)])
       call new_friction_state(before, lattice, self%problem%space)
@@ -166,31 +181,19 @@ contains
       call self%part%solve_step(before, reference(c(1):c(2), r(1):r(2), :), target, &
                                 self%problem%options%multilevel%part_tolerance*tolerance, max_sweeps, after, error)
       if (allocated(error)) return
-      work = after%operator_applications*lattice%size()/self%problem%lattice%size()
-      if (.not. after%converged .or. reaches_rim(self, after%pressure > 0.0_wp)) return
+      state%operator_applications = after%operator_applications*lattice%size()/self%problem%lattice%size()
+      state%sweeps = after%sweeps
+      solved = after%converged
+      if (.not. solved) return
       state%pressure(c(1):c(2), r(1):r(2)) = after%pressure
       state%traction(c(1):c(2), r(1):r(2), :) = after%traction
     end associate
     state%motion = after%motion
-    state%sweeps = after%sweeps
     allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
     call self%whole%displacements(state%pressure, state%traction, displacement, error)
     if (allocated(error)) return
     call self%problem%conclude(target, tolerance, reference, displacement, state)
-    work = work + 1.0_wp
-    state%operator_applications = work
+    state%operator_applications = state%operator_applications + 1.0_wp
   end subroutine solve_part
-
-  !> Does the contact reach a rim of the part that is not one of the window?
-  pure logical function reaches_rim(self, contact)
-    class(windowed_friction_t), intent(in) :: self
-    !> Nodes in contact on the part
-    logical, intent(in) :: contact(:, :)
-
-    associate (n => shape(contact), extent => self%problem%lattice%extent)
-      reaches_rim = (self%low(1) > 1 .and. any(contact(1, :))) .or. (self%high(1) < extent(1) .and. any(contact(n(1), :))) &
-                    .or. (self%low(2) > 1 .and. any(contact(:, 1))) .or. (self%high(2) < extent(2) .and. any(contact(:, n(2))))
-    end associate
-  end function reaches_rim
 
 end module hc_subwindow_solver

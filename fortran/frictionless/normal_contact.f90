@@ -7,6 +7,7 @@
 module hc_normal_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: multilevel_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
@@ -21,6 +22,7 @@ module hc_normal_contact
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
+  use hc_subwindow, only: next_part
   use hc_transfer, only: level_count, prolong_edge, coarsen_bodies
   implicit none
   private
@@ -34,8 +36,7 @@ module hc_normal_contact
 
   !> Lattices with fewer nodes are left to one thread.
   integer, parameter :: worth_sharing = 150000
-  !> Parts of the window that are tried, and their tolerance.
-  integer, parameter :: part_tries = 3
+  !> Tolerance on a part of the window, relative to that on the whole.
   real(wp), parameter :: part_tolerance = 0.8_wp
 
   !> A frictionless contact problem on a hierarchy of lattices.
@@ -211,8 +212,7 @@ contains
 
   !> Solve on the finest lattice: on the part around the contact, if that is much smaller than the window.
   !>
-  !> The gap elsewhere follows from one product over the window; should the bodies overlap there,
-  !> the part grows.
+  !> The gap elsewhere follows from one product over the window.
   subroutine solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
     class(normal_contact_t), intent(inout), target :: self
     !> force_control or displacement_control
@@ -231,16 +231,15 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: part
+    type(multilevel_options_t) :: options
     integer :: low(2), high(2), sweeps, try
+    logical :: found
 
     associate (whole => self%level(1))
       sweeps = 0
-      do try = 1, part_tries
-        call whole%lattice%enclose(state%pressure > 0.0_wp, low, high)
-        if (try > 1) then
-          call whole%lattice%enclose(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. whole%candidate), low, high)
-        end if
-        if (.not. whole%lattice%is_worth_parting(low, high)) exit
+      do try = 1, options%max_parts + 1
+        call next_part(try, options, whole%lattice, whole%candidate, state, low, high, found)
+        if (.not. found) exit
         call take_part(self, low, high, error)
         if (allocated(error)) return
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
@@ -259,7 +258,8 @@ contains
         if (allocated(error)) return
         work = work + whole%work()
         state%sweeps = sweeps
-        if (state%converged .or. .not. part%converged) return
+        if (state%converged) return
+        if (.not. part%converged) exit
       end do
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
       call whole%prepare(self%pair, self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)

@@ -11,9 +11,6 @@ module hc_normal_directions
 
   public :: find_residual, projected_step, next_direction, find_step
 
-  !> Length c of a projected step: M is a little more than the inverse.
-  real(wp), parameter :: step_length = 0.85_wp
-
 contains
 
   !> r = approach - h - w on the active nodes.
@@ -42,10 +39,11 @@ contains
     logical, intent(in) :: held, by_load
     !> Sum of the pressures under a prescribed load
     real(wp), intent(in) :: pressures
-    real(wp) :: part(size(now%p, 2)), aim, mean, row_sum
+    real(wp) :: part(size(now%p, 2)), aim, mean, row_sum, step_length
     real(sp) :: lack
     integer :: col, row
 
+    step_length = level%options%normal%step_length
     mean = 0.0_wp
     if (by_load .and. .not. held) then
       !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, row_sum)

@@ -12,9 +12,6 @@ module hc_normal_iterate
 
   public :: normal_iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, push_only
 
-  !> Scale of the classification parameter: r = this/(2 pi lambda_1 a), a the contact radius.
-  real(wp), parameter :: classification_scale = 10.0_wp
-
   !> Error of a product in single precision, relative to its largest value.
   real(wp), parameter :: single_error = epsilon(1.0_sp)
 
@@ -194,7 +191,9 @@ contains
     real(wp) :: r, stiffness, p_max, worst, worst_active
     integer :: row, n_next, n_changed, n_wrong
 
-    r = classification_scale/(2.0_wp*pi*level%pair%lambda_1*sqrt(level%lattice%cell_area()*now%n_active/pi))
+    ! (N2)
+    r = level%options%contact%classification_scale/(2.0_wp*pi*level%pair%lambda_1 &
+                                                    *sqrt(level%lattice%cell_area()*now%n_active/pi))
     stiffness = 1.0_wp/level%compliance
     p_max = 0.0_wp
     worst = 0.0_wp

@@ -5,6 +5,7 @@
 module hc_normal_lattice
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
+  use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -32,6 +33,7 @@ module hc_normal_lattice
     !> Nodes that may come into contact (n_col, n_row)
     logical, allocatable :: candidate(:, :)
     type(elastic_pair_t) :: pair
+    type(options_t) :: options
     type(symbol_preconditioner_t) :: preconditioner
     !> The flexibility in single precision, in the unit of the preconditioner
     type(convolution_t) :: single

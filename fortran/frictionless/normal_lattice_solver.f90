@@ -16,6 +16,7 @@
 module hc_normal_lattice_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: normal_options_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
   use hc_contact_residuals, only: conclude
@@ -27,17 +28,6 @@ module hc_normal_lattice_solver
   private
 
   public :: solve_on_normal_lattice
-
-  !> Projected steps have to bring the residual down by this factor every other time, or sets are held.
-  real(wp), parameter :: progress = 0.5_wp
-  !> Steps that are not judged.
-  integer, parameter :: first_steps = 3
-  !> A set that is held is given up when its residual has come down by this factor.
-  real(wp), parameter :: held_accuracy = 0.1_wp
-  !> Share of a residual, and of the tolerance, that errors of single precision may make up.
-  real(wp), parameter :: residual_share = 0.01_wp, tolerance_share = 0.1_wp
-  !> Times that the pressure of a solution is fitted to the load: a tolerance below rounding errors is not reached by more.
-  integer, parameter :: max_fits = 3
 
 contains
 
@@ -111,7 +101,9 @@ contains
     type(conjugate_gradient_t) :: recurrence
     logical :: changed, held, fresh
     integer :: fits
+    type(normal_options_t) :: options
 
+    options = level%options%normal
     allocate (candidate, source=level%candidate)
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
     if (.not. by_load) candidate = candidate .and. level%initial_gap < target
@@ -129,14 +121,15 @@ contains
       if (by_load) call balance(level, now)
       call judge(level, now, candidate, next, changed, error)
       if (allocated(error)) return
-      if (level%exact .and. now%stale > level%compliance*now%p_max*max(residual_share*now%residual, tolerance_share*tolerance)) then
+      if (level%exact .and. now%stale > level%compliance*now%p_max*max(options%residual_share*now%residual, &
+                                                                       options%tolerance_share*tolerance)) then
         if (by_load) call fit_load(level, now, pressures)
         call find_closing(level, now, error)
         if (allocated(error)) return
         cycle
       end if
-      if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < max_fits) then
-        if (abs(load_lack(level, now, pressures)) > tolerance_share*tolerance*pressures) then
+      if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < options%max_fits) then
+        if (abs(load_lack(level, now, pressures)) > options%tolerance_share*tolerance*pressures) then
           fits = fits + 1
           call fit_load(level, now, pressures)
           call find_closing(level, now, error)
@@ -149,10 +142,10 @@ contains
       if (sweeps == 1) changed = .true.
 
       ! has the residual come down, compared with the best but the last two?
-      if (.not. held .and. sweeps > first_steps) held = now%residual > progress*history(3)
+      if (.not. held .and. sweeps > options%first_steps) held = now%residual > options%progress*history(3)
       history = [now%residual, history(1), min(history(2), history(3))]
       if (held .and. changed) then
-        if (fresh .and. now%residual_active > held_accuracy*held_start) then
+        if (fresh .and. now%residual_active > options%held_accuracy*held_start) then
           changed = .false.
         else
           held_start = min(now%residual, 1.0_wp)

@@ -37,6 +37,10 @@ module hexcontact
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_load_path, only: advance
+  use hc_elliptic_contact, only: elliptic_contact_t, hertz_ellipse, crossed_cylinders_hessian
+  use hc_partial_slip, only: mindlin_t, plane_cattaneo_t, turning_points
+  use hc_torsion, only: lubkin_t
+  use hc_self_similar, only: no_slip_constants, goodman_stick_ratio, goodman_stick_ratio_plane
   implicit none
   public
 end module hexcontact

@@ -4,3 +4,4 @@ hc_f2py_normal: Any
 hc_f2py_friction: Any
 hc_f2py_influence: Any
 hc_f2py_cache: Any
+hc_f2py_analytic: Any

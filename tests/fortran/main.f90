@@ -21,6 +21,7 @@ program tester
   use test_friction_sweeps, only: collect_friction_sweeps
   use test_load_path, only: collect_load_path
   use test_direct_friction, only: collect_direct_friction
+  use test_analytic, only: collect_analytic
   implicit none
 
   type(suite_t), allocatable :: suites(:)
@@ -43,7 +44,8 @@ program tester
     new_suite('fas_predictor', collect_fas_predictor), &
     new_suite('friction_sweeps', collect_friction_sweeps), &
     new_suite('load_path', collect_load_path), &
-    new_suite('direct_friction', collect_direct_friction) &
+    new_suite('direct_friction', collect_direct_friction), &
+    new_suite('analytic', collect_analytic) &
   ]
   call run_suites(suites, n_failed)
   if (n_failed > 0) stop 1, quiet=.true.

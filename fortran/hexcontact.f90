@@ -41,6 +41,7 @@ module hexcontact
   use hc_partial_slip, only: mindlin_t, plane_cattaneo_t, turning_points
   use hc_torsion, only: lubkin_t
   use hc_self_similar, only: no_slip_constants, goodman_stick_ratio, goodman_stick_ratio_plane
+  use hc_axisymmetric, only: axisymmetric_t, power_law_t, rounded_punch_t, flat_punch_t
   implicit none
   public
 end module hexcontact

@@ -23,6 +23,8 @@ import scipy  # its parts are loaded when they are first used: a fifth of a seco
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import number, reals
+from ..core.analytic import at_points
+from ..core.analytic import axisymmetric as flat
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array], Array]
@@ -34,6 +36,9 @@ class Given(TypedDict, total=False):
     normal_load: float
     approach: float
     contact_radius: float
+
+
+_GIVEN = ("normal_load", "approach", "contact_radius")  # in the order of the core
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,7 @@ def require_positive(**values: float) -> None:
 
 def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
     """Return name and value of the one quantity that was given."""
-    names = ("normal_load", "approach", "contact_radius")[: 3 if with_radius else 2]
+    names = _GIVEN[: 3 if with_radius else 2]
     if len(given) != 1 or not set(given) <= set(names):
         raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
     [(name, value)] = given.items()
@@ -119,28 +124,20 @@ def power_law(
     if not (np.isfinite(n) and n >= 1.0):
         raise ValueError(f"exponent is {exponent!r}; expected a number of at least 1")
     name, value = driven_by(given)
-    log_gamma = scipy.special.gammaln
-    c = np.sqrt(np.pi) * np.exp(log_gamma(n / 2 + 1) - log_gamma(n / 2 + 0.5)) * coefficient
-    load_factor = 2.0 * effective_modulus * n / (n + 1.0)  # P = load_factor * delta * a
-    if name == "normal_load":
-        a = (value / (load_factor * c)) ** (1.0 / (n + 1.0))
-    else:
-        a = value if name == "contact_radius" else (value / c) ** (1.0 / n)
-    delta = c * a**n
-    scale = effective_modulus * n * delta / (np.pi * a)
+    return _contact(flat.power_law, flat.power_law_pressure, (effective_modulus, coefficient, n), name, value)
 
-    def pressure(r: Array) -> Array:
-        z = np.maximum(1.0 - (r / a) ** 2, 0.0)
-        return np.asarray(scale * np.sqrt(z) * scipy.special.hyp2f1(1.0, 1.0 - n / 2, 1.5, z))
 
-    if n == 1.0:
-        peak = np.inf
-    elif n <= 2.0:  # the pressure falls from the center outwards
-        peak = scale / (n - 1.0)
-    else:
-        peak = _maximum(pressure, 0.0, a)
+def _contact(
+    solve: Callable[..., Array],
+    pressure: Callable[..., Array],
+    body: tuple[float, ...],
+    name: str,
+    value: float,
+) -> AxisymmetricContact:
+    """Solve the contact with a body of the Fortran library."""
+    radius, *others = solve(body, _GIVEN.index(name), value).tolist()
     return AxisymmetricContact(
-        effective_modulus, float(a), float(delta), float(load_factor * delta * a), float(peak), pressure
+        body[0], radius, *others, _pressure=lambda r: at_points(pressure, body, [r], radius)
     )
 
 
@@ -204,14 +201,12 @@ def flat_punch(effective_modulus: float, radius: float, **given: Unpack[Given]) 
     """
     require_positive(effective_modulus=effective_modulus, radius=radius)
     name, value = driven_by(given, with_radius=False)
-    stiffness = 2.0 * effective_modulus * radius
+    body = effective_modulus, radius
+    stiffness = float(flat.flat_punch_stiffness(body))
     load = value if name == "normal_load" else stiffness * value
-
-    def pressure(r: Array) -> Array:
-        with np.errstate(divide="ignore"):
-            return np.asarray(load / (2 * np.pi * radius * np.sqrt(np.maximum(radius**2 - r**2, 0.0))))
-
-    return AxisymmetricContact(effective_modulus, radius, load / stiffness, load, np.inf, pressure)
+    return AxisymmetricContact(
+        *body, load / stiffness, load, np.inf, lambda r: at_points(flat.flat_punch_pressure, body, [r], load)
+    )
 
 
 def rounded_punch(
@@ -237,20 +232,11 @@ def rounded_punch(
     AxisymmetricContact
     """
     require_positive(effective_modulus=effective_modulus, flat_radius=flat_radius, edge_radius=edge_radius)
-    b, radius = flat_radius, edge_radius
-
-    def leg(t: Array) -> Array:
-        return np.sqrt(np.maximum((t - b) * (t + b), 0.0))
-
-    def delta(t: Array) -> Array:
-        t = np.maximum(t, b)
-        return np.asarray(t / radius * (leg(t) - b * np.arctan2(leg(t), b)))
-
-    def rate(t: Array) -> Array:
-        t = np.maximum(t, b)
-        return np.asarray((2.0 * leg(t) - b * np.arctan2(leg(t), b)) / radius)
-
-    return _solve_profile(effective_modulus, delta, rate, driven_by(given), smallest=b)
+    name, value = driven_by(given)
+    if name == "contact_radius" and value <= flat_radius:
+        raise ValueError(f"contact_radius is {value!r}; expected more than the flat radius {flat_radius!r}")
+    body = effective_modulus, flat_radius, edge_radius
+    return _contact(flat.rounded_punch, flat.rounded_punch_pressure, body, name, value)
 
 
 def axisymmetric(

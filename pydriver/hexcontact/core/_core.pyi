@@ -5,3 +5,4 @@ hc_f2py_friction: Any
 hc_f2py_influence: Any
 hc_f2py_cache: Any
 hc_f2py_analytic: Any
+hc_f2py_axisymmetric: Any

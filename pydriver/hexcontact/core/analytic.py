@@ -13,6 +13,7 @@ from . import _core
 Array = NDArray[np.float64]
 
 flat = _core.hc_f2py_analytic
+axisymmetric = _core.hc_f2py_axisymmetric
 
 
 def at_points(

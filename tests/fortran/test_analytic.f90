@@ -9,6 +9,7 @@ module test_analytic
   use hc_torsion, only: lubkin_t
   use hc_self_similar, only: no_slip_constants, goodman_stick_ratio, goodman_stick_ratio_plane
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+  use hc_axisymmetric, only: power_law_t, rounded_punch_t, flat_punch_t
   use testing, only: test_t, new_test, check, check_true, check_raised
   implicit none
   private
@@ -29,7 +30,9 @@ contains
       new_test('partial_slip', test_partial_slip), &
       new_test('memory', test_memory), &
       new_test('torsion', test_torsion), &
-      new_test('dissimilar', test_dissimilar) &
+      new_test('dissimilar', test_dissimilar), &
+      new_test('power_laws', test_power_laws), &
+      new_test('punches', test_punches) &
     ]
   end subroutine collect_analytic
 
@@ -214,5 +217,78 @@ contains
     if (allocated(error)) return
     call check_true(error, ieee_is_nan(goodman_stick_ratio(0.5_wp, 1.0e-4_wp)), 'too small a stick ratio')
   end subroutine test_dissimilar
+
+  !> Closed forms of n = 1, 2, 3, 4, and the sum of the pressure for an exponent that is no integer.
+  subroutine test_power_laws(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(power_law_t) :: body
+    real(wp) :: node(60), weight(60)
+
+    ! Sneddon's cone: delta = pi m a/2, P = pi E* m a^2/2, p = (E* m/2) arcosh(a/r)
+    body = power_law_t(2.0_wp, 0.3_wp, 1.0_wp)
+    call check(error, [body%approach(1.5_wp), body%load(1.5_wp)], pi*[0.225_wp, 0.675_wp], 1.0e-14_wp, 'cone')
+    if (allocated(error)) return
+    call check(error, body%pressure(1.5_wp, [0.01_wp, -1.0_wp, 1.49_wp]), &
+               0.3_wp*acosh(1.5_wp/[0.01_wp, 1.0_wp, 1.49_wp]), 1.0e-14_wp, 'pressure of the cone')
+    if (allocated(error)) return
+    call check_true(error, min(body%max_pressure(1.5_wp), body%pressure(1.5_wp, 0.0_wp)) > huge(1.0_wp), 'its tip')
+    if (allocated(error)) return
+    ! Hertz: R = 1, a = 1, E* = 3/4: P = 1, p0 = 3/(2 pi)
+    body = power_law_t(0.75_wp, 0.5_wp, 2.0_wp)
+    call check(error, [body%load(1.0_wp), body%approach(1.0_wp), body%max_pressure(1.0_wp), body%pressure(1.0_wp, 0.6_wp)], &
+               [1.0_wp, 1.0_wp, 1.5_wp/pi, 1.2_wp/pi], 1.0e-14_wp, 'sphere')
+    if (allocated(error)) return
+    ! n = 4: p = 32/(3 pi) (s^3/3 + r^2 s), largest at r = a/sqrt(2)
+    body = power_law_t(1.0_wp, 1.0_wp, 4.0_wp)
+    call check(error, body%pressure(1.0_wp, [0.0_wp, 0.6_wp, 1.1_wp]), &
+               32.0_wp/(3.0_wp*pi)*[1.0_wp/3.0_wp, 0.512_wp/3.0_wp + 0.36_wp*0.8_wp, 0.0_wp], 1.0e-14_wp, 'fourth power')
+    if (allocated(error)) return
+    call check(error, body%max_pressure(1.0_wp), 32.0_wp*sqrt(2.0_wp)/(9.0_wp*pi), 1.0e-14_wp, 'its largest pressure')
+    if (allocated(error)) return
+    body = power_law_t(2.0_wp, 0.4_wp, 5.3_wp)
+    call check(error, [body%contact_radius(normal_load=body%load(0.9_wp)), body%contact_radius(approach=body%approach(0.9_wp))], &
+               [0.9_wp, 0.9_wp], 1.0e-14_wp, 'contact radius')
+    if (allocated(error)) return
+    call gauss_legendre(node, weight)
+    associate (r => 0.9_wp*sqrt((1.0_wp - node)*(1.0_wp + node)))
+      ! r dr = a^2 s ds takes the root at the edge out
+      call check(error, 2.0_wp*pi*0.81_wp*sum(weight*node*body%pressure(0.9_wp, r)), body%load(0.9_wp), 1.0e-9_wp, 'sum')
+    end associate
+  end subroutine test_power_laws
+
+  !> A rounded punch (benchmarks.csv, E* = 1, a = 1, b = 0.6, R = 1) and a flat one.
+  subroutine test_punches(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(rounded_punch_t), parameter :: rounded = rounded_punch_t(1.0_wp, 0.6_wp, 1.0_wp)
+    type(flat_punch_t), parameter :: flat = flat_punch_t(2.0_wp, 1.3_wp)
+    real(wp), parameter :: beside = 1.0e-12_wp
+    real(wp) :: p(3), node(60), weight(60)
+
+    call check(error, [rounded%load(1.0_wp), rounded%approach(1.0_wp)], [0.4142895_wp, 0.2436229_wp], 5.0e-8_wp, 'rounded punch')
+    if (allocated(error)) return
+    ! the table's values for a lattice are 1e-5 below and 2e-5 above
+    call check(error, rounded%max_pressure(1.0_wp), 0.17562_wp, 2.0e-5_wp, 'largest pressure')
+    if (allocated(error)) return
+    ! r = x^2 (3 - 2 x) on both sides of the end of the flat, where the pressure has a kink
+    call gauss_legendre(node, weight)
+    weight = weight*6.0_wp*node*(1.0_wp - node)
+    node = node**2*(3.0_wp - 2.0_wp*node)
+    associate (inner => 0.6_wp*node, outer => 0.6_wp + 0.4_wp*node)
+      call check(error, 2.0_wp*pi*(0.6_wp*sum(weight*inner*rounded%pressure(1.0_wp, inner)) &
+                                   + 0.4_wp*sum(weight*outer*rounded%pressure(1.0_wp, outer))), &
+                 rounded%load(1.0_wp), 1.0e-7_wp, 'sum of the pressure')
+      if (allocated(error)) return
+    end associate
+    call check(error, [rounded%contact_radius(normal_load=rounded%load(1.7_wp)), rounded%contact_radius(approach=0.2436229_wp)], &
+               [1.7_wp, 1.0_wp], 1.0e-7_wp, 'contact radius')
+    if (allocated(error)) return
+    p = rounded%pressure(1.0_wp, 0.6_wp*[1.0_wp - beside, 1.0_wp, 1.0_wp + beside])
+    call check(error, p, spread(p(2), 1, 3), 1.0e-10_wp, 'the pressure is continuous where the flat ends')
+    if (allocated(error)) return
+    call check(error, [flat%stiffness(), flat%pressure(1.0_wp, 0.0_wp), flat%pressure(1.0_wp, 1.31_wp)], &
+               [5.2_wp, 1.0_wp/(2.0_wp*pi*1.69_wp), 0.0_wp], 1.0e-15_wp, 'flat punch')
+    if (allocated(error)) return
+    call check_true(error, flat%pressure(1.0_wp, -1.3_wp) > huge(1.0_wp), 'its edge')
+  end subroutine test_punches
 
 end module test_analytic

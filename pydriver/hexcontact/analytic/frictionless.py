@@ -265,80 +265,50 @@ def axisymmetric(
     AxisymmetricContact
     """
     require_positive(effective_modulus=effective_modulus, scale=scale)
-    node, weight = _gauss(64)
-    sine = np.sin(np.pi / 2 * node)  # r = t sin(theta), theta = pi/2 * node
+    name, value = driven_by(given)
+    theta, weight = _gauss(64)
+    sine, weight = np.sin(np.pi / 2 * theta), np.pi / 2 * weight  # r = t sin(theta)
+    node, share = _gauss(200)
 
-    def delta(t: Array) -> Array:
-        t = np.asarray(t, dtype=float)[..., None]
-        return np.asarray(np.pi / 2 * np.sum(weight * t * slope(t * sine), axis=-1))
+    def delta(t: float) -> float:
+        return float(np.sum(weight * t * slope(t * sine)))
 
     def rate(t: Array) -> Array:
-        r = np.asarray(t, dtype=float)[..., None] * sine
-        return np.asarray(np.pi / 2 * np.sum(weight * (slope(r) + r * curvature(r)), axis=-1))
+        r = t[..., None] * sine
+        return np.asarray(np.sum(weight * (slope(r) + r * curvature(r)), axis=-1))
 
-    return _solve_profile(effective_modulus, delta, rate, driven_by(given), start=scale)
+    def load(a: float) -> float:  # by parts: P = 2 E* int t delta'(t) dt
+        return float(2.0 * effective_modulus * a**2 * np.sum(share * node * rate(a * node)))
+
+    def pressure(r: Array) -> Array:
+        s = np.sqrt(np.maximum(a**2 - r**2, 0.0))[..., None]  # t^2 = r^2 + s^2
+        t = np.hypot(r[..., None], s * node)
+        integrand = np.divide(rate(t), t, out=np.zeros_like(t), where=t > 0.0)
+        return np.asarray(effective_modulus / np.pi * np.sum(s * share * integrand, axis=-1))
+
+    a = value
+    if name != "contact_radius":
+        target = load if name == "normal_load" else delta
+        upper = scale
+        while target(upper) < value:
+            upper *= 2.0
+        a = scipy.optimize.brentq(lambda t: target(t) - value, 0.0, upper, xtol=1e-15 * upper, rtol=1e-15)
+    r = np.linspace(0.0, a, 401)
+    found = pressure(r)
+    at = int(np.argmax(found))
+    peak = float(found[at])
+    if at > 0:
+        bounds = r[at - 1], r[min(at + 1, 400)]
+        peak = -scipy.optimize.minimize_scalar(
+            lambda s: -float(pressure(np.array(s))),
+            bounds=bounds,
+            method="bounded",
+            options={"xatol": 1e-8 * a},
+        ).fun
+    return AxisymmetricContact(effective_modulus, a, delta(a), load(a), peak, pressure)
 
 
 def _gauss(n: int) -> tuple[Array, Array]:
     """Nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
     node, weight = scipy.special.roots_legendre(n)
     return 0.5 * (node + 1.0), 0.5 * weight
-
-
-def _solve_profile(
-    effective_modulus: float,
-    delta: Profile,
-    rate: Profile,
-    given: tuple[str, float],
-    *,
-    smallest: float = 0.0,
-    start: float | None = None,
-) -> AxisymmetricContact:
-    """Contact whose approach grows as ``delta(t)`` with ``rate`` = delta'; both vanish for t <= smallest."""
-    node, weight = _gauss(200)
-    node, weight = node**2, 2.0 * node * weight  # the square takes the root-like start out of the integrand
-
-    def load(a: float) -> float:
-        t = smallest + (a - smallest) * node  # by parts: P = 2 E* int t delta'(t) dt
-        return float(2.0 * effective_modulus * (a - smallest) * np.sum(weight * t * rate(t)))
-
-    name, value = given
-    if name == "contact_radius":
-        if value <= smallest:
-            raise ValueError(f"contact_radius is {value!r}; expected more than the flat radius {smallest!r}")
-        a = value
-    else:
-        target = load if name == "normal_load" else lambda t: float(delta(np.array(t)))
-        upper = start if start is not None else 2.0 * smallest
-        while target(upper) < value:
-            upper *= 2.0
-        a = scipy.optimize.brentq(
-            lambda t: target(t) - value, smallest, upper, xtol=1e-15 * upper, rtol=1e-15
-        )
-
-    def pressure(r: Array) -> Array:
-        r = np.asarray(r, dtype=float)[..., None]
-        first = np.sqrt(np.maximum(smallest**2 - r**2, 0.0))  # t^2 = r^2 + s^2
-        last = np.sqrt(np.maximum(a**2 - r**2, 0.0))
-        t = np.sqrt(r**2 + (first + (last - first) * node) ** 2)
-        with np.errstate(invalid="ignore"):
-            integrand = np.where(t > 0.0, rate(t) / t, 0.0)
-        return np.asarray(effective_modulus / np.pi * np.sum((last - first) * weight * integrand, axis=-1))
-
-    r = np.linspace(0.0, a, 401)
-    at = int(np.argmax(pressure(r)))
-    peak = float(pressure(r[at]))
-    if at > 0:
-        peak = _maximum(pressure, r[at - 1], r[min(at + 1, 400)])
-    return AxisymmetricContact(effective_modulus, a, float(delta(np.array(a))), load(a), peak, pressure)
-
-
-def _maximum(pressure: Profile, first: float, last: float) -> float:
-    """Largest value between two radii; there is one maximum between them."""
-    found: scipy.optimize.OptimizeResult = scipy.optimize.minimize_scalar(
-        lambda s: -float(pressure(np.array(s))),
-        bounds=(first, last),
-        method="bounded",
-        options={"xatol": 1e-8 * last},
-    )
-    return -float(found.fun)

@@ -1,17 +1,21 @@
 program press_and_shear
-  use hexcontact, only: wp, error_t, material_t, elastic_pair_t, new_elastic_pair, lattice_t, new_lattice, &
+  use hexcontact, only: wp, pi, error_t, material_t, elastic_pair_t, new_elastic_pair, lattice_t, new_lattice, &
     equilateral_basis, coulomb_t, friction_problem_t, new_friction_problem, frictional_contact_t, &
-    new_frictional_contact, contact_state_t, new_friction_state, load_target_t, advance, stick, normal, along_x
+    new_frictional_contact, contact_state_t, new_friction_state, load_target_t, adaptive_path_t, &
+    contact_edges_t, new_contact_edges, zone_edge_t, stick, normal, along_x
   implicit none
   type(elastic_pair_t) :: pair
   type(lattice_t) :: lattice
   type(friction_problem_t) :: problem
   type(frictional_contact_t) :: contact
-  type(contact_state_t) :: state, next
+  type(contact_state_t) :: state
   type(load_target_t) :: target
+  type(adaptive_path_t) :: path
+  type(contact_edges_t) :: edges
+  type(zone_edge_t) :: contact_area, stick_area
   type(error_t), allocatable :: error
   real(wp) :: x(61, 61), y(61, 61)
-  integer :: step
+  integer :: segment, steps
 
   call new_elastic_pair(pair, material_t(210.0e9_wp, 0.3_wp), material_t(70.0e9_wp, 0.33_wp), error)  ! steel, aluminum
   if (.not. allocated(error)) call new_lattice(lattice, equilateral_basis(7.0e-6_wp), [-30, -30], shape(x), error)
@@ -20,16 +24,27 @@ program press_and_shear
     call new_friction_problem(problem, lattice, pair, (x**2 + y**2)/(2*0.01_wp), x < 1, coulomb_t(0.3_wp), .false., error)
   end if
   if (.not. allocated(error)) call new_frictional_contact(contact, problem, error)
+  if (allocated(error)) error stop error%message
   call new_friction_state(state, lattice)
-  do step = 1, 10
-    target%value(normal) = 3.0_wp*min(step, 5)        ! five steps up to 15 N,
-    target%value(along_x) = 0.6_wp*max(step - 5, 0)   ! then five up to 3 N along x
-    if (.not. allocated(error)) call advance(contact, state, target, .false., 1.0e-8_wp, 40, 6, next, error)
-    if (allocated(error)) error stop error%message
-    if (.not. next%converged) error stop 'no convergence'
-    state = next
+  call path%begin(state, pi*(0.13e-3_wp)**2)            ! the contact will be about that large
+  do segment = 1, 2
+    target%value(normal) = 15.0_wp                      ! first up to 15 N,
+    if (segment == 2) target%value(along_x) = 3.0_wp    ! then up to 3 N along x
+    steps = 0
+    do
+      call path%advance(contact, target, step_tolerance=0.05_wp, tolerance=1.0e-8_wp, max_sweeps=40, max_cuts=6, error=error)
+      if (allocated(error)) error stop error%message
+      if (.not. path%state%converged) error stop 'no convergence'
+      steps = steps + 1
+      if (path%fraction >= 1) exit                      ! the end of the segment
+    end do
+    state = path%state
+    call new_contact_edges(edges, lattice, state%pressure, state%gap, state%zone > 0, x < 1)
+    contact_area = edges%contact_edge()
+    stick_area = edges%stick_edge(state%zone == stick, 0.3_wp*state%pressure - norm2(state%traction, dim=3))
+    print '(i0, a, 2(f5.1, a))', steps, ' steps: stick ', 100*stick_area%area/contact_area%area, &
+      ' % of the contact area, within', 100*path%stick_area_error/contact_area%area, ' %'
   end do
-  print '(a, f6.2, a)', 'stick  ', 100.0_wp*count(state%zone == stick)/count(state%zone > 0), ' % of the contact area'
   print '(a, f6.4, a)', 'shift  ', state%motion(along_x)/1.0e-6_wp, ' um'
   print '(a, f6.2, a)', 'energy ', state%dissipated_energy/1.0e-9_wp, ' nJ taken by friction'
 end program press_and_shear

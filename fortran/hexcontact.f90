@@ -42,6 +42,15 @@ module hexcontact
   use hc_torsion, only: lubkin_t
   use hc_self_similar, only: no_slip_constants, goodman_stick_ratio, goodman_stick_ratio_plane
   use hc_axisymmetric, only: axisymmetric_t, power_law_t, rounded_punch_t, flat_punch_t
+  use hc_adaptive_path, only: adaptive_path_t
+  use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed
+  use hc_step_error, only: step_change_t, compare_halves
+  use hc_discretization_error, only: limits_of_error
+  use hc_zone_estimators, only: boundary, boundary_circle, circle_fit_t, area_radius, edge_radius, pressure_center, &
+                                moment_ellipse, edge_ellipse, ellipse_t
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
+  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   implicit none
   public
 end module hexcontact

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from hexcontact import Case, Result, plotting
-from hexcontact.plotting import influence as plotting_influence
+from hexcontact.plotting.registry import entries
 
 HERE = Path(__file__).parent
 CASES = HERE.parents[1] / "cases"
@@ -37,7 +37,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "fretting_tractions": lambda: plotting.tractions(fretting(), [10, 11, 15, 20, 25, 30, 35, 40]),
     "cattaneo_mindlin": lambda: plotting.tractions(solved("cattaneo_mindlin"), [13, 19, 25, 31, 37]),
     "mindlin_loop": lambda: plotting.loop(solved("mindlin_loop")),
-    **{name.replace("-", "_"): draw for name, draw in plotting_influence.FIGURES.items()},
+    **{name.replace("-", "_"): figure.draw for name, figure in entries().items() if not figure.of_a_result},
 }
 
 

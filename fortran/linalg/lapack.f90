@@ -2,13 +2,13 @@
 module hc_lapack
   use, intrinsic :: iso_fortran_env, only: real32, int64
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_memory, only: require_memory
   implicit none
   private
 
   public :: dgemm, dposv, dsgesv, dgelss, spotrf, spotrs
-  public :: prepare_lapack, eliminate
+  public :: prepare_lapack, eliminate, least_squares
 
   !> Bytes of address space that OpenBLAS takes for a buffer when it is first called, and a reserve.
   integer(int64), parameter :: buffer_space = 160000000
@@ -119,5 +119,32 @@ contains
       b(k, :) = (b(k, :) - matmul(a(k, k + 1:), b(k + 1:, :)))/a(k, k)
     end do
   end subroutine eliminate
+
+  !> Solve A x = b in the sense of least squares.
+  subroutine least_squares(a, b, x, error)
+    !> Matrix (m, n) with m >= n; overwritten
+    real(wp), intent(inout), contiguous :: a(:, :)
+    !> Right-hand side (m)
+    real(wp), intent(in) :: b(:)
+    !> Solution (n) of least norm
+    real(wp), intent(out) :: x(:)
+    !> Allocated if there is no memory, or the singular values are not found
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: singular(size(x)), best_size(1)
+    real(wp), allocatable :: work(:), rhs(:, :)
+    integer :: rank, info
+
+    x = 0.0_wp
+    call prepare_lapack(error)
+    if (allocated(error)) return
+    associate (m => size(a, 1), n => size(a, 2))
+      rhs = reshape(b, [m, 1])
+      call dgelss(m, n, 1, a, m, rhs, m, singular, m*epsilon(1.0_wp), rank, best_size, -1, info)
+      allocate (work(int(best_size(1))))
+      call dgelss(m, n, 1, a, m, rhs, m, singular, m*epsilon(1.0_wp), rank, work, size(work), info)
+      x = rhs(:n, 1)
+    end associate
+    if (info /= 0) call raise(error, status%no_convergence, 'the singular values of a least-squares fit were not found')
+  end subroutine least_squares
 
 end module hc_lapack

@@ -6,10 +6,10 @@ module hc_f2py_friction
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
+    kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
-  use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_solver, only: friction_solver_t
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
@@ -92,13 +92,10 @@ contains
     type(slot_t), pointer :: slot
     type(error_t), allocatable :: error
     type(friction_problem_t) :: problem
-    type(coulomb_t) :: friction
     type(windowed_friction_t), pointer :: fft
     type(direct_friction_t), pointer :: dense
     integer(c_int64_t) :: bytes
 
-    friction%no_slip = coefficient > 0.5_wp*huge(1.0_wp)
-    if (.not. friction%no_slip) friction%coefficient = coefficient
     call take_slot(slot, handle, error)
     if (.not. allocated(error)) call new_lattice(slot%lattice, basis, first, extent, error, origin)
     if (.not. allocated(error)) call check_size(slot, n_node, error)
@@ -111,7 +108,7 @@ contains
     end if
     if (.not. allocated(error)) then
       call new_friction_problem(problem, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
-                                reshape(candidate /= 0, extent), friction, goodman /= 0, error)
+                                reshape(candidate /= 0, extent), friction_of(coefficient), goodman /= 0, error)
     end if
     if (.not. allocated(error)) then
       if (method == direct) then

@@ -13,12 +13,13 @@ module hc_f2py_handles
   use hc_field_space, only: field_space_t, most_threads
   use hc_flexibility, only: flexibility_t
   use hc_elastic_pair, only: elastic_pair_t
+  use hc_coulomb, only: coulomb_t
   use hc_contact_solver, only: contact_solver_t
   use hc_spectrum_cache, only: kernel_cache_t
   implicit none
   private
 
-  public :: slot_t, kernel_cache, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of
+  public :: slot_t, kernel_cache, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of
 
   !> Objects that may exist at a time.
   integer, parameter :: n_slot = 4096
@@ -174,6 +175,14 @@ contains
     real(c_double), intent(in) :: lambda(3)
     pair_of = elastic_pair_t(lambda(1), lambda(2), lambda(3))
   end function pair_of
+
+  !> A law of friction from its coefficient; an infinite or huge one: no slip.
+  pure type(coulomb_t) function friction_of(coefficient) result(friction)
+    real(c_double), intent(in) :: coefficient
+
+    friction%no_slip = coefficient > 0.5_c_double*huge(1.0_c_double)
+    if (.not. friction%no_slip) friction%coefficient = coefficient
+  end function friction_of
 
   !> An error as a code and a message.
   pure subroutine report(error, code, message)

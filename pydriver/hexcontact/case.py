@@ -179,9 +179,9 @@ class Case(Problem):
         DeckError, ConvergenceError, ResourceError
             As `hexcontact.solve.run`, which does it.
         """
-        from .solve import run as solve
+        from .solve.run import run
 
-        return solve.run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
+        return run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
 
     def start(self, output: str | Path | None = None, overwrite: bool = False) -> Session:
         """Begin a run that waits between its load steps, for loads that depend on answers.

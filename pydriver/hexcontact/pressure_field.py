@@ -1,4 +1,4 @@
 """The public name of the pressure between the nodes, of `hexcontact.result.interpolate`."""
 
+from .core.interpolation import linear as linear
 from .result.interpolate import PressureField as PressureField
-from .result.interpolate import linear as linear

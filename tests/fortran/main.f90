@@ -19,9 +19,12 @@ program tester
   use test_friction, only: collect_friction
   use test_fas_predictor, only: collect_fas_predictor
   use test_friction_sweeps, only: collect_friction_sweeps
+  use test_laws, only: collect_laws
   use test_load_path, only: collect_load_path
   use test_direct_friction, only: collect_direct_friction
   use test_analytic, only: collect_analytic
+  use test_edges, only: collect_edges
+  use test_steps, only: collect_steps
   implicit none
 
   type(suite_t), allocatable :: suites(:)
@@ -43,9 +46,12 @@ program tester
     new_suite('friction', collect_friction), &
     new_suite('fas_predictor', collect_fas_predictor), &
     new_suite('friction_sweeps', collect_friction_sweeps), &
+    new_suite('laws', collect_laws), &
     new_suite('load_path', collect_load_path), &
     new_suite('direct_friction', collect_direct_friction), &
-    new_suite('analytic', collect_analytic) &
+    new_suite('analytic', collect_analytic), &
+    new_suite('edges', collect_edges), &
+    new_suite('steps', collect_steps) &
   ]
   call run_suites(suites, n_failed)
   if (n_failed > 0) stop 1, quiet=.true.

@@ -17,13 +17,14 @@ import netCDF4  # noqa: F401 (before the time limit)
 import xarray  # noqa: F401
 from fuzz import file_damage, harness
 
+from hexcontact import plotting
+from hexcontact.cli import plot as cli_plot
 from hexcontact.cli import run as cli_solve
 from hexcontact.cli import show as cli_show
-from hexcontact.cli.plot_choices import OF_A_RESULT
 from hexcontact.errors import HexcontactError
 from hexcontact.result.store import open_result
 
-PICTURES = [name for name in OF_A_RESULT if name != "overview"]
+PICTURES = [name for name in plotting.FIGURES if name != "overview"]
 
 
 def commands(file: Path, folder: Path, rng: random.Random) -> list[tuple[str, Any, dict[str, Any]]]:
@@ -33,7 +34,7 @@ def commands(file: Path, folder: Path, rng: random.Random) -> list[tuple[str, An
     shown = [
         ("export", cli_show.export, {"file": file, **tables, "output": folder / "tables"}),
         ("report", cli_show.report, {"file": file, "output": folder / "page.html"}),
-        (f"plot {what}", cli_show.plot, {"files": [file], "what": what, "output": folder / "picture.svg"}),
+        (f"plot {what}", cli_plot.plot, {"files": [file], "what": what, "output": folder / "picture.svg"}),
     ]
     return [
         ("info", cli_show.info, {"file": file, "as_json": True}),

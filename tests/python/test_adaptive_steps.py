@@ -13,11 +13,11 @@ from hexcontact import Case, ConvergenceError, DeckError
 from hexcontact.cli import tables as summary
 from hexcontact.deck.schema import deck_schema
 from hexcontact.problem import estimates, overview
+from hexcontact.problem.loads import LEAST
 from hexcontact.result import history
 from hexcontact.result.history import describe
 from hexcontact.result.result import Result, Step
 from hexcontact.result.store import Journal, journal_of, open_result
-from hexcontact.solve import adaptive as adaptive_steps
 from hexcontact.solve.progress import Lines
 from hexcontact.solve.restart import resume
 
@@ -398,4 +398,4 @@ def test_editors_know_the_word() -> None:
 
 def test_the_smallest_step_is_that_of_the_documentation() -> None:
     page = (Path(__file__).parents[2] / "docs" / "deck.md").read_text(encoding="utf-8")
-    assert f"{adaptive_steps.LEAST:.1%} of the segment".replace("%", " %") in page
+    assert f"{LEAST:.1%} of the segment".replace("%", " %") in page

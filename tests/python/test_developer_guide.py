@@ -16,6 +16,8 @@ import pytest
 from typer.testing import CliRunner
 
 import hexcontact
+from hexcontact.cli.app import app
+from hexcontact.plotting import registry
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/developer.md").read_text(encoding="utf-8")
@@ -61,9 +63,6 @@ def test_example_of_a_surface_has_its_closed_solution(monkeypatch: pytest.Monkey
 
 
 def test_examples_of_a_figure_and_a_command_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    registry = pytest.importorskip("hexcontact.plotting.registry")
-    from hexcontact.cli.app import app
-
     monkeypatch.setattr(registry, "_ENTRIES", dict(registry._ENTRIES))
     monkeypatch.setattr(app, "registered_commands", list(app.registered_commands))
     executed("Add a figure", "hexcontact.plotting.history")

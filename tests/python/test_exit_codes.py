@@ -45,7 +45,7 @@ ENVIRONMENT = os.environ | {
 
 LATE = """
 import atexit, os, sys, time
-from hexcontact.cli import app as cli, json_output, run_command
+from hexcontact.cli import app as cli, json_output, messages
 from hexcontact.result import store
 
 number, sent = int(sys.argv.pop(1)), []
@@ -62,8 +62,8 @@ def signaled(module, name):
 signaled(store, "write")  # the output is assembled
 signaled(store.Journal, "remove")
 signaled(store.Store, "close")
-signaled(run_command, "overview")
-signaled(run_command.Listeners, "tell")
+signaled(messages, "overview")
+signaled(messages.Messages, "conclude")
 signaled(json_output, "write")
 atexit.register(lambda: (os.kill(os.getpid(), number), sys.stderr.write(" ".join(sent))))
 cli.main()
@@ -98,7 +98,7 @@ def test_a_complete_run_exits_with_0_whatever_comes(
     words = [sys.executable, "-c", LATE, str(int(sent)), command, name, "--plot", "-q", "--json"]
     done = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert done.stderr.split() == ["write", "remove", "close", "close", "overview", "tell", "write"]
+    assert done.stderr.split() == ["write", "remove", "close", "close", "overview", "conclude", "write"]
     assert open_result(out).complete
     assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.nc", "sphere.png", "sphere.toml"]
 

@@ -1,5 +1,6 @@
 """``--json``: standard output is one object, whatever happens, that says what files and messages say."""
 
+import dataclasses
 import json
 import math
 import os
@@ -200,10 +201,9 @@ def test_study_says_how_many_are_done_and_what_failed(folder: Path) -> None:
 
 def test_verify_says_each_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
     def comparison(computed: float) -> verify.Comparison:
-        found = verify.Comparison(notes=["a note"])
-        found.add("sphere", "approach", "um", computed, analytic=2e-6, relative=1e-3)
-        found.add("sphere", "time", "s", 1.0)
-        return found
+        approach = verify.Row("sphere", "approach", "um", computed, analytic=2e-6, judge="analytic")
+        rows = [dataclasses.replace(approach, tolerance=1e-3), verify.Row("sphere", "time", "s", 1.0)]
+        return verify.Comparison(rows, ["a note"])
 
     def checks(computed: float) -> dict[str, verify.Check]:
         return {"it": verify.Check("it", "A check", "", lambda: comparison(computed))}
@@ -293,7 +293,7 @@ def test_a_mistake_of_the_program_is_told_and_shown(folder: Path, monkeypatch: p
     def broken(*arguments: Any) -> Any:
         raise ZeroDivisionError("a mistake")
 
-    monkeypatch.setattr(json_output, "of_case", broken)
+    monkeypatch.setattr(cli_deck, "case_content", broken)
     with pytest.raises(ZeroDivisionError):
         cli_deck.check(deck=Path("deck.toml"), as_json=True)
     result = CliRunner().invoke(app, ["check", "deck.toml", "--json"])

@@ -39,13 +39,13 @@ def failed(case: Case, **changed: Any) -> tuple[ConvergenceError, Any, Any]:
 
 
 def _names() -> list[str]:
-    from hexcontact.deck.series import LOADS
+    from hexcontact.variables import LOADS
 
     return [name for pair in LOADS.values() for name in pair]
 
 
 def compliance(case: Case, lattice: Any) -> float:
-    """d_n of theory, section 7."""
+    """d_n of docs/theory/residuals.md, (R1)."""
     return case.pair.lambda_1 * float(influence.pyramid_kernels(0.0, 0.0).K1) * lattice.spacing
 
 

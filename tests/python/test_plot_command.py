@@ -10,13 +10,16 @@ import drawn
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from hexcontact import Case, open_result, plotting
-from hexcontact.cli import plot_choices, plot_command
+from hexcontact.cli import options
+from hexcontact.cli import plot as plot_command
 from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
-from hexcontact.plotting import influence as plotting_influence
+from hexcontact.plotting import registry
+from hexcontact.plotting.registry import entries
 
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 
@@ -192,12 +195,36 @@ def test_all_draws_what_there_is(folder: Path, tmp_path: Path) -> None:
 
 
 def test_help_has_a_line_for_each_choice() -> None:
-    assert list(plot_choices.OF_A_RESULT) == list(plotting.FIGURES)
-    assert list(plot_choices.OF_NO_RESULT) == list(plotting_influence.FIGURES)
     done = CliRunner().invoke(app, ["plot", "--help"], env={"COLUMNS": "80", "TERM": "dumb"})
     lines = [line.strip() for line in done.stdout.splitlines()]
-    for name, words in (plot_choices.OF_A_RESULT | plot_choices.OF_NO_RESULT).items():
-        assert any(re.fullmatch(rf"{name} +{re.escape(words)}", line) for line in lines), name
+    assert len(entries()) > len(plotting.FIGURES) > 10
+    for name, entry in entries().items():
+        assert any(re.fullmatch(rf"{name} +{re.escape(entry.help)}", line) for line in lines), name
+    assert lines.index("Without FILE:") < next(
+        k for k, line in enumerate(lines) if line.startswith("pyramid")
+    )
+    overall = CliRunner().invoke(app, ["--help"]).stdout
+    assert "Draw a result, or what" in overall and "Choices" not in overall
+
+
+def test_a_figure_is_a_decorated_function(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "_ENTRIES", dict(entries()))
+
+    @registry.figure("steps", "how many load steps there are")
+    def steps(result: Any) -> Figure:
+        assert matplotlib.rcParams["legend.frameon"] is False  # the style of all figures
+        figure = Figure()
+        figure.suptitle(f"{len(result)} load steps")
+        return figure
+
+    picture = tmp_path / "steps.png"
+    assert plot(folder / "sheared.nc", "--what", "steps", "-o", picture)[0] == 0
+    np.testing.assert_array_equal(drawn.pixels(picture), drawn.pixels(steps([1] * 5)))
+    assert "how many load steps there are" in plot("--help")[1]
+    assert "expected the FILE of a result" in plot("--what", "steps")[2]
+    assert "--angle: not an option" in plot(folder / "sheared.nc", "-w", "steps", "--angle", "3")[2]
 
 
 def test_every_option_belongs_to_some_picture() -> None:
@@ -206,7 +233,7 @@ def test_every_option_belongs_to_some_picture() -> None:
 
 
 def test_options_are_read() -> None:
-    assert plot_command.steps_of("3, 4,-1") == [3, 4, -1]
+    assert options.steps_of("3, 4,-1") == [3, 4, -1]
     assert plot_command.angle_of("30") == pytest.approx(np.pi / 6)
     assert plot_command.angle_of("0.5 rad") == 0.5
     assert plot_command.point_of("10 um, -1e-3") == pytest.approx((1e-5, -1e-3))

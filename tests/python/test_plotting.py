@@ -12,10 +12,11 @@ import xarray
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
-from hexcontact import analytic, plotting
+from hexcontact import Result, analytic, plotting
 from hexcontact.analytic import EllipticContact
 from hexcontact.core import estimators
 from hexcontact.plotting import maps as plotting_maps
+from hexcontact.plotting.registry import entries
 from hexcontact.result.view import StepView, scaled, worded
 
 HEIGHT = np.sqrt(0.75)
@@ -170,7 +171,7 @@ RESULTS = {
     "cone": cone,
     "fine": lambda: sphere(half=90, spacing=0.012),
 }
-FRICTIONLESS = ("overview", "pressure", "section", "boundary", "history")  # the others need friction
+FRICTIONLESS = [name for name, entry in entries().items() if entry.of_a_result and not entry.needs]
 results = pytest.mark.parametrize("make", RESULTS)
 
 
@@ -311,7 +312,7 @@ def test_history_shows_each_quantity_over_the_steps() -> None:
 
 def test_field_is_drawn_on_equilateral_triangles_where_there_is_pressure() -> None:
     view = StepView.of(sphere(), -1)
-    found = plotting_maps.triangles(view, view.pressure)
+    found = plotting_maps.mesh_of(view, view.pressure, view.contact)
     assert found is not None
     mesh, values = found
     corners = np.stack([mesh.x, mesh.y], axis=1)[mesh.triangles]
@@ -325,7 +326,7 @@ def test_field_is_drawn_on_equilateral_triangles_where_there_is_pressure() -> No
 
 def test_a_huge_field_is_thinned_out() -> None:
     view = StepView.of(sphere(half=330, spacing=0.0035), -1)
-    found = plotting_maps.triangles(view, view.pressure)
+    found = plotting_maps.mesh_of(view, view.pressure, view.contact)
     assert found is not None
     mesh, values = found
     assert (
@@ -339,6 +340,21 @@ def test_section_of_a_step_before_the_last(center: tuple[float, float]) -> None:
     result = sphere(center, loads=(0.2, 0.8, 1.1))
     hertz = analytic.hertz_ellipse(2.0, np.eye(2) / 1.5, normal_load=0.8)
     is_section(*plotting.section(result, 2).axes, StepView.of(result, 2), hertz)
+
+
+@pytest.mark.parametrize(("degrees", "through"), [(0.0, None), (17.0, None), (90.0, (0.13, -0.2))])
+def test_a_figure_draws_the_section_of_the_result(
+    degrees: float, through: tuple[float, float] | None
+) -> None:
+    result, angle = Result(cylinders()), np.radians(degrees)
+    line = result.section("pressure", angle=angle, through=through)
+    axes = plotting.section(result, angle=angle, through=through).axes[-1]
+    zero = {0.0: float(line.x[0] - line.distance[0]), 90.0: float(line.y[0] - line.distance[0])}
+    ends = np.array([line.distance[0], line.distance[-1]]) + zero.get(degrees, 0.0)
+    low, high = np.asarray(axes.get_xlim()) * drawn.units(axes.get_xlabel())
+    assert_allclose((low + 0.02 * np.ptp(ends), high - 0.02 * np.ptp(ends)), ends, rtol=0, atol=1e-9)
+    s, p = drawn.si(axes.figure.axes[0], axes.figure.axes[0].lines[0], axes.get_xlabel())
+    assert_allclose(p, np.interp(s - zero.get(degrees, 0.0), line.distance, line.pressure), atol=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [17.0, 30.0])

@@ -27,10 +27,11 @@ from hexcontact.analytic import shear as closed_forms
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
 from hexcontact.analytic.shear import ClosedForms
 from hexcontact.core.lattice import Lattice
-from hexcontact.plotting import zone_maps
-from hexcontact.plotting.compliance_curve import initial_compliance
-from hexcontact.plotting.histories import panels_of
+from hexcontact.plotting.compliance import initial_compliance
+from hexcontact.plotting.history import panels_of
+from hexcontact.plotting.registry import entries
 from hexcontact.plotting.style import SLIP, STICK
+from hexcontact.plotting.zones import cell_outline
 from hexcontact.result.result import Metadata, Step, assemble
 from hexcontact.result.view import StepView
 
@@ -416,7 +417,7 @@ def test_tractions_along_an_oblique_line_through_a_point() -> None:
     x, y = through[0] + s * np.cos(angle), through[1] + s * np.sin(angle)
     expected = (0.1 + 0.05 * x) * np.cos(angle) - 0.02 * y * np.sin(angle)
     np.testing.assert_allclose(q_along, expected, atol=1e-9)  # the field is linear, and so is what is drawn
-    assert lower.get_xlabel() == "distance from (100, -200) mm along 20° (mm)"
+    assert lower.get_xlabel() == "distance from (100, -200) mm along 20° (m)"
 
 
 def test_a_family_of_tractions() -> None:
@@ -489,7 +490,7 @@ BASIS = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
 @settings(max_examples=60, deadline=None)
 @given(arrays.arrays(bool, arrays.array_shapes(min_dims=2, max_dims=2, max_side=9)))
 def test_outline_encloses_the_cells_of_the_zone(zone: np.ndarray) -> None:
-    polygons = zone_maps.cell_outline(zone, BASIS, (3.0, -2.0))
+    polygons = cell_outline(zone, BASIS, (3.0, -2.0))
     assert area(polygons) == pytest.approx(zone.sum() * np.sqrt(0.75), abs=1e-9)
     for polygon in polygons:
         assert polygon[0] == pytest.approx(polygon[-1])
@@ -678,8 +679,14 @@ def test_map_of_the_slip() -> None:
 # ----------------------------------------------------------------------------------- history and loops
 
 
+def panels(result: xarray.Dataset) -> list[tuple[str, ...]]:
+    scalars = result[[name for name in result.data_vars if result[name].dims == ("step",)]]
+    histories = scalars.to_dataframe().to_dict("records")
+    return [tuple(curves) for curves in panels_of(histories).values()]
+
+
 def test_history_leaves_out_what_stays_zero() -> None:
-    assert panels_of(cattaneo()) == [
+    assert panels(cattaneo()) == [
         ("normal_load",),
         ("tangential_load_x",),
         ("approach",),
@@ -687,16 +694,15 @@ def test_history_leaves_out_what_stays_zero() -> None:
         ("contact_area", "stick_area"),
         ("max_pressure",),
         ("max_traction",),
-        ("dissipated_energy",),
     ]
-    assert ("torque",) in panels_of(torsion())
-    assert ("tangential_load_x",) not in panels_of(torsion())
+    assert ("torque",) in panels(torsion())
+    assert ("tangential_load_x",) not in panels(torsion())
 
 
 def test_every_panel_of_a_history_shows_its_quantities() -> None:
     result = cattaneo()
-    panels = drawn.visible(plotting.history(result))
-    for axes, names in zip(panels, panels_of(result), strict=True):
+    shown = drawn.visible(plotting.history(result))
+    for axes, names in zip(shown, panels(result), strict=True):
         lines = by_label(axes)
         assert set(lines) == set(names)
         for name in names:
@@ -847,8 +853,9 @@ def test_overview_shows_maps_zones_section_and_history() -> None:
 
 
 SUITABLE = {
-    **dict.fromkeys(plotting.FIGURES, dissimilar),
-    "torsion": torsion,
+    name: torsion if entry.needs == "torque" else dissimilar
+    for name, entry in entries().items()
+    if entry.of_a_result
 }
 
 
@@ -871,6 +878,7 @@ NEEDS_FRICTION = {
     "tractions": "a contact without friction has no traction",
     "traction": "a contact without friction has no traction",
     "traction_x": "a contact without friction has no traction x",
+    "traction_y": "a contact without friction has no traction y",
     "slip_increment": "a contact without friction has no slip increment",
     "accumulated_slip": "a contact without friction has no accumulated slip",
     "zones": "a contact without friction has no stick and slip zones",
@@ -881,7 +889,7 @@ NEEDS_FRICTION = {
 }
 
 
-@pytest.mark.parametrize("name", NEEDS_FRICTION)
+@pytest.mark.parametrize("name", [name for name, entry in entries().items() if entry.needs])
 def test_what_needs_friction_says_so(name: str) -> None:
     without = frictionless()
     if name == "accumulated_slip":

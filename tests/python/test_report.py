@@ -25,10 +25,10 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, analytic, open_result
 from hexcontact.cli.app import app
-from hexcontact.plotting.report import report, write_report
-from hexcontact.plotting.report_fields import MOST_STEPS, Plane, kept_steps
+from hexcontact.cli.report import report, write_report
+from hexcontact.plotting.report_data import MOST_STEPS, Plane, kept_steps
 from hexcontact.result.result import Result, Step
-from hexcontact.result.view import StepView
+from hexcontact.result.view import StepView, worded
 from hexcontact.text import quantity
 
 DECK = """\
@@ -144,9 +144,9 @@ def test_page_is_whole_and_fetches_nothing(folder: Path, name: str) -> None:
 def test_text_of_the_deck_is_text(folder: Path) -> None:
     page = (folder / "sheared.html").read_text(encoding="utf-8")
     assert page.count("<script") == 2 and page.count("</script>") == 2
-    assert "<title>Sheared &lt;script&gt;alert(&#x27;1 &amp; 2&#x27;)&lt;/script&gt; {{data}}</title>" in page
+    assert "<title>Sheared &lt;script&gt;alert(&#39;1 &amp; 2&#39;)&lt;/script&gt; {{data}}</title>" in page
     assert data_of(page)["labels"][-1] == "shear </script>"
-    assert "tangential_load_x = &quot;30 N&quot;" in page
+    assert "tangential_load_x = &#34;30 N&#34;" in page
 
 
 def test_page_says_where_it_comes_from(folder: Path) -> None:
@@ -207,7 +207,12 @@ def test_inputs_loads_and_residuals_are_in_tables(folder: Path) -> None:
 def test_maps_are_the_fields(folder: Path) -> None:
     result = open_result(folder / "sheared.nc")
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
-    assert [m["name"] for m in fields["maps"]] == ["pressure", "traction", "slip", "accumulated_slip"]
+    assert [m["name"] for m in fields["maps"]] == [
+        "pressure",
+        "traction",
+        "slip_increment",
+        "accumulated_slip",
+    ]
     assert fields["length"] == "µm"
     assert fields["steps"] == [1, 2, 3, 4, 5, 6]
     assert [m["unit"] for m in fields["maps"]] == ["MPa", "MPa", "nm", "nm"]
@@ -264,7 +269,10 @@ def test_arrows_point_along_the_traction_where_there_is_slip(folder: Path) -> No
     fields = data_of((folder / "sheared.html").read_text(encoding="utf-8"))["fields"]
     view = StepView.of(open_result(folder / "sheared.nc"), -1)
     x_min, x_max, y_min, y_max = (1e-6 * v for v in fields["limits"])
-    for name, many, sign in (("traction", 50, 1), ("slip", 20, -1)):  # the load on body 1 is along +x
+    for name, many, sign in (
+        ("traction", 50, 1),
+        ("slip_increment", 20, -1),
+    ):  # the load on body 1 is along +x
         (shown,) = [m for m in fields["maps"] if m["name"] == name]
         x, y, u, v = np.reshape(shown["arrows"][-1], (-1, 4)).T
         assert len(x) > many and x.min() > 0 and x.max() < 1000 and y.min() > 0 and y.max() < 1000
@@ -292,8 +300,10 @@ def test_sections_hold_pressure_and_bounds(folder: Path) -> None:
     assert list(pressure["curves"]) == ["p"] and list(shear["curves"]) == ["q_x", "μp"]
     assert (pressure["unit"], shear["unit"]) == ("MPa", "MPa")
     x = 1e-6 * np.array(fields["sections"]["x"])
-    assert (len(x), x[0], x[-1]) == (201, *(pytest.approx(1e-6 * v, rel=5e-5) for v in fields["limits"][:2]))
-    middle = 0.5e-6 * sum(fields["limits"][2:])
+    line = result.section("pressure", points=201)
+    np.testing.assert_allclose(x, line.x, rtol=5e-5, atol=1e-12)
+    middle = float(line.y[0])
+    assert fields["section_y"] == worded(middle, "m")
     for panel, name, field, factor in (
         (pressure, "p", "pressure", 1.0),
         (shear, "q_x", "traction_x", 1.0),
@@ -323,8 +333,8 @@ def test_curves_are_the_history(folder: Path) -> None:
     history = open_result(folder / "sheared.nc").history
     expected = {
         "Normal load": {"": "normal_load"},
-        "Approach": {"": "approach"},
         "Tangential load": {"Q_x": "tangential_load_x"},
+        "Approach": {"": "approach"},
         "Shift": {"x": "shift_x"},
         "Contact and stick area": {"contact": "contact_area_fit", "stick": "stick_area_fit"},
         "Largest pressure": {"": "max_pressure"},

@@ -14,6 +14,7 @@ from numpy.testing import assert_array_equal
 import hexcontact
 from hexcontact import Case, ConvergenceError, DeckError, Result, Step, StopRun, open_result
 from hexcontact.deck.surfaces import Sphere
+from hexcontact.deck.tables import Load
 from hexcontact.result.store import journal_of
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -290,6 +291,20 @@ def test_a_step_that_fails_leaves_the_session_where_it_was() -> None:
     other.advance(tangential_load_x=14.0)
     other.advance(tangential_load_x=15.0)
     assert_array_equal(other.step.traction_x, last.traction_x)
+
+
+def test_a_load_is_checked_and_unrolled_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    checked: list[Any] = []
+    validate = Load.model_validate
+    monkeypatch.setattr(Load, "model_validate", lambda data: checked.append(data) or validate(data))
+    session = fretting().start()
+    for count, load in enumerate((10.0, 11.0, 12.0, 13.0), start=1):
+        session.advance(normal_load=load)
+        assert len(checked) == count
+    with pytest.raises(DeckError, match="tangential_load_x: gross sliding|tangential_load_x = 1000.0: gross"):
+        session.advance(tangential_load_x=1000.0)
+    assert session.advance(normal_load=14.0).segment == 5
+    assert [step.normal_load for step in session.steps] == pytest.approx([10.0, 11.0, 12.0, 13.0, 14.0])
 
 
 def test_steps_may_be_taken_back() -> None:

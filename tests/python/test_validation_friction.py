@@ -18,10 +18,9 @@ from validation import (
     tangential,
     unloading,
 )
-from validation.reference import reference
+from validation.reference import Comparison, reference
 
 from hexcontact.analytic.friction import PlaneCattaneo, goodman_stick_ratio_plane
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Sphere
 
 

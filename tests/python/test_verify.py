@@ -8,12 +8,12 @@ from importlib import resources
 import pytest
 from validation import checks, normal, runs
 from validation import reference as table_of_references
-from validation.reference import TABLE, reference
+from validation.reference import TABLE, Comparison, reference
 from validation.run import markdown
 
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.cli import verify
-from hexcontact.cli.verify import Check, Comparison
+from hexcontact.cli.verify import Check
 from hexcontact.core.contact import ElasticPair
 from hexcontact.errors import DeckError
 

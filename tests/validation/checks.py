@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hexcontact.cli.verify import Check, Comparison
+from hexcontact.cli.verify import Check
 
-from .reference import reference
+from .reference import Comparison, reference
 
 
 def kernels() -> Comparison:

@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 
 from hexcontact import analytic
-from hexcontact.cli.verify import Comparison
 from hexcontact.core import estimators
 from hexcontact.deck.surfaces import Cylinder
 
 from .normal import ellipse_error
-from .reference import reference
+from .reference import Comparison, reference
 from .runs import DIGITS, Run, State, press, run
 
 STEEL = {"young_modulus": 200e9, "poisson_ratio": 0.30}

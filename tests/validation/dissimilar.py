@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hexcontact.analytic import friction as closed
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Sphere
 
-from .reference import reference
+from .reference import Comparison, reference
 from .runs import (
     ALUMINUM,
     BALL,

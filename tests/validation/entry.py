@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hexcontact.analytic import friction as closed
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Sphere
 
 from .dissimilar import LOAD
-from .reference import reference
+from .reference import Comparison, reference
 from .runs import (
     ALUMINUM,
     BALL,

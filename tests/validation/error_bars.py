@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from hexcontact import analytic
 from hexcontact.analytic.friction import MindlinContact
 from hexcontact.case import Case
-from hexcontact.cli.verify import Comparison
 from hexcontact.core.contact import ElasticPair
 from hexcontact.deck.surfaces import Cylinder, Sphere
 from hexcontact.solve.events import Listener
 from hexcontact.solve.lattices import InMemory, refine
 
+from .reference import Comparison
 from .runs import shear_compliance
 
 Array = NDArray[np.float64]

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hexcontact.analytic.friction import MindlinContact
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Sphere
 
-from .reference import reference
+from .reference import Comparison, reference
 from .runs import (
     ALUMINUM,
     BALL,

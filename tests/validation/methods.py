@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Sphere
 
+from .reference import Comparison
 from .runs import ALUMINUM, BALL, STIFF, bodies, dissimilar_pair, hertz_of, press, run
 
 ROUGH = hertz_of(dissimilar_pair(), 31.5).contact_radius / 8  # spacing: a few hundred nodes in contact

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 from hexcontact.analytic import friction as closed
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Punch, Sphere
 
-from .reference import reference
+from .reference import Comparison, reference
 from .runs import DIGITS, bodies, hertz_of, press, run
 
 NO_SLIP = math.inf

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from hexcontact import analytic
 from hexcontact.case import Case
-from hexcontact.cli.verify import Comparison
 from hexcontact.core import estimators
 from hexcontact.deck.surfaces import Cone, Cylinder, Paraboloid, Power, Punch, RoundedPunch, Sphere, Surface
 
-from .reference import reference
+from .reference import Comparison, reference
 
 Array = NDArray[np.float64]
 

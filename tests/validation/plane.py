@@ -9,9 +9,9 @@ import numpy as np
 
 from hexcontact import analytic
 from hexcontact.analytic.friction import PlaneCattaneo, goodman_stick_ratio_plane
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Paraboloid
 
+from .reference import Comparison
 from .runs import Array, Mask, State, bodies, press, run
 
 # A barrel along x, so that the contact is 18 times as long as it is wide.

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from hexcontact.analytic.friction import LubkinTorsion, MindlinContact
-from hexcontact.cli.verify import Comparison
 from hexcontact.core.contact import ElasticPair
 from hexcontact.deck.surfaces import Sphere
 
-from .reference import reference
+from .reference import Comparison, reference
 from .runs import DIGITS, Run, State, bodies, each, hertz_of, run, shear_compliance, twist_compliance
 
 # ------------------------------------------------------------------------- Cattaneo-Mindlin, Figure 13.2

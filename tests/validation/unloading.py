@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hexcontact.cli.verify import Comparison
 from hexcontact.deck.surfaces import Sphere
 
-from .reference import reference
+from .reference import Comparison, reference
 from .runs import DIGITS, bodies, hertz_of, press, run
 
 LOAD = 4.0 / 3.0  # E* = 1, R = 1: a_Hertz = 1

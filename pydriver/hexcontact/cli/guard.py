@@ -1,4 +1,4 @@
-"""What the command line says and returns in the end, above all when something goes wrong."""
+"""The frame of every command: registration, messages, exit codes, standard streams."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 
 from ..errors import LACKING, DeckError, HexcontactError, KernelFolderWarning, PathWarning, ResourceError
 from ..text import visible
+from . import json_output
 
 if TYPE_CHECKING:
     from ..errors import Fault
@@ -25,7 +26,7 @@ P = ParamSpec("P")
 # of the system, of threads and of the netCDF library
 _NO_MEMORY = ("failed to map segment", "can't start new thread", "Memory allocation (malloc) failure")
 Content = Mapping[str, Any] | None
-"""What a command has to say to a program; None if it was not asked by ``--json``."""
+"""The object that a command prints with ``--json``; None without it."""
 
 
 class Failure(HexcontactError):
@@ -36,20 +37,24 @@ class Failure(HexcontactError):
         self.exit_code = exit_code
 
 
-class _Told(NamedTuple):
-    """What is said of an error."""
+class _Answer(NamedTuple):
+    """The message of an error, and what programs learn about it."""
 
     message: str
     exit_code: int
     faults: Sequence[Fault] = ()
     details: Mapping[str, Any] | None = None
 
+    def print_json(self, name: str) -> None:
+        """Print the object of a command that failed."""
+        json_output.write(name, json_output.error(*self))
+
 
 def guarded(command: Callable[P, Content]) -> Callable[P, None]:
     """Turn what goes wrong into a sentence and an exit code; HEXCONTACT_DEBUG=1 shows tracebacks instead.
 
-    With ``--json`` the command returns what it has to say instead of printing it, and an object is printed
-    whatever happens.
+    With ``--json`` the command returns its content instead of printing it, and an object is printed whatever
+    happens.
     """
 
     @functools.wraps(command)
@@ -58,44 +63,44 @@ def guarded(command: Callable[P, Content]) -> Callable[P, None]:
         try:
             content = command(*args, **kwargs)
             if name:
-                _print_json(name, content or {})
+                json_output.write(name, content or {})
         except typer.Exit:
             raise
         except (Exception, KeyboardInterrupt) as error:
-            told = None if os.environ.get("HEXCONTACT_DEBUG") else _told(error)
-            if told is None:
-                if name:
-                    _print_error(name, _Told(f"{type(error).__name__}: {error}", HexcontactError.exit_code))
-                raise
-            complain(told.message)
+            answer = None if os.environ.get("HEXCONTACT_DEBUG") else _answer_to(error)
+            if answer is not None:
+                complain(answer.message)
             if name:
-                _print_error(name, told)
-            raise typer.Exit(told.exit_code) from None
+                unforeseen = _Answer(f"{type(error).__name__}: {error}", HexcontactError.exit_code)
+                (answer or unforeseen).print_json(name)
+            if answer is None:
+                raise
+            raise typer.Exit(answer.exit_code) from None
         if content and content.get("exit_code"):
             raise typer.Exit(content["exit_code"])
 
     return wrapped
 
 
-def _told(error: BaseException) -> _Told | None:
-    """Return what is said of an error; None of one that nobody foresaw."""
+def _answer_to(error: BaseException) -> _Answer | None:
+    """Return the answer to an error; None if it is a mistake of the program."""
     if isinstance(error, KeyboardInterrupt):
-        return _Told("interrupted", 130)
+        return _Answer("interrupted", 130)
     if isinstance(error, HexcontactError):
         message = "\n".join([str(error), *getattr(error, "__notes__", ())])
-        return _Told(message, error.exit_code, getattr(error, "faults", ()), getattr(error, "details", None))
-    if isinstance(error, UnicodeEncodeError):
-        return _Told(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
+        return _Answer(
+            message, error.exit_code, getattr(error, "faults", ()), getattr(error, "details", None)
+        )
+    if isinstance(error, UnicodeEncodeError):  # bytes of a name or an argument that are no text
+        return _Answer(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
-        return _Told("the machine has not enough memory for this", ResourceError.exit_code)
+        return _Answer("the machine has not enough memory for this", ResourceError.exit_code)
     if isinstance(error, OSError) and error.strerror:
         named = f"{error.filename}: " if error.filename else ""
         kind = ResourceError if error.errno in LACKING else DeckError
-        return _Told(named + error.strerror, kind.exit_code)
-    if isinstance(error, UnicodeEncodeError):  # bytes of a name or an argument that are no text
-        return _Told(f"{error.object}: expected text in UTF-8", DeckError.exit_code)
+        return _Answer(named + error.strerror, kind.exit_code)
     if isinstance(error, RuntimeError | OSError) and "NetCDF" in str(error):
-        return _Told(f"the result file is damaged ({error})", DeckError.exit_code)
+        return _Answer(f"the result file is damaged ({error})", DeckError.exit_code)
     return None
 
 
@@ -177,20 +182,11 @@ def warn_plainly() -> None:
     warnings.showwarning = show
 
 
-def _print_json(name: str, content: Mapping[str, Any]) -> None:
-    from . import json_output
-
-    json_output.write(name, content)
-
-
-def _print_error(name: str, told: _Told) -> None:
-    from . import json_output
-
-    json_output.write(name, json_output.error(*told))
+# --- the command and its sub-commands -----------------------------------------------------------------------
 
 
 class Commands(TyperGroup):
-    """The sub-commands; wrong options and arguments are told to programs, too."""
+    """The sub-commands; programs learn of wrong options and arguments, too."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
         """Run the command that the arguments name."""
@@ -201,5 +197,31 @@ class Commands(TyperGroup):
             usage = getattr(ending.__context__, "format_message", None)  # what typer has shown before
             if "--json" in given and usage is not None:
                 name = next((word for word in given if word in self.commands), "")
-                _print_error(name, _Told(usage(), DeckError.exit_code))
+                _Answer(usage(), DeckError.exit_code).print_json(name)
             raise
+
+
+app = typer.Typer(
+    name="hexcontact",
+    cls=Commands,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Callable[P, None]]:
+    """Register a function as the sub-command of its name, guarded, with its options as arguments.
+
+    Parameters
+    ----------
+    example : str
+        A line that the help shows as an example.
+    **options
+        What `typer.Typer.command` takes besides.
+    """
+
+    def register(function: Callable[P, Content]) -> Callable[P, None]:
+        return app.command(epilog=f"Example: {example}", **options)(guarded(function))
+
+    return register

@@ -1,15 +1,21 @@
-"""Arguments and options that several commands have."""
+"""Arguments and options that several commands have, and what they stand for."""
 
 from __future__ import annotations
 
 import enum
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import DeckError
+
+if TYPE_CHECKING:
+    from ..case import Case
+    from ..problem.problem import Problem
+
+_PICTURES = (".png", ".pdf", ".svg")
 
 DeckFile = Annotated[Path, typer.Argument(metavar="DECK", help="The deck, a TOML file.", show_default=False)]
 ResultFile = Annotated[
@@ -56,3 +62,30 @@ def setting(text: str) -> tuple[str, Any]:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return key.strip(), value.strip()
+
+
+def steps_of(text: str) -> list[int]:
+    """Read numbers of load steps: "20" or "10,20,30"."""
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise DeckError(f"--step {text}: expected a number of a load step, or several as 10,20,30") from None
+
+
+def case_of(deck: Path, settings: list[str] | None) -> Case:
+    """Read a deck with the keys that ``--set`` replaces."""
+    from ..case import Case
+
+    return Case.from_toml(deck, overrides=dict(map(setting, settings or ())))
+
+
+def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:
+    """Return the file that a run writes: from the option, else from the deck, else from the deck's name."""
+    target = output or Path(case.output.file or f"{deck.stem}.nc")
+    if target.suffix in _PICTURES:
+        raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
+    if not target.parent.is_dir():
+        there = target.parent.exists()
+        fault = f"{target.parent} is not a folder" if there else f"the folder {target.parent} does not exist"
+        raise DeckError(f"cannot write {target}: {fault}")
+    return target

@@ -1,4 +1,4 @@
-"""Tables for the terminal: what is going to be run, what came out, and how it compares with Hertz."""
+"""What came out of a run or stands in a file, beside Hertz: as tables for the terminal, and for programs."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import functools
 import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..errors import HexcontactError
@@ -14,7 +15,9 @@ from ..result.history import (
     fitted,
     is_frictional,
     load_or_motion,
+    remarks,
     residuals,
+    step_rows,
     stick_share,
     worth_showing,
 )
@@ -25,7 +28,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from ..case import Case
     from ..problem.problem import Problem
     from ..result.result import Result
 
@@ -48,7 +50,136 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
     return rich_table(title, ("", ""), rows)
 
 
-# --- after the run --------------------------------------------------------------------------------
+# --- the load steps of a run or a file ------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The load steps of a run or a file, to be shown as tables or handed to programs.
+
+    Attributes
+    ----------
+    title : str
+        Title of the case.
+    histories : sequence of mapping
+        History of each load step.
+    parameters : mapping
+        How they were solved: parameters of the case, or attributes of the result.
+    case : Problem or None
+        The case, if it is known; without it there is nothing about Hertz.
+    result : Result or None
+        The result, if it was read from a file.
+    """
+
+    title: str
+    histories: Sequence[History]
+    parameters: Mapping[str, Any]
+    case: Problem | None
+    result: Result | None = None
+
+    @classmethod
+    def of_run(cls, case: Problem, histories: Sequence[History], refined: Result | None) -> Summary:
+        """Summarize a run; of a refined lattice the finest one, with errors, is in its file."""
+        from ..problem.overview import parameters_of
+
+        found = histories_of(refined) if refined is not None else histories
+        return cls(case.title, found, parameters_of(case), case, refined)
+
+    @classmethod
+    def of_result(cls, result: Result) -> Summary:
+        """Summarize a file."""
+        return cls(
+            result.case_title, histories_of(result), result.dataset.attrs, case_of(result.deck), result
+        )
+
+    @property
+    def remarks(self) -> list[str]:
+        """Sentences about steps that need one."""
+        return remarks(self.histories, self.parameters)
+
+    @property
+    def hertz(self) -> list[tuple[str, float, float, str]]:
+        """The last step beside Hertz, see `against_hertz`."""
+        return against_hertz(self.case, self.histories[-1]) if self.case is not None else []
+
+    def print(self, whole_file: bool = False) -> None:
+        """Print the history, the last step, how it compares with Hertz, lattices and errors.
+
+        Parameters
+        ----------
+        whole_file : bool
+            Also where the result comes from.
+        """
+        shown, last, named = console(), self.histories[-1], ""
+        if whole_file and self.result is not None:
+            shown.print(pairs(self.title, file_rows(self.result)))
+        elif self.title:
+            named = f" of {self.title!r}"
+        if whole_file or len(self.histories) > 1:
+            shown.print(history_table(self.histories, shown))
+        shown.print(pairs(f"Last load step{named}", step_rows(last)))
+        if rows := hertz_rows(self.hertz, last):
+            shown.print(rich_table("Against Hertz", HERTZ_HEADERS, rows))
+        if self.result is not None and (rows := trial_rows(self.result)):
+            shown.print(rich_table("Accuracy", TRIAL_HEADERS, rows))
+        for remark in self.remarks:
+            shown.print(f"note: {remark}", soft_wrap=True)
+
+    def steps(self) -> list[dict[str, Any]]:
+        """Return the histories for programs, each with its number."""
+        return [{"step": number, **history} for number, history in enumerate(self.histories, start=1)]
+
+    def as_run(self) -> dict[str, Any]:
+        """Return for programs what came out of a run that is complete."""
+        worst = [residual for history in self.histories for residual in residuals(history).values()]
+        return {
+            "title": self.title,
+            "complete": True,
+            "load_steps": len(self.histories),
+            "seconds": math.fsum(history["seconds"] for history in self.histories),
+            "operator_applications": math.fsum(h["operator_applications"] for h in self.histories),
+            "largest_residual": max(worst, default=math.nan),
+            "hertz": {name: {"exact": exact, "computed": value} for name, exact, value, _ in self.hertz},
+            "steps": self.steps(),
+        }
+
+
+def file_content(result: Result) -> dict[str, Any]:
+    """Return for programs what a result holds: its attributes, size and fields, and its history."""
+    summary, sizes = Summary.of_result(result), result.dataset.sizes
+    return {
+        "file": result.path,
+        **result.dataset.attrs,
+        "complete": result.complete,
+        "rows": sizes["row"],
+        "columns": sizes["col"],
+        "fields": fields_of(result),
+        "warnings": summary.remarks,
+        "steps": summary.steps(),
+    }
+
+
+def histories_of(result: Result) -> list[dict[str, Any]]:
+    """Return the histories of the load steps of a result."""
+    return [{str(name): value for name, value in row.items()} for row in result.history.to_dict("records")]
+
+
+def fields_of(result: Result) -> list[str]:
+    """Return the names of the fields that a result holds at each step."""
+    return [str(name) for name, values in result.dataset.data_vars.items() if values.ndim == 3]
+
+
+def case_of(deck: str) -> Problem | None:
+    """Return the case of a deck that stands in a result, if it tells all of it."""
+    from ..problem.problem import Problem
+
+    try:
+        return Problem.from_text(deck) if deck else None
+    except HexcontactError:  # a deck with parts that were made in Python
+        return None
+
+
+# --- the history ----------------------------------------------------------------------------------
 
 
 def history_table(histories: Sequence[History], console: Console) -> Table:
@@ -59,8 +190,8 @@ def history_table(histories: Sequence[History], console: Console) -> Table:
     """
     stride = max(1, math.ceil(len(histories) / _MOST_ROWS))
     chosen = [k for k in range(len(histories)) if (len(histories) - 1 - k) % stride == 0]
-    for told in (_and_error, _alone):
-        columns = _columns(histories, told)
+    for with_errors in (True, False):
+        columns = _columns(histories, with_errors)
         for spare in ("", "time", "label", "residual"):
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
@@ -70,22 +201,11 @@ def history_table(histories: Sequence[History], console: Console) -> Table:
     return shown
 
 
-_Told = Callable[[str, str, History], str]
-
-
-def _alone(text: str, name: str, history: History) -> str:
-    return text
-
-
-def _and_error(text: str, name: str, history: History) -> str:
-    return text + error_of(name, history)
-
-
-def _columns(histories: Sequence[History], told: _Told) -> dict[str, Callable[[History], str]]:
-    """Return what a table of load steps shows, by its header."""
+def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Callable[[History], str]]:
+    """Return the columns of a table of load steps by their header, with estimated errors if there is room."""
 
     def column(entry: Callable[[History], str], name: str) -> Callable[[History], str]:
-        return lambda history: told(entry(history), name, history)
+        return lambda history: entry(history) + (error_of(name, history) if with_errors else "")
 
     columns: dict[str, Callable[[History], str]] = {"label": lambda h: str(h.get("label", ""))}
     for name in worth_showing(histories):
@@ -148,14 +268,14 @@ def against_hertz(case: Problem, history: History) -> list[tuple[str, float, flo
     ]
 
 
-def hertz_rows(case: Problem, history: History) -> list[Row]:
-    """Return the rows of `against_hertz`: quantity, Hertz, computed, difference."""
+def hertz_rows(compared: Sequence[tuple[str, float, float, str]], history: History) -> list[Row]:
+    """Return what `against_hertz` found as rows: quantity, Hertz, computed, difference."""
     named = {
         "contact_radius_fit": "contact radius (to the edge)",
         "contact_radius": "contact radius (area of the nodes)",
     }
     rows: list[Row] = []
-    for name, exact, value, unit in against_hertz(case, history):
+    for name, exact, value, unit in compared:
         off, error = f"{100 * (value / exact - 1):+.3f} %", float(history.get(f"{name}_error", math.nan))
         if not math.isnan(error):
             off += f" (± {percent(error / value)} estimated)"
@@ -211,8 +331,8 @@ def trial_rows(result: Result) -> list[Row]:
     ]
     for name in names:
         values = own[f"trial_{name}"].isel(step=-1)
-        told = (_value(float(values[k]), VARIABLES[name].units) for k in shown)
-        rows.append((spelled(name.removesuffix("_fit")), *told, percent(relative[name])))
+        values_shown = (_value(float(values[k]), VARIABLES[name].units) for k in shown)
+        rows.append((spelled(name.removesuffix("_fit")), *values_shown, percent(relative[name])))
     return [*rows, ("target", "", "", "", percent(float(data.attrs["accuracy_target"])))]
 
 
@@ -225,7 +345,6 @@ def file_rows(result: Result) -> list[Row]:
     planned = int(attributes["planned_steps"])
     plan = f"{planned} were planned" if planned else "their number was open"
     state = "complete" if result.complete else f"unfinished, {plan}"
-    fields = [str(n) for n, v in result.dataset.data_vars.items() if v.dims == ("step", "row", "col")]
     return [
         ("file", result.path),
         ("written by", f"{attributes['source']}, run started {attributes['created']}"),
@@ -235,12 +354,12 @@ def file_rows(result: Result) -> list[Row]:
         ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
         ("algorithm", algorithm(attributes)),
         *([("accuracy", _reached(attributes))] if "accuracy_reached" in attributes else []),
-        ("fields", ", ".join(fields)),
+        ("fields", ", ".join(fields_of(result))),
     ]
 
 
 def _reached(attributes: Mapping[str, Any]) -> str:
-    """Say whether the accuracy that was asked for is reached."""
+    """Say whether the target of the accuracy is reached."""
     if "accuracy_shortfall" in attributes:
         return str(attributes["accuracy_shortfall"])
     error, target = (percent(float(attributes[f"accuracy_{name}"])) for name in ("estimate", "target"))
@@ -255,13 +374,3 @@ def algorithm(attributes: Mapping[str, Any]) -> str:
     if words.startswith("incremental"):
         words += ", entry interpolated" * (attributes.get("entry") == "interpolated")
     return words + ", coupling goodman" * (attributes.get("coupling") == "goodman")
-
-
-def case_of(result: Result) -> Case | None:
-    """Return the case a result came from, if its deck tells."""
-    from ..case import Case
-
-    try:
-        return Case.from_text(result.deck) if result.deck else None
-    except HexcontactError:  # a deck with parts that were made in Python
-        return None

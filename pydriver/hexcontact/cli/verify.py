@@ -1,4 +1,4 @@
-"""Compare a few quick contacts with known solutions: ``hexcontact verify`` tests an installation.
+"""The command that tests an installation: ``hexcontact verify`` compares quick contacts with known solutions.
 
 Decks, quantities, references, tolerances and sources stand in ``data/self_test.toml``. The long comparisons
 with published, analytic and converged solutions are a program of the repository: tests/validation.
@@ -13,9 +13,37 @@ import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from ..errors import DeckError
+from .guard import Content, command
+from .options import AsJson
+
+
+@command("hexcontact verify")
+def verify(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Which comparisons; default: all.", show_default=False),
+    ] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
+    as_json: AsJson = False,
+) -> Content:
+    """Test the installation: solve a few contacts and compare them with known solutions.
+
+    Exit code 1 if a comparison fails.
+    """
+    if not as_json:
+        raise typer.Exit(main(names or [], listing=listing))
+    chosen = _chosen(names or [], self_test())
+    if listing:
+        return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
+    found = [check.run().content(check) for check in chosen]
+    passed = all(check["passed"] for check in found)
+    return {"exit_code": int(not passed), "passed": passed, "checks": found}
+
 
 # display unit -> SI
 UNITS = {
@@ -31,16 +59,6 @@ UNITS = {
     "rad": 1.0,
     "deg": math.pi / 180.0,
 }
-
-
-@dataclass(frozen=True)
-class Known:
-    """What is known about a quantity, in SI; nan where there is no such value."""
-
-    published: float = math.nan
-    reference: float = math.nan
-    uncertainty: float = math.nan
-    analytic: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -81,59 +99,22 @@ class Comparison:
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def add(
-        self,
-        case: str,
-        quantity: str,
-        unit: str,
-        computed: float,
-        *,
-        row: Known | None = None,
-        analytic: float = math.nan,
-        judge: str = "",
-        relative: float = math.nan,
-        absolute: float = math.nan,
-    ) -> None:
-        """Add a row.
-
-        Parameters
-        ----------
-        case, quantity : str
-            What was computed.
-        unit : str
-            Unit to show it in, a key of `UNITS`.
-        computed : float
-            The value, SI.
-        row : Known, optional
-            What is known about it.
-        analytic : float
-            The analytic value, SI, instead of that of `row`.
-        judge : str
-            "reference" or "analytic": what the difference is taken from; by default the reference, if any.
-        relative, absolute : float
-            Bound on the difference, relative or in SI; without one the row is reported, not judged.
-        """
-        known = row or Known()
-        by_reference = judge == "reference" or (not judge and not math.isnan(known.reference))
-        self.rows.append(
-            Row(
-                case,
-                quantity,
-                unit,
-                computed,
-                published=known.published,
-                reference=known.reference,
-                analytic=known.analytic if math.isnan(analytic) else analytic,
-                judge="reference" if by_reference else "analytic",
-                tolerance=relative if math.isnan(absolute) else absolute,
-                absolute=not math.isnan(absolute),
-            )
-        )
-
     @property
     def passed(self) -> bool:
         """Whether no row fails."""
         return all(row.passed is not False for row in self.rows)
+
+    def content(self, check: Check) -> dict[str, Any]:
+        """Return the comparison of a check for programs: in SI, relative differences unless absolute."""
+        values = ("computed", "published", "reference", "analytic", "judge", "difference", "tolerance")
+        shown = ("case", "quantity", *values, "absolute", "passed")
+        return {
+            "name": check.name,
+            "title": check.title,
+            "passed": self.passed,
+            "rows": [{name: getattr(row, name) for name in shown} for row in self.rows],
+            "notes": self.notes,
+        }
 
 
 @dataclass(frozen=True)
@@ -254,7 +235,7 @@ def main(
     DeckError
         If there is no check of some name.
     """
-    chosen = _chosen(names, checks)
+    chosen = _chosen(names, self_test() if checks is None else checks)
     if listing:
         width = max(len(check.name) for check in chosen)
         for check in chosen:
@@ -271,24 +252,11 @@ def main(
     return 1 if failed else 0
 
 
-def _chosen(names: Sequence[str], checks: Mapping[str, Check] | None = None) -> list[Check]:
+def _chosen(names: Sequence[str], known: Mapping[str, Check]) -> list[Check]:
     """Return the checks of these names, all if there are none."""
-    known = self_test() if checks is None else checks
     if unknown := [name for name in names if name not in known]:
         raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(known)}")
     return [known[name] for name in names] if names else list(known.values())
-
-
-def for_programs(names: Sequence[str] = (), *, listing: bool = False) -> dict[str, Any]:
-    """Run checks and return what they find, with the exit code; arguments and errors as `main`."""
-    from .json_output import of_comparison
-
-    chosen = _chosen(names)
-    if listing:
-        return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
-    found = [of_comparison(check, check.run()) for check in chosen]
-    passed = all(check["passed"] for check in found)
-    return {"exit_code": int(not passed), "passed": passed, "checks": found}
 
 
 # ------------------------------------------------------------------------------- the self-test
@@ -315,13 +283,16 @@ def _solve(entry: Mapping[str, Any]) -> Comparison:
         computed = float(step[value["quantity"]])
         if over := value.get("over"):
             computed /= float(step[over])
-        found.add(
+        about = f"{value['quantity']}/{over}" if over else value["quantity"]
+        row = Row(
             f"step {value['step']}",
-            f"{value['quantity']}/{over}" if over else value["quantity"],
+            about,
             value.get("unit", "-"),
             computed,
-            row=Known(**{value["source"]: value["value"]}),
-            relative=value["relative"],
+            judge=value["source"],
+            tolerance=value["relative"],
+            **{value["source"]: value["value"]},
         )
+        found.rows.append(row)
     found.notes.append(entry["note"])
     return found

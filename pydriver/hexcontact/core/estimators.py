@@ -1,4 +1,4 @@
-"""Size and shape of a contact or stick zone from its nodes.
+"""Size and shape of a contact or stick zone from its nodes, and errors of lattices, as the core finds them.
 
 Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i+-1), (j+-1, i), (j+-1, i-+1).
 """
@@ -10,10 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
+from .contact import raise_for
+
+_api = _core.hc_f2py_measures
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-_NEIGHBORS = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1))
 
 
 @dataclass(frozen=True)
@@ -50,12 +53,7 @@ class Ellipse:
 
 def boundary(zone: Mask) -> Mask:
     """Nodes of ``zone`` that have a neighbor outside it (or outside the window)."""
-    padded = np.pad(zone, 1)
-    n_row, n_col = zone.shape
-    surrounded = np.ones(zone.shape, dtype=bool)
-    for row, col in _NEIGHBORS:
-        surrounded &= padded[1 + row : 1 + row + n_row, 1 + col : 1 + col + n_col]
-    return zone & ~surrounded
+    return np.asarray(_api.zone_boundary(zone.T) != 0).T
 
 
 def boundary_circle(
@@ -78,16 +76,14 @@ def boundary_circle(
     -------
     CircleFit
     """
-    rim = boundary(zone)
-    radii = np.hypot(x[rim] - center[0], y[rim] - center[1]) + 0.5 * spacing
-    radius = float(radii.mean())
-    off = (radii - radius) / radius
-    return CircleFit(radius, float(np.abs(off).mean()), float(np.sqrt(np.mean(off**2))), int(radii.size))
+    numbers, count = _api.circle_of_zone(x.T, y.T, zone.T, spacing, center)
+    radius, mean, standard = numbers.tolist()
+    return CircleFit(radius, mean, standard, count)
 
 
 def area_radius(zone: Mask, cell_area: float) -> float:
     """Radius (m) of the circle with as much area as the cells of the nodes in ``zone``; cell area in m^2."""
-    return float(np.sqrt(np.count_nonzero(zone) * cell_area / np.pi))
+    return float(_api.radius_of_area(np.count_nonzero(zone), cell_area))
 
 
 def edge_radius(
@@ -115,23 +111,13 @@ def edge_radius(
     float
         Radius, m; nan if fewer than three nodes are in the band.
     """
-    r2 = (x - center[0]) ** 2 + (y - center[1]) ** 2
-    around = area_radius(pressure > 0.0, np.sqrt(0.75) * spacing**2)
-    inner, outer = max(around - 6.0 * spacing, 0.0), around - spacing
-    band = (pressure > 0.0) & (r2 >= inner**2) & (r2 <= outer**2)
-    if outer <= 0.0 or np.count_nonzero(band) < 3:
-        return float("nan")
-    scale, peak = around**2, pressure.max()
-    slope, start = np.polyfit(r2[band] / scale, (pressure[band] / peak) ** 2, 1)
-    return float(np.sqrt(-start / slope * scale)) if slope < 0.0 < start else float("nan")
+    return float(_api.radius_of_pressure(x.T, y.T, pressure.T, spacing, center))
 
 
 def pressure_center(x: Array, y: Array, pressure: Array) -> tuple[float, float]:
     """Return the centroid of a pressure (m); nan if there is none."""
-    total = float(pressure.sum())
-    if not total > 0.0:
-        return float("nan"), float("nan")
-    return float((pressure * x).sum()) / total, float((pressure * y).sum()) / total
+    along, across = _api.center_of_pressure(x.T, y.T, pressure.T).tolist()
+    return along, across
 
 
 def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
@@ -148,11 +134,7 @@ def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
     -------
     Ellipse
     """
-    points = np.stack([x[zone], y[zone]])
-    center = points.mean(axis=1)
-    variance, axes = np.linalg.eigh(np.cov(points, bias=True))
-    minor, major = 2.0 * np.sqrt(np.maximum(variance, 0.0))
-    return Ellipse(float(major), float(minor), _angle(axes[:, 1]), (float(center[0]), float(center[1])))
+    return _ellipse(_api.ellipse_of_zone(x.T, y.T, zone.T))
 
 
 def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse:
@@ -179,32 +161,34 @@ def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse
     ValueError
         If there are fewer than six nodes to fit, or the fit is no ellipse.
     """
-    around = moment_ellipse(x, y, pressure > 0.0)
-    x0, y0 = around.center
-    cosine, sine = np.cos(around.angle), np.sin(around.angle)
-    u = ((x - x0) * cosine + (y - y0) * sine) / around.semi_major
-    v = ((y - y0) * cosine - (x - x0) * sine) / around.semi_minor
-    way, ring = np.hypot(u, v), spacing / around.semi_minor
-    band = (pressure > 0.0) & (way >= 1.0 - 6.0 * ring) & (way <= 1.0 - ring)
-    u, v, p2 = u[band], v[band], (pressure[band] / pressure.max()) ** 2
-    if u.size < 6:
-        raise ValueError("too few nodes in contact to fit an ellipse to the pressure")
-    forms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1)
-    c = np.linalg.lstsq(forms, p2, rcond=None)[0]
-    # back to metres: p2 = start + slope . r + r . form . r
-    turn = np.array([[cosine, sine], [-sine, cosine]]) / np.array([[around.semi_major], [around.semi_minor]])
-    form = turn.T @ np.array([[c[3], 0.5 * c[4]], [0.5 * c[4], c[5]]]) @ turn
-    slope = turn.T @ c[1:3]
-    middle = -0.5 * np.linalg.solve(form, slope)
-    top = c[0] + 0.5 * slope @ middle
-    curvature, axes = np.linalg.eigh(-form / top)
-    if not (top > 0.0 and curvature[0] > 0.0):
-        raise ValueError("the pressure does not vanish on an ellipse")
-    major, minor = 1.0 / np.sqrt(curvature)
-    center = float(x0 + middle[0]), float(y0 + middle[1])
-    return Ellipse(float(major), float(minor), _angle(axes[:, 0]), center)
+    numbers, code, message = _api.ellipse_of_pressure(x.T, y.T, pressure.T, spacing)
+    raise_for(code, message)
+    return _ellipse(numbers)
 
 
-def _angle(axis: Array) -> float:
-    """Direction of an axis (rad) from x; it has no sense, so it is in (-pi/2, pi/2]."""
-    return float(np.pi / 2 - (np.pi / 2 - np.arctan2(axis[1], axis[0])) % np.pi)
+def limits_of_error(spacings: Array, values: Array) -> Array:
+    """Estimate how far values on the first, finest lattice are from their limit for a vanishing spacing.
+
+    A trend c h^p with p from 1 to 2 and a scatter in proportion to h are fitted: docs/theory/error_bars.md,
+    (A1), (A2).
+
+    Parameters
+    ----------
+    spacings : ndarray, (n,)
+        Spacings in units of the first.
+    values : ndarray, (n, m)
+        m quantities, on each of the lattices.
+
+    Returns
+    -------
+    ndarray, (m,)
+        What hardly any error exceeds; NaN where a value is.
+    """
+    errors, code, message = _api.errors_of_limits(spacings, values)
+    raise_for(code, message)
+    return np.asarray(errors)
+
+
+def _ellipse(numbers: Array) -> Ellipse:
+    major, minor, angle, x, y = numbers.tolist()
+    return Ellipse(major, minor, angle, (x, y))

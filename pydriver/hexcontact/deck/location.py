@@ -1,7 +1,7 @@
 """Where the keys of a deck are written: line and column of each, which tomllib does not tell.
 
-The text is known to be TOML by the time anybody asks (tomllib has read it), so the scanner only has to find
-its way: it skips values and comments, and notes where each key of tables, inline tables and arrays begins.
+tomllib has read the text before, so the scanner need not judge it: it skips values and comments, and notes
+where each key of tables, inline tables and arrays begins.
 """
 
 from __future__ import annotations

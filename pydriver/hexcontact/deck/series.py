@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 from ..errors import DeckError
 from ..files import require_ordinary, text_of
 from ..text import did_you_mean, listed, shown
-from ..variables import LOADS as LOADS  # the two keys that drive each rigid motion
+from ..variables import LOADS
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
 from .model import Table, extended, meaning
 from .units import ANGLE, FORCE, LENGTH, TORQUE

@@ -13,11 +13,11 @@ from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from ..variables import FIELDS
+from ..variables import FIELDS, LOADS
 from .faults import Mistake
 from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
 from .model import Table, extended, meaning, problems_of
-from .series import DRIVEN, LOADS, MOST_STEPS, Series
+from .series import DRIVEN, MOST_STEPS, Series
 from .surfaces import Flat, Point, PositiveLength, Surface, SurfaceKind
 from .units import LENGTH, NUMBER, PRESSURE
 

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..analytic import hertz_sphere
-from .style import EXACT, GUIDE, STYLE
+from .registry import figure
+from .style import COMPUTED, EXACT, GUIDE, THIRD, new_figure
 
 Array = NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]
@@ -29,6 +30,7 @@ _TABLE_8_1 = (
 )
 
 
+@figure("pyramid", "displacements by one pyramid (Figure 5.6)")
 def pyramid_displacements(poisson_ratio: float = 0.3) -> Figure:
     """Draw the nine functions C ... K of Table 8.1, the displacements of unit pyramid loads (Figure 5.6).
 
@@ -46,24 +48,23 @@ def pyramid_displacements(poisson_ratio: float = 0.3) -> Figure:
     fine = np.linspace(-2.2, 2.2, 221)
     x, y = np.meshgrid(fine, fine)
     functions = iter(pyramid_functions(x, y, poisson_ratio))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 6.9), layout="constrained")
-        panels = figure.subplots(3, 3, sharex=True, sharey=True)
-        for row, (names, load) in enumerate(_TABLE_8_1):
-            for column, name in enumerate(names):
-                axes = panels[row, column]
-                _map(figure, axes, x, y, next(functions))
-                axes.set_title(name)
-                if row == 2:
-                    axes.set_xlabel("$x/l_e$")
-            panels[row, 0].set_ylabel(f"{load}\n$y/l_e$")
-        figure.suptitle(
-            f"Surface displacements of the unit pyramid, Table 8.1 (spacing 1, $\\nu$ = {poisson_ratio:g})"
-        )
-        return figure
+    canvas = new_figure(7.2, 6.9)
+    panels = canvas.subplots(3, 3, sharex=True, sharey=True)
+    for row, (names, load) in enumerate(_TABLE_8_1):
+        for column, name in enumerate(names):
+            axes = panels[row, column]
+            _map(canvas, axes, x, y, next(functions))
+            axes.set_title(name)
+            if row == 2:
+                axes.set_xlabel("$x/l_e$")
+        panels[row, 0].set_ylabel(f"{load}\n$y/l_e$")
+    canvas.suptitle(
+        f"Surface displacements of the unit pyramid, Table 8.1 (spacing 1, $\\nu$ = {poisson_ratio:g})"
+    )
+    return canvas
 
 
-def _map(figure: Figure, axes: Axes, x: Array, y: Array, value: Array) -> None:
+def _map(canvas: Figure, axes: Axes, x: Array, y: Array, value: Array) -> None:
     """Draw filled contours; a function of both signs gets a diverging map that is white at 0."""
     top = float(np.abs(value).max())
     signed = float(value.min()) < -0.05 * top
@@ -73,7 +74,7 @@ def _map(figure: Figure, axes: Axes, x: Array, y: Array, value: Array) -> None:
     axes.contour(x, y, value, levels=levels[1:-1:2], colors="black", linewidths=0.25, linestyles="solid")
     axes.plot(np.cos(_HEXAGON), np.sin(_HEXAGON), color="black" if signed else "white", lw=0.8)
     axes.set_aspect("equal")
-    bar = figure.colorbar(drawn, ax=axes, shrink=0.8, pad=0.02)
+    bar = canvas.colorbar(drawn, ax=axes, shrink=0.8, pad=0.02)
     bar.locator = matplotlib.ticker.MaxNLocator(5)
     bar.update_ticks()
     bar.ax.tick_params(labelsize=7)
@@ -109,8 +110,8 @@ def pyramid(x: Array, y: Array) -> Array:
 
 SHAPES: dict[str, tuple[Shape, dict[str, Any]]] = {
     "point force": (point_force, {"color": EXACT, "ls": ":"}),
-    "constant on the cell": (constant_cell, {"color": "#009E73", "ls": "--"}),
-    "pyramid": (pyramid, {"color": "#0072B2", "ls": "-"}),
+    "constant on the cell": (constant_cell, {"color": THIRD, "ls": "--"}),
+    "pyramid": (pyramid, {"color": COMPUTED, "ls": "-"}),
 }
 """Ways to spread a nodal pressure, each of volume sqrt(3)/2 (spacing 1), and how each is drawn."""
 
@@ -146,6 +147,7 @@ def hertz_error(shape: Shape, nodes_in_radius: float, x: Array, y: Array) -> Arr
     return np.asarray((computed - (hertz.approach - 0.5 * (x**2 + y**2))) / hertz.approach)
 
 
+@figure("load-shapes", "pyramid, point force and constant load compared (Figure 7.3)")
 def load_shapes(nodes_in_radius: int = 10) -> Figure:
     """Compare a point force, a constant load on the hexagonal cell and the pyramid (Figure 7.3).
 
@@ -159,18 +161,17 @@ def load_shapes(nodes_in_radius: int = 10) -> Figure:
     matplotlib.figure.Figure
     """
     a = nodes_in_radius
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 5.6), layout="constrained")
-        (one, pressure), (error, convergence) = figure.subplots(2, 2)
-        _draw_one_load(one)
-        _draw_pressures(pressure, a)
-        _draw_errors(error, a)
-        _draw_convergence(convergence)
-        for letter, axes in zip("abcd", (one, pressure, error, convergence), strict=True):
-            axes.set_title(f"({letter}) {axes.get_title()}")
-        handles = [matplotlib.lines.Line2D([], [], label=name, **look) for name, (_, look) in SHAPES.items()]
-        figure.legend(handles=handles, loc="outside lower center", ncols=3)
-        return figure
+    canvas = new_figure(7.2, 5.6)
+    (one, pressure), (error, convergence) = canvas.subplots(2, 2)
+    _draw_one_load(one)
+    _draw_pressures(pressure, a)
+    _draw_errors(error, a)
+    _draw_convergence(convergence)
+    for letter, axes in zip("abcd", (one, pressure, error, convergence), strict=True):
+        axes.set_title(f"({letter}) {axes.get_title()}")
+    handles = [matplotlib.lines.Line2D([], [], label=name, **look) for name, (_, look) in SHAPES.items()]
+    canvas.legend(handles=handles, loc="outside lower center", ncols=3)
+    return canvas
 
 
 def _draw_one_load(axes: Axes) -> None:
@@ -189,8 +190,8 @@ def _draw_pressures(axes: Axes, a: int) -> None:
     p = np.sqrt(np.maximum(1 - nodes**2, 0.0))
     axes.vlines(nodes, 0.0, p, color=EXACT, ls=":", lw=1.0)
     edges = np.concatenate([nodes - 0.5 / a, [nodes[-1] + 0.5 / a]])
-    axes.stairs(p, edges, color="#009E73", ls="--", baseline=None)
-    axes.plot(nodes, p, color="#0072B2", lw=1.1)
+    axes.stairs(p, edges, color=THIRD, ls="--", baseline=None)
+    axes.plot(nodes, p, color=COMPUTED, lw=1.1)
     axes.set(title=f"nodal pressures, $a/l_e$ = {a}", xlabel="$x/a$", ylabel="$p/p_0$", xlim=(0.0, 1.2))
     axes.set_ylim(0.0, 1.08)
 
@@ -248,7 +249,3 @@ def _draw_convergence(axes: Axes) -> None:
     axes.set_xticks(meshes, [str(mesh) for mesh in meshes])
     axes.minorticks_off()
     axes.grid(color="0.9", lw=0.5)
-
-
-FIGURES: dict[str, Callable[[], Figure]] = {"pyramid": pyramid_displacements, "load-shapes": load_shapes}
-"""Pictures that need no result, by name."""

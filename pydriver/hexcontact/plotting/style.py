@@ -12,9 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
+from ..result.raster import SLIP as SLIP
+from ..result.raster import STICK as STICK
+
 # the Okabe-Ito palette, which people with any color vision can tell apart
 COMPUTED, EXACT, THIRD, GUIDE = "#0072B2", "#D55E00", "#009E73", "0.55"
-STICK, SLIP = "#0072B2", "#F0C05A"  # dark and light, so that they differ in black and white too
+IN_CONTACT = "#56B4E9"
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
@@ -49,6 +52,11 @@ def legend_below(axes: Axes, **options: Any) -> None:
     down = ScaledTranslation(0.0, -0.42, axes.figure.dpi_scale_trans)
     below = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down}
     axes.legend(loc="upper center", **below, **options)
+
+
+def legend_above(axes: Axes) -> None:
+    """Put a legend right above axes."""
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)
 
 
 def shades(count: int) -> Sequence[Any]:

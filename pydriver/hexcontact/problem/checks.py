@@ -69,7 +69,7 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, tuple[Load
 
 
 def _algorithm(friction: Friction | None, solver: Solver) -> tuple[str, list[Mistake]]:
-    """Return the algorithm that a deck asks for, and what stands against it."""
+    """Return the algorithm of a deck, and its conflicts with the friction."""
     mu = friction.coefficient if friction else None
     algorithm = solver.algorithm or ("incremental" if mu else "frictionless")
     problems = []
@@ -97,7 +97,7 @@ def _field_problems(output: Output, algorithm: str) -> list[Mistake]:
 def _touching_problems(gap: Separation) -> list[Mistake]:
     """Complain about surfaces that never touch, or that touch along a line or all over, without end."""
     try:
-        gap.first_touch  # noqa: B018 (worked out here, kept for later)
+        gap.first_touch  # noqa: B018 (computed here, cached)
     except DeckError as error:
         return [Mistake(("body", "2", "surface"), MISSING, str(error))]
     one, two = gap.surface_1.curvature, gap.surface_2.curvature

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import reals
-from ..core import contact as native
+from ..core.contact import shaped
 from ..core.lattice import Lattice
 from ..deck.surfaces import Separation
 from ..deck.units import LENGTH, UnitError, to_si
@@ -53,7 +53,7 @@ def given_gap(gap: Any, lattice: Lattice | None) -> GivenGap | None:
             "gap: an array needs lattice=..., at whose nodes it is given; heights on a rectangular grid "
             "are given as an xarray.DataArray with the coordinates x and y (m)"
         )
-    return native.shaped(gap, lattice, "gap").copy()
+    return shaped(gap, lattice, "gap").copy()
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Gap:
 
     @property
     def first_touch(self) -> tuple[float, float] | None:
-        """Point (m) where the bodies touch first; None if nothing tells."""
+        """Point (m) where the bodies touch first; None if it is not known."""
         known = isinstance(self.source, Separation | HeightMap)
         return self.source.first_touch[:2] if known else None  # type: ignore[union-attr]
 
@@ -113,7 +113,7 @@ class Gap:
         return isinstance(self.source, HeightMap) and self.source.ends_within(distance, x, y)
 
     def __eq__(self, other: object) -> bool:
-        """Whether two gaps are the same wherever that can be told."""
+        """Whether two gaps are the same; two functions are if they are one object."""
         if not isinstance(other, Gap):
             return NotImplemented
         if self.at_nodes and other.at_nodes:

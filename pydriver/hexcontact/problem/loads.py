@@ -14,8 +14,9 @@ from typing import Literal, NamedTuple
 
 from ..deck.faults import MISSING, Mistake
 from ..deck.kinds import SMALLEST
-from ..deck.series import LOADS, MOST_STEPS
+from ..deck.series import MOST_STEPS
 from ..deck.tables import Load, Segment
+from ..variables import LOADS
 
 Control = Literal["force", "displacement"]
 Motion = Literal["z", "x", "y", "twist"]
@@ -49,7 +50,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Ramp:
-    """A segment that is run in increments which only the solution tells (``steps = "auto"``).
+    """A segment in increments that are chosen while it is solved (``steps = "auto"``).
 
     Attributes
     ----------
@@ -288,7 +289,7 @@ def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virg
 def _overload(
     key: tuple[str | int, ...], segment: Segment, step: LoadStep, mu: float | None
 ) -> Iterator[Mistake]:
-    """Yield the tangential loads of a step that friction cannot carry, as far as the deck alone tells."""
+    """Yield the tangential loads of a step that friction cannot carry, as far as the deck determines them."""
     tangential: tuple[tuple[Motion, Target], ...] = ("x", step.x), ("y", step.y), ("twist", step.twist)
     if not mu:
         for motion, target in tangential:

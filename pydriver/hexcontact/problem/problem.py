@@ -12,9 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import contact as native
-from ..core import friction as native_friction
-from ..core import memory
+from ..core import contact, friction, memory
 from ..core.contact import ElasticPair, Method
 from ..core.lattice import Lattice
 from ..deck import toml
@@ -33,7 +31,7 @@ from .window import Estimate, NoContactFound
 
 Array = NDArray[np.float64]
 
-# Windows of up to so many nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
+# Windows of up to this number of nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
 MOST_DIRECT_NODES = 200
 _SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
 
@@ -58,7 +56,7 @@ class Problem:
     load_steps : tuple of LoadStep
         The history; a segment in adaptive steps is one of them.
     output : Output
-        What is kept.
+        What is written, and where.
     deck : Deck
         The deck, checked and in SI.
     deck_file : Path or None
@@ -261,13 +259,13 @@ class Problem:
     def memory_needed(self, lattice: Lattice) -> int:
         """Return the memory (bytes) that solving on a window takes, with a contact as large as estimated."""
         method, shape = self.method_for(lattice), lattice.shape
-        contact = self.contact_nodes(lattice)
+        nodes = self.contact_nodes(lattice)
         if not self.frictional:
-            return native.memory_needed(method, *shape, contact=contact, threads=memory.threads())
-        return native_friction.memory_needed(
+            return contact.memory_needed(method, *shape, contact=nodes, threads=memory.threads())
+        return friction.memory_needed(
             method,
             *shape,
-            contact=contact,
+            contact=nodes,
             loads=max(sum(t.control == "force" for t in step.targets) for step in self.load_steps),
             coupled=self.coupled,
             threads=memory.threads(),
@@ -302,7 +300,7 @@ class Problem:
         return case
 
     def __eq__(self, other: object) -> bool:
-        """Whether two cases are the same problem, solved and kept in the same way."""
+        """Whether two cases are the same problem, with the same solver and output."""
         if not isinstance(other, Problem):
             return NotImplemented
         mine, others = ((one._gap, one.deck, one.load_steps, one.lattice) for one in (self, other))
@@ -323,7 +321,7 @@ class Problem:
     # --- the window -----------------------------------------------------------------------------------------
 
     def _refinement_problems(self, wanted: Accuracy) -> list[Mistake]:
-        """Complain about what cannot be refined, or not far enough for errors to be told."""
+        """Return what prevents a refinement that is fine enough to estimate errors."""
         if self._gap.at_nodes:
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]

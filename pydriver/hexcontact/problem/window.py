@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,9 +155,7 @@ def estimate_contact(
     gap: GapFunction,
     center: tuple[float, float],
     origin: tuple[float, float],
-    *,
-    normal_load: float | None = None,
-    approach: float | None = None,
+    **drive: float,
 ) -> Estimate:
     """Find the contact roughly, under a normal load (N) or at an approach (m).
 
@@ -168,19 +167,19 @@ def estimate_contact(
         Initial gap over the plane.
     center, origin : (float, float)
         A point near the contact, and a lattice node.
-    normal_load, approach : float
-        One of them, above zero.
+    **drive : float
+        `normal_load` or `approach`, above zero.
 
     Raises
     ------
     NoContactFound
         If nothing touches, or if the contact has no end.
     """
-    half = _starting_half_size(pair, gap, center, normal_load, approach)
+    half = _starting_half_size(pair, gap, center, **drive)
     lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), origin)
     enclosed, enlargements = False, 0
     for _ in range(MOST_TRIALS):
-        contact = _solve(pair, gap, lattice, normal_load, approach)
+        contact = _solve(pair, gap, lattice, **drive)
         if contact is None or not contact.any():
             # Under load control there is always contact; at an approach the nodes may have missed it.
             lattice = centered(lattice.spacing / 4, center, lattice.shape, origin)
@@ -210,8 +209,8 @@ def _starting_half_size(
     pair: ElasticPair,
     gap: GapFunction,
     center: tuple[float, float],
-    normal_load: float | None,
-    approach: float | None,
+    normal_load: float | None = None,
+    approach: float = 0.0,
 ) -> float:
     """Guess the contact radius: where the gap reaches the approach, or 2 E* a h(a) carries the load."""
     radii = 10.0 ** np.linspace(-12, 4, 161)
@@ -226,15 +225,13 @@ def _starting_half_size(
         if normal_load is not None:
             inside = 2 * pair.effective_modulus * radii * profile < normal_load
         else:
-            inside = profile < (approach or 0.0)
+            inside = profile < approach
     if inside[-1]:
         raise NoContactFound("the contact has no end")
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 
-def _solve(
-    pair: ElasticPair, gap: GapFunction, lattice: Lattice, normal_load: float | None, approach: float | None
-) -> NDArray[np.bool_] | None:
+def _solve(pair: ElasticPair, gap: GapFunction, lattice: Lattice, **drive: Any) -> NDArray[np.bool_] | None:
     """Return the nodes in contact of a rough frictionless solution, or None if no node can touch."""
     height = np.asarray(gap(lattice.x, lattice.y), float)
     candidate = np.isfinite(height)
@@ -242,8 +239,7 @@ def _solve(
         return None
     height = np.where(candidate, height, 0.0)
     contact = NormalContact(lattice, pair, height, candidate, threads=1)
-    solution = contact.solve(normal_load=normal_load, approach=approach, tolerance=1e-4)
-    return np.asarray(solution.pressure > 0)
+    return np.asarray(contact.solve(**drive, tolerance=1e-4).pressure > 0)
 
 
 def _measure(lattice: Lattice, contact: NDArray[np.bool_]) -> Estimate:

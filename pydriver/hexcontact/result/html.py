@@ -12,7 +12,7 @@ from ..text import Row, html_table, quantity, visible
 from ..variables import spelled
 from .history import step_rows
 from .layout import history_of
-from .raster import Plane, png_of
+from .raster import SLIP, STICK, Plane, png_of
 from .view import StepView
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # Colors of a map of pressure, from none to the largest (viridis), and of zones: separated, stick, slip.
 _SHADES = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725")
-_ZONES = ("#ffffff", "#0072b2", "#f0c05a")
+_ZONES = ("#ffffff", STICK, SLIP)
 _PIXELS = 240  # of the longer side of a picture
 
 

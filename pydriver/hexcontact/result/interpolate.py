@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.edges import ContactEdges
+from ..core.interpolation import linear, nearest, pressure_between
 from ..errors import DeckError
 from ..text import did_you_mean
 from ..variables import NOT_KEPT, VARIABLES
@@ -31,63 +32,6 @@ Fields = Mapping[str, NDArray[Any]]
 
 _MARGIN = 0.15  # of a section on both sides, in widths of the contact
 _SAME = 1e-9  # spacings between corners that are one
-
-
-def linear(
-    values: Array, basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float = 0.0
-) -> Array:
-    """Interpolate values at the nodes of a lattice linearly on its triangles.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_row, n_col)
-        Values at the nodes.
-    basis : ndarray, shape (2, 2)
-        Basis vectors of the lattice as rows, m.
-    start : tuple of float
-        Position of node [0, 0], m.
-    x, y : array_like
-        Points, m.
-    outside : float
-        Value at nodes outside the window.
-
-    Returns
-    -------
-    ndarray
-        Values at the points, in their shape.
-    """
-    points = np.stack([np.ravel(x), np.ravel(y)], axis=1) - start
-    col, row = np.linalg.solve(np.asarray(basis).T, points.T)
-    col, row = np.round(col, 9), np.round(row, 9)  # a node is a node
-    i, j = np.floor(col).astype(int), np.floor(row).astype(int)
-    u, v = col - i, row - j
-    padded = np.pad(np.asarray(values, dtype=float), 1, constant_values=outside)
-    n_row, n_col = padded.shape
-    lower = u + v <= 1
-    total = np.zeros(u.shape)
-    for dj, di, weight in (
-        (0, 0, np.maximum(1 - u - v, 0.0)),
-        (0, 1, np.where(lower, u, 1 - v)),
-        (1, 0, np.where(lower, v, 1 - u)),
-        (1, 1, np.maximum(u + v - 1, 0.0)),
-    ):
-        value = padded[np.clip(j + dj + 1, 0, n_row - 1), np.clip(i + di + 1, 0, n_col - 1)]
-        total += np.where(weight > 0.0, weight * value, 0.0)
-    return total.reshape(np.shape(x))
-
-
-def nearest(
-    values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
-) -> Array:
-    """Return the values at the nodes next to some points; parameters as of `linear`."""
-    away = np.stack([np.subtract(x, start[0]), np.subtract(y, start[1])], axis=-1)
-    corner = np.floor(away @ np.linalg.inv(basis))
-    corners = np.stack([corner + of_cell for of_cell in ((0, 0), (1, 0), (0, 1), (1, 1))])
-    distance = np.linalg.norm(corners @ basis - away, axis=-1)
-    chosen = np.take_along_axis(corners, distance.argmin(axis=0)[None, ..., None], axis=0)[0]
-    col, row = np.moveaxis(np.clip(chosen, 0, np.array(values.shape)[::-1] - 1).astype(int), -1, 0)
-    inside = (chosen == np.stack([col, row], axis=-1)).all(axis=-1)
-    return np.where(inside, values[row, col], outside).astype(float)
 
 
 def first_node(lattice: Lattice) -> Point:
@@ -144,9 +88,7 @@ class PressureField:
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the pressure (Pa) at some points (m), in their shape; 0 outside the window."""
-        plain = linear(self._pressure, self._basis, self._start, x, y)
-        square = linear(self._squares, self._basis, self._start, x, y)
-        return np.where(np.isnan(square), plain, np.sqrt(np.maximum(square, 0.0)))
+        return pressure_between(self._pressure, self._squares, self._basis, self._start, x, y)
 
 
 # --- lines --------------------------------------------------------------------------------------------------

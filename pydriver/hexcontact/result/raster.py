@@ -10,10 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .interpolate import nearest
+from ..core.interpolation import nearest
 from .view import StepView
 
 Array = NDArray[np.float64]
+
+# of zones in all pictures: dark and light, so that they differ in black and white too
+STICK, SLIP = "#0072b2", "#f0c05a"
 
 
 @dataclass(frozen=True)

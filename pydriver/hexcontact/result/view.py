@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analytic.hertz_gap import QuadraticGap, friction_of, pressure_is_frictionless
+from ..core.interpolation import linear
 from ..text import scaled as scaled
 from ..text import visible, worded
 from ..variables import LARGEST, VARIABLES, spelled
-from .interpolate import PressureField, first_node, is_kept, linear
+from .interpolate import PressureField, first_node, is_kept
 from .layout import lattice_of, step_of
 
 if TYPE_CHECKING:

@@ -1,15 +1,11 @@
 """How far a result is from the limit of vanishing spacing, told from solutions on several lattices.
 
 The lattice is refined by the square root of two from solution to solution. The difference of a solution and
-the limit has two parts: a trend, c h^p with an order p from 1 (areas of whole cells) to 2 (approach, loads,
-energies), and a scatter, since the contact lies differently on every lattice. The scatter is often the
-larger part, so that a pair of lattices tells little; it is measured where it costs least, on shifted copies
-of a coarser lattice: of the same spacing, with the origin moved by fractions of it.
-
-Both follow from a least-squares fit of q + c h^p to the last solutions, each weighted by 1/h, as a scatter
-in proportion to h asks for. The procedure is the same for every scalar of the history and every load step.
-It follows Eca and Hoekstra, Journal of Computational Physics 262 (2014) 104-130; factors and numbers here are
-those with which errors known from closed solutions stay within the estimate (docs/theory.md, section 12).
+the limit has two parts: a trend with the spacing, and a scatter, since the contact lies differently on every
+lattice. The scatter is often the larger part, so that a pair of lattices tells little; it is measured where
+it costs least, on shifted copies of a coarser lattice: of the same spacing, with the origin moved by
+fractions of it. The core fits both to the last solutions (fortran/path/discretization_error.f90), in the same
+way for every scalar of the history and every load step.
 """
 
 from __future__ import annotations
@@ -19,23 +15,17 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..deck.series import LOADS
+from ..core.estimators import limits_of_error
 from ..result.trials import Solution
-from ..variables import ESTIMATED
+from ..variables import ESTIMATED, LOADS
 
 if TYPE_CHECKING:
     from ..problem.loads import LoadStep
 
-Array = NDArray[np.float64]
 History = Mapping[str, Any]
 
 LEVELS_FITTED = 4  # the finest ones, with their shifted copies
-ORDERS = (1.0, 1.5, 2.0)
-SAFETY = 1.25  # on the trend
-DEVIATIONS = 2.0  # standard errors of the limit that the fit finds
-_ALIKE = 1.5  # orders whose residual is at most so many times the least one are all possible
 
 JUDGED = ("max_pressure", "contact_area_fit", "stick_area_fit", "approach")
 """Quantities that are to reach the target."""
@@ -87,40 +77,6 @@ def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep])
             name: 0.0 if name in prescribed else float(error) for name, error in zip(names, row, strict=True)
         })  # fmt: skip
     return found
-
-
-def limits_of_error(spacings: Array, values: Array) -> Array:
-    """Estimate how far values on the first, finest lattice are from their limit for a vanishing spacing.
-
-    Parameters
-    ----------
-    spacings : ndarray, (n,)
-        Spacings in units of the first.
-    values : ndarray, (n, m)
-        m quantities, on each of the lattices.
-
-    Returns
-    -------
-    ndarray, (m,)
-        What hardly any error exceeds; NaN where a value is.
-    """
-    n = len(spacings)
-    if n < 4:
-        raise ValueError(f"expected solutions on four lattices at least, not {n}")
-    scale = np.abs(values).max(axis=0)
-    scale[~(scale > 0.0)] = 1.0
-    weighted = values / scale / spacings[:, None]
-    scatters, widths = [], []
-    for order in ORDERS:
-        forms = np.stack([np.ones(n), spacings**order], axis=1) / spacings[:, None]
-        covariance = np.linalg.inv(forms.T @ forms)
-        unknowns = covariance @ (forms.T @ weighted)
-        scatter = np.sqrt(((weighted - forms @ unknowns) ** 2).sum(axis=0) / (n - 2))
-        trend = np.abs(weighted[0] - unknowns[0])
-        scatters.append(scatter)
-        widths.append(SAFETY * trend + DEVIATIONS * math.sqrt(covariance[0, 0]) * scatter)
-    possible = np.array(scatters) <= _ALIKE * np.min(scatters, axis=0)
-    return np.asarray(scale * np.where(possible, widths, 0.0).max(axis=0) + 0.0 * values.sum(axis=0))
 
 
 def relative_errors(histories: Sequence[History], errors: Sequence[Mapping[str, float]]) -> dict[str, float]:

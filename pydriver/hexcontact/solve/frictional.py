@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core import contact
 from ..core.edges import ContactEdges, Edge
 from ..core.estimators import area_radius
 from ..core.friction import ContactState, FrictionalContact
+from ..core.measures import elastic_energy, zone_extent
 from ..errors import DeckError
 from ..problem.loads import LoadStep
 from ..result.step import Step
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
 
 # numbers of a state that have the names of the history
 _NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
-_PLACES: dict[str, tuple[Any, str]] = {  # of the stick zone
-    "stick_center_x": (np.mean, "x"),
-    "stick_center_y": (np.mean, "y"),
-    "stick_min_x": (np.min, "x"),
-    "stick_max_x": (np.max, "x"),
-    "stick_min_y": (np.min, "y"),
-    "stick_max_y": (np.max, "y"),
-}
 _ROUGHLY = 1e-4  # residual of a solution that only tells how large the contact becomes
 
 
@@ -84,7 +76,7 @@ class FrictionWindow(Window[ContactState]):
             **self._stick_measures(solution, edges),
             "max_traction": float(np.hypot(solution.traction_x, solution.traction_y).max()),
             "dissipated_energy_step": solution.dissipated_energy - spent_before,
-            "elastic_energy": self._elastic_energy(solution),
+            "elastic_energy": elastic_energy(self.lattice, self.initial_gap, solution),
             "sweeps": solution.sweeps,
             "cuts": solution.cuts,
         }
@@ -114,25 +106,19 @@ class FrictionWindow(Window[ContactState]):
         """Return size and place of the stick zone; NaN for its place where there is none."""
         stick = solution.zone == 1
         edge = self.stick_edge(solution, edges)
-        place = {
-            name: float(measure(getattr(self.lattice, axis)[stick])) if stick.any() else math.nan
-            for name, (measure, axis) in _PLACES.items()
-        }
+        center, lower, upper = zone_extent(self.lattice, stick)
         return {
             "stick_area": self.lattice.cell_area * int(stick.sum()),
             "stick_radius": area_radius(stick, self.lattice.cell_area),
             "stick_area_fit": edge.area,
             "stick_radius_fit": edge.radius,
-            **place,
+            "stick_center_x": float(center[0]),
+            "stick_center_y": float(center[1]),
+            "stick_min_x": float(lower[0]),
+            "stick_max_x": float(upper[0]),
+            "stick_min_y": float(lower[1]),
+            "stick_max_y": float(upper[1]),
         }
-
-    def _work(self, solution: ContactState, inside: NDArray[np.bool_]) -> float:
-        """Return the work with that of the shear tractions, u1 - u2 = s + shift + twist x r."""
-        x, y = self.lattice.x[inside], self.lattice.y[inside]
-        moved_x = solution.relative_displacement_x[inside] + solution.shift_x - solution.twist * y
-        moved_y = solution.relative_displacement_y[inside] + solution.shift_y + solution.twist * x
-        work = super()._work(solution, inside) + solution.traction_x[inside] @ moved_x
-        return float(work + solution.traction_y[inside] @ moved_y)
 
 
 def state_of(step: Step) -> ContactState:

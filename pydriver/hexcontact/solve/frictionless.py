@@ -19,12 +19,12 @@ from ..core import contact, kernel_cache, memory
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
 from ..core.edges import ContactEdges
 from ..core.estimators import area_radius, pressure_center
-from ..deck.series import LOADS
+from ..core.measures import elastic_energy
 from ..errors import DeckError
 from ..problem.loads import MOTIONS
 from ..result.step import Step
 from ..text import listed
-from ..variables import DISPLACEMENTS, STATE
+from ..variables import DISPLACEMENTS, LOADS, STATE
 from .events import Listener
 
 if TYPE_CHECKING:
@@ -210,14 +210,6 @@ class Window(ABC, Generic[S]):
     def _more_history(self, solution: S, before: S | None, edges: ContactEdges) -> dict[str, float]:
         """Return what has one value by step beyond load, approach and contact area."""
 
-    def _work(self, solution: S, inside: NDArray[np.bool_]) -> float:
-        """Return the work of the tractions at the nodes in contact, by unit of cell area."""
-        return float(solution.pressure[inside] @ self.closing(solution)[inside])
-
-    def _elastic_energy(self, solution: S) -> float:
-        """Return U = sum A_p (p w + q . (u1 - u2))/2."""
-        return 0.5 * self.lattice.cell_area * self._work(solution, solution.zone > 0)
-
     def outgrown(self, solution: S) -> bool:
         """Tell whether the contact reached the rim of the window, be it in a part of the step only."""
         return solution.touches_rim
@@ -296,11 +288,6 @@ class Window(ABC, Generic[S]):
             solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
         )
 
-    def closing(self, solution: S) -> Array:
-        """Return u_1z + u_2z (m), by which the deformation opens the gap; NaN where nothing can touch."""
-        with np.errstate(invalid="ignore"):  # inf - NaN there
-            return np.asarray(solution.gap - self.initial_gap + solution.approach)
-
     def _contact_measures(self, solution: S, edges: ContactEdges) -> dict[str, float]:
         """Return load, approach and the size of the contact."""
         inside, edge = solution.zone > 0, edges.contact()
@@ -358,7 +345,7 @@ class NormalWindow(Window[NormalSolution]):
         self, solution: NormalSolution, before: NormalSolution | None, edges: ContactEdges
     ) -> dict[str, float]:
         return {
-            "elastic_energy": self._elastic_energy(solution),
+            "elastic_energy": elastic_energy(self.lattice, self.initial_gap, solution),
             "sweeps": solution.sweeps,
             "operator_applications": solution.operator_applications,
             "residual_normal": solution.residual_normal,

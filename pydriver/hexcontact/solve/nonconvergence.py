@@ -1,6 +1,6 @@
 """Says of a load step that did not converge which condition failed most, where, by how much, what to try.
 
-The residuals are those of docs/theory.md, section 7, node by node.
+The residuals are those of docs/theory/residuals.md, node by node.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.measures import nodal_residuals
 from ..errors import ConvergenceError
 from ..problem.loads import LEAST
 from ..result.history import RESIDUALS
@@ -23,12 +23,9 @@ if TYPE_CHECKING:
     from ..problem.loads import LoadStep
     from ..problem.problem import Problem
 
-Array = NDArray[np.float64]
-
 _NEAR_SLIDING = 0.99  # share of mu P from which full slip may carry a tangential load
 _SLIDING = 1.0 - 1e-6  # ... from which it has to
 _ROUNDING = 1e-11  # tolerance below which rounding errors may decide
-_LEAST_TRACTION = 1e-3  # without slip: the least traction that R_t refers to, over the largest pressure
 _SAME = 1e-3  # relative difference of a residual from that of the solver that still means the same state
 _LOST = "the last attempt lost all contact"
 _INFINITE = 1e100  # the core says so for an error relative to nothing
@@ -177,7 +174,8 @@ def _worst(
         return Worst(sign, value, what=_LOST)
     if sign not in ("R_n", "R_t"):
         return Worst(sign, value, what=_missed(sign, solution, values))
-    field = (_normal if sign == "R_n" else _tangential)(case, lattice, solution)
+    mu = case.friction_coefficient if case.frictional else 0.0
+    field = nodal_residuals(lattice, case.pair, mu, solution, tangential=sign == "R_t")
     row, col = (int(k) for k in np.unravel_index(int(np.argmax(field)), field.shape))
     if not math.isclose(field[row, col], value, rel_tol=_SAME):  # of another state than the one at hand
         return Worst(sign, value)
@@ -207,23 +205,6 @@ def _instead(name: str, carried: float, wanted: float, unit: str) -> str:
     )
 
 
-def _self_compliances(case: Problem, lattice: Lattice) -> tuple[float, float]:
-    """Return d_n and d_t (m/Pa): the displacement of a node under its own pyramid of unit traction."""
-    from ..core.influence import pyramid_kernels
-
-    kernels, spacing, pair = pyramid_kernels(0.0, 0.0), lattice.spacing, case.pair
-    normal = pair.lambda_1 * float(kernels.K1) * spacing
-    return normal, normal + pair.lambda_5 * float(kernels.Kxx) * spacing
-
-
-def _normal(case: Problem, lattice: Lattice, solution: NormalSolution | ContactState) -> Array:
-    """Return |p - max(0, p - g/d_n)|/p_max at the nodes."""
-    gap, known = solution.gap, np.isfinite(solution.gap)
-    pressure, (compliance, _) = solution.pressure, _self_compliances(case, lattice)
-    aim = np.maximum(0.0, pressure - np.where(known, gap, 0.0) / compliance)
-    return np.where(known, abs(pressure - aim), 0.0) / pressure.max()
-
-
 def _normal_fault(case: Problem, solution: NormalSolution | ContactState, row: int, col: int) -> str:
     pressure, gap = float(solution.pressure[row, col]), float(solution.gap[row, col])
     if pressure < 0:
@@ -231,25 +212,6 @@ def _normal_fault(case: Problem, solution: NormalSolution | ContactState, row: i
     if gap < 0:
         return f"the surfaces penetrate by {quantity(-gap, 'm')}"
     return f"there is a pressure of {quantity(pressure, 'Pa')} across a gap of {quantity(gap, 'm')}"
-
-
-def _tangential(case: Problem, lattice: Lattice, solution: Any) -> Array:
-    """Return |q - P(q - ds/d_t)|/tau at the nodes, P the projection on the cone."""
-    mu, (_, compliance) = case.friction_coefficient, _self_compliances(case, lattice)
-    pressure = np.maximum(solution.pressure, 0.0)
-    q_x, q_y = solution.traction_x, solution.traction_y
-    trial_x = q_x - solution.slip_increment_x / compliance
-    trial_y = q_y - solution.slip_increment_y / compliance
-    scale = mu * pressure.max()
-    share: Any = 1.0
-    if math.isinf(mu):
-        inside = pressure > 0
-        scale = max(np.hypot(q_x, q_y)[inside].max(), _LEAST_TRACTION * pressure.max())
-    else:
-        size = np.hypot(trial_x, trial_y)
-        share = np.minimum(1.0, mu * pressure / np.where(size > 0, size, 1.0))
-    missed = np.hypot(q_x - share * trial_x, q_y - share * trial_y)
-    return np.where(solution.pressure > 0, missed, 0.0) / (scale or 1.0)
 
 
 def _tangential_fault(case: Problem, solution: Any, row: int, col: int) -> str:

@@ -12,15 +12,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from pydantic import ValidationError
-
-from ..deck.faults import Source, deck_error
-from ..deck.model import problems_of
+from ..deck.faults import NOWHERE, deck_error
 from ..deck.tables import Load
 from ..deck.write import plain
 from ..errors import DeckError
 from ..problem.arguments import middle_of, with_radians
-from ..problem.loads import LoadStep, load_steps
+from ..problem.loads import History, LoadStep
 from ..problem.problem import Problem
 from ..result.layout import assemble
 from ..result.result import Result
@@ -99,6 +96,7 @@ class Session:
         self._log = Log()
         self._log.begun(case.title, case.planned_steps)
         self._loads: list[dict[str, Any]] = []  # entries of [[load]], once they are those of the script
+        self._history: History | None = None  # of these loads, where it is known
         self._driven = copy.copy(case)
         self._closed = False
         self._store: Store | None = None
@@ -216,31 +214,28 @@ class Session:
             If there is not enough memory or disk.
         """
         self._check_open()
-        entry = with_radians(
-            plain(
-                dict(
-                    normal_load=normal_load,
-                    approach=approach,
-                    tangential_load_x=tangential_load_x,
-                    shift_x=shift_x,
-                    tangential_load_y=tangential_load_y,
-                    shift_y=shift_y,
-                    torque=torque,
-                    twist=twist,
-                    steps=steps,
-                    label=label or None,
-                )
-            )
-        )
+        given = {
+            "normal_load": normal_load,
+            "approach": approach,
+            "tangential_load_x": tangential_load_x,
+            "shift_x": shift_x,
+            "tangential_load_y": tangential_load_y,
+            "shift_y": shift_y,
+            "torque": torque,
+            "twist": twist,
+            "steps": steps,
+            "label": label or None,
+        }
+        entry = with_radians(plain(given))
         before = self._loads if self._by_hand else self._loads_so_far()
-        targets = self._unrolled(before, entry)
+        history = self._unrolled(before, entry)
         if not self._by_hand:
             self._by_hand, self._loads, self._solving = True, before, None
             self._log.begun(self.case.title, 0)
-        self._driven.load_steps = targets
+        self._driven.load_steps = tuple(history.steps)
         segment = int(self._steps[-1].history["segment"]) if self._steps else 0
         done = len(self._steps)
-        for target in targets[-steps:]:
+        for target in history.steps[-steps:]:
             self._queue.append(dataclasses.replace(target, index=len(self._steps), segment=segment))
             if self._solving is None:
                 queued = iter(self._queue.popleft, None)
@@ -252,7 +247,7 @@ class Session:
                 self._queue.clear()
                 self._loads = [*self._loads, *self._resolved(self._steps[done:])]
                 raise
-        self._loads = [*self._loads, entry]
+        self._loads, self._history = [*self._loads, entry], history
         return self.step
 
     def back(self, steps: int = 1) -> None:
@@ -276,7 +271,7 @@ class Session:
         del self._steps[-steps:]
         self._solving = None
         if self._by_hand:
-            self._loads = self._resolved(self._steps)
+            self._loads, self._history = self._resolved(self._steps), None
             self._change(self._loads, len(self._steps))
 
     def _next_step(self, done: int = 0, loads: list[dict[str, Any]] | None = None) -> Step:
@@ -328,17 +323,18 @@ class Session:
             for step in steps
         ]
 
-    def _unrolled(self, before: Sequence[dict[str, Any]], entry: dict[str, Any]) -> tuple[LoadStep, ...]:
-        """Return the load steps of a history that ends with a new entry; DeckError if that is wrong."""
-        try:
-            new = Load.model_validate(entry)
-        except ValidationError as error:
-            raise deck_error(problems_of(error), Source()) from None
-        mu = self.case.friction_coefficient if self.case.frictional else None
-        targets, problems = load_steps([*map(Load.model_validate, before), new], mu)
-        if problems:
-            raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], Source())
-        return targets
+    def _unrolled(self, before: Sequence[dict[str, Any]], entry: dict[str, Any]) -> History:
+        """Return the history with a new entry; DeckError if that is wrong."""
+        new = Load.parse(entry, NOWHERE)
+        history, self._history = self._history, None  # until all steps of the entry are solved
+        if history is None:
+            history = History(self.case.friction_coefficient if self.case.frictional else None)
+            for load in before:
+                history.append(Load.model_validate(load))
+        history.append(new)
+        if problems := history.problems:
+            raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], NOWHERE)
+        return history
 
     def _change(self, loads: Sequence[dict[str, Any]], count: int) -> None:
         """Write these loads into the deck of the result, and the number of their steps."""

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._version import __version__
-from ..deck.series import LOADS
 from ..errors import DeckError, PathWarning
 from ..problem.overview import parameters_of
 from ..result.history import unasked_path
 from ..result.step import Step
-from . import nonconvergence
-from .adaptive import AdaptivePath
+from ..variables import LOADS
+from .adaptive import AdaptivePath, GivenPath
 from .events import Listener
 from .frictional import FrictionWindow
 from .frictionless import NormalWindow, Window
@@ -91,7 +90,10 @@ def steps(
     started, done = time.perf_counter(), len(before)
     _announce(case, lattice, done, listener)
     held = len(case.load_steps) if in_memory else 0
-    for step in _solved(case, window_type(case)(case, lattice, held, listener), before, targets):
+    kind: type[GivenPath] = AdaptivePath if case.adaptive and targets is None else GivenPath
+    path = kind(case, window_type(case)(case, lattice, held, listener), before)
+    targets = case.load_steps[path.position :] if targets is None else targets
+    for step in _solved(path, before, targets):
         case.check_contact(step.number, step.lattice, step.fields["zone"] > 0)
         yield step
         done = step.number
@@ -111,45 +113,21 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
     listener.said("resumed" if done else "begun", **values)
 
 
-def _solved(
-    case: Problem, window: Any, before: Sequence[Step], targets: Iterable[LoadStep] | None
-) -> Iterator[Step]:
-    """Solve step by step, from a window on; see `steps`."""
-    state: Any = window.restored(before[-1]) if before else None
-    adaptive = AdaptivePath(case, window, before) if case.adaptive and targets is None else None
+def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]) -> Iterator[Step]:
+    """Solve step by step; see `steps`."""
+    state = path.window.restored(before[-1]) if before else None
     segment, begun, reached_by_now = -1, _standing({}), _standing({})
     for step in before:
         if step.history["segment"] != segment + 1:
             segment, begun = int(step.history["segment"]) - 1, reached_by_now
         reached_by_now = _standing(step.history)
-    if targets is None:
-        targets = case.load_steps[adaptive.position if adaptive else len(before) :]
     for target in targets:
-        started = time.perf_counter()
         if target.segment != segment:
             segment, begun = target.segment, reached_by_now
-        if adaptive and target.ramp is not None:
-            for step, reached in adaptive.steps(state, target, begun):
-                _warn_of_path(case, step, state, window.listener)
-                yield step
-                state, reached_by_now = reached, _standing(step.history)
-            window = adaptive.window
-            continue
-        if adaptive:
-            target = adaptive.numbered(target)
-        values = target.values(begun)
-        # a step that reached the rim is solved again on a larger window, from where it began
-        while window.outgrown(reached := window.advance(state, target, values)):
-            smaller, window = window.lattice, window.grown(reached, target)
-            state = window.carried(state, smaller)
-        if not reached.converged:
-            raise nonconvergence.error(case, window.lattice, reached, target, values)
-        step = window.step(target, reached, state, started)
-        if adaptive:
-            adaptive.window, step = window, adaptive.given(step)
-        _warn_of_path(case, step, state, window.listener)
-        yield step
-        state, reached_by_now = reached, _standing(step.history)
+        for step, reached in path.steps(state, target, begun):
+            _warn_of_path(path.case, step, state, path.window.listener)
+            yield step
+            state, reached_by_now = reached, _standing(step.history)
 
 
 def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) -> None:

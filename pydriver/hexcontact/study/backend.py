@@ -83,7 +83,7 @@ class Backend:
 def arrived(
     outcomes: queue.Queue[Outcome | BaseException], count: int, cancel: threading.Event
 ) -> Iterator[Outcome]:
-    """Yield outcomes as they come, until there are so many or `cancel` is set."""
+    """Yield `count` outcomes as they come, fewer if `cancel` is set."""
     while count and not cancel.is_set():
         with contextlib.suppress(queue.Empty):
             outcome = outcomes.get(timeout=_POLL)

@@ -119,11 +119,11 @@ def _outcome(folder: StudyFolder, case: PlannedCase, done: bool) -> tuple[int, i
 
 
 def _coordinate(axis: Axis, dim: str, values: Sequence[Any]) -> Any:
-    told = [axis.coordinate(value) for value in values]
+    entries = [axis.coordinate(value) for value in values]
     attributes = {"long_name": axis.long_name or axis.key, "deck_key": axis.key}
-    if all(isinstance(value, float) for value in told):
-        return dim, np.array(told, dtype=float), {**attributes, "units": axis.units or "1"}
-    return dim, np.array([str(value) for value in told]), attributes
+    if all(isinstance(value, float) for value in entries):
+        return dim, np.array(entries, dtype=float), {**attributes, "units": axis.units or "1"}
+    return dim, np.array([str(value) for value in entries]), attributes
 
 
 def is_study(path: Path) -> bool:

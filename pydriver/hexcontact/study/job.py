@@ -76,7 +76,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
     Returns
     -------
     Outcome
-        Failures are told, not raised.
+        Failures are returned, not raised.
     """
     from ..case import Case
     from ..result.store import Store

@@ -306,6 +306,6 @@ def _refuse_namesakes(axes: Sequence[Axis], study: str) -> None:
 def _refuse_twins(axes: Sequence[Axis], study: str) -> None:
     """Refuse a dimension of the result that has a coordinate twice."""
     for axis in axes:
-        told = [axis.coordinate(value) for value in axis.values]
-        if twins := [value for value in told if told.count(value) > 1]:
+        entries = [axis.coordinate(value) for value in axis.values]
+        if twins := [value for value in entries if entries.count(value) > 1]:
             raise DeckError(f"{study}: parameter {axis.key}: has the value {shown(twins[0])} twice")

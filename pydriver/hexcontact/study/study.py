@@ -25,13 +25,13 @@ from ..errors import DeckError
 from ..solve.events import Listener, Listeners
 from ..solve.log import Log
 from ..text import quantity
-from . import plan as study_plan
 from .backend import BACKENDS, Backend
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
+from .collect import STUDY_VERSION, collect, refuse_foreign, write
 from .folder import StudyFolder
 from .job import Job, Outcome, solve_case
-from .plan import Plan, PlannedCase
+from .plan import Plan, PlannedCase, plan
 from .tables import StudyFile
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ class Study:
         whole = assemble(base, source.text, source, Path(source.name).parent)
         if whole.problems:
             raise deck_error(whole.problems, whole.source)
-        self.plan: Plan = study_plan.plan(file, whole.data, whole.source, name, check)
+        self.plan: Plan = plan(file, whole.data, whole.source, name, check)
         self.output = Path(output)
         self.folder = StudyFolder(self.output)
 
@@ -200,8 +200,6 @@ class Study:
         ResourceError
             If the result cannot be written.
         """
-        from .collect import refuse_foreign
-
         listener, cancel = Listeners(Log(), listener or Listener()), cancel or threading.Event()
         refuse_foreign(self.output)
         lock = self.folder.lock()
@@ -300,21 +298,17 @@ class Study:
         DeckError, ResourceError
             If it cannot be written.
         """
-        from . import collect as study_collect
-
         self.folder.enter(self.plan)
         attributes = {
             "title": self.title,
             "source": f"hexcontact {__version__}",
             "hexcontact_version": __version__,
-            "study_version": study_collect.STUDY_VERSION,
+            "study_version": STUDY_VERSION,
             "combine": self.file.combine,
             "study": json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str),
         }
-        dataset = study_collect.collect(
-            self.plan, self.folder, self.file.combine, self.file.steps, attributes
-        )
-        study_collect.write(dataset, self.output)
+        dataset = collect(self.plan, self.folder, self.file.combine, self.file.steps, attributes)
+        write(dataset, self.output)
         return dataset
 
     def __repr__(self) -> str:

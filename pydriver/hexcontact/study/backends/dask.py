@@ -75,7 +75,7 @@ class DaskPool(Backend):
     Raises
     ------
     DeckError
-        If Dask is not installed, nobody answers, or the cluster refuses its options.
+        If Dask is not installed, no scheduler answers, or the cluster refuses its options.
     """
 
     def __init__(self, settings: Dask, cases: int) -> None:
@@ -85,7 +85,7 @@ class DaskPool(Backend):
         if where.cluster is not None:
             self._cluster = _started(where)
         try:
-            # nobody else's: xarray would take its locks from the default client, even from one that failed
+            # not the default client, from which xarray would take its locks, even after it failed
             self._client = distributed.Client(
                 self._cluster or where.address, timeout="10s", set_as_default=False
             )

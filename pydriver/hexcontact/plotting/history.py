@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, line_of
+from ..result.history import LOADS_AND_MOTIONS, worth_showing
 from ..result.view import dataset_of, scaled, title_of
-from .style import COMPUTED, EXACT, GUIDE, STYLE, new_figure, set_title
+from ..variables import PANELS, VARIABLES, spelled
+from .registry import figure
+from .style import COMPUTED, EXACT, GUIDE, new_figure, set_title
 
 if TYPE_CHECKING:
     import xarray
@@ -23,30 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Panels of the history: quantities of one unit share a panel. A panel whose quantities stay 0 is left out.
-HISTORY = (
-    ("normal_load",),
-    ("tangential_load_x", "tangential_load_y"),
-    ("torque",),
-    ("approach",),
-    ("shift_x", "shift_y"),
-    ("twist",),
-    ("contact_area", "stick_area"),
-    ("max_pressure",),
-    ("max_traction",),
-    ("dissipated_energy",),
-)
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
-# A motion or load is shown if it is not tiny beside this quantity, times this power of the contact radius.
-_BESIDE = {
-    "tangential_load_x": ("normal_load", 0),
-    "tangential_load_y": ("normal_load", 0),
-    "torque": ("normal_load", 1),
-    "shift_x": ("approach", 0),
-    "shift_y": ("approach", 0),
-    "twist": ("approach", -1),
-}
-_TINY = 1e-4
 _MANY = 60  # steps that are too many for a marker each
 _BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as a band around
 
@@ -57,38 +36,70 @@ def _known(dataset: xarray.Dataset) -> list[str]:
     ]
 
 
-def _values(dataset: xarray.Dataset, name: str) -> Array:
+def values_of(dataset: xarray.Dataset, name: str) -> Array:
+    """Return the history of a quantity."""
     return np.asarray(dataset[name].values, dtype=float)
 
 
+def vectors_of(dataset: xarray.Dataset, name: str) -> Array:
+    """Return the history of a vector, its components in rows."""
+    return np.stack([values_of(dataset, f"{name}_{axis}") for axis in "xy"])
+
+
 def _largest(dataset: xarray.Dataset, names: Sequence[str]) -> float:
-    values = np.concatenate([_values(dataset, name) for name in names])
+    values = np.concatenate([values_of(dataset, name) for name in names])
     finite = values[np.isfinite(values)]
     return float(np.abs(finite).max()) if finite.size else 0.0
 
 
-def panels_of(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
+def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """Return the quantities that share a panel, and what curves are called there, by the title of the panel.
+
+    Loads and motions that are no more than noise, and quantities that stay 0, have no curve. Areas are those
+    to the edge between the nodes, where the histories have them.
+
+    Parameters
+    ----------
+    histories : sequence of mapping
+        History of each step.
+    """
+    noise = LOADS_AND_MOTIONS.keys() - worth_showing(histories)
+    panels: dict[str, dict[str, str]] = {}
+    for title, names in PANELS.items():
+        shown = [name for name in fitted(histories[0], names) if name in histories[0] and name not in noise]
+        several = len(names) > 1
+        curves = {
+            name: (VARIABLES[name].symbol or _apart(name.removesuffix("_fit"), names)) if several else ""
+            for name in shown
+            if peak(name, histories) > 0.0
+        }
+        if curves:
+            panels[title] = curves
+    return panels
+
+
+def peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
+    """Return the largest magnitude of a quantity."""
+    values = np.abs([float(history[name]) for history in histories])
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def fitted(known: Container[Any], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of areas or radii to the edge between the nodes, where all of them are known."""
+    fits = tuple(f"{name}_fit" for name in names)
+    return fits if all(name in known for name in fits) else names
+
+
+def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
     """Return the quantities that a history shows by default, those of a panel together."""
     known = _known(dataset)
-    radius = _largest(dataset, ["contact_radius"]) if "contact_radius" in known else 1.0
-
-    def shown(name: str) -> bool:
-        if name not in known:
-            return False
-        beside, power = _BESIDE.get(name, (name, 0))
-        scale = _largest(dataset, [beside]) * (radius or 1.0) ** power
-        return beside == name or _largest(dataset, [name]) > _TINY * scale
-
-    panels = (tuple(filter(shown, names)) for names in (HISTORY if "stick_area" in known else FRICTIONLESS))
-    return [fitted(dataset, names) for names in panels if names]
+    if "stick_area" not in known:
+        return [fitted(known, names) for names in FRICTIONLESS if names[0] in known]
+    histories = dataset[known].reset_coords(drop=True).to_dataframe().to_dict("records")
+    return [tuple(curves) for curves in panels_of(histories).values()]
 
 
-def fitted(dataset: xarray.Dataset, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of areas or radii to the edge between the nodes, where the result has them all."""
-    fits = tuple(f"{name}_fit" for name in names)
-    return fits if all(name in dataset for name in fits) else names
-
-
+@figure("history", "loads, motions, areas, p_max by step or over a load")
 def history(
     result: Result | xarray.Dataset, quantities: Sequence[str] | None = None, over: str = "step"
 ) -> Figure:
@@ -99,7 +110,7 @@ def history(
     result : Result or xarray.Dataset
         What a run returned, or `open_result` read.
     quantities : sequence of str, optional
-        Names of the history variables, a panel each; by default those of `HISTORY` that are there.
+        Names of the history variables, a panel each; by default those that are more than noise.
     over : str
         What is along the axis: "step", or a history variable such as "tangential_load_x".
 
@@ -113,27 +124,26 @@ def history(
         If a name is not a history variable of the result.
     """
     dataset = dataset_of(result)
-    panels = panels_of(dataset) if quantities is None else [(name,) for name in quantities]
+    panels = _chosen(dataset) if quantities is None else [(name,) for name in quantities]
     known = _known(dataset)
     wanted = [*(name for names in panels for name in names), *([over] if over != "step" else [])]
     if unknown := [name for name in wanted if name not in known]:
         raise ValueError(f"no history of {', '.join(unknown)} in this result; there are {', '.join(known)}")
     panels = [names for names in panels if names != (over,)]
-    with matplotlib.rc_context(STYLE):
-        columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
-        rows = -(-len(panels) // columns)
-        figure = new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
-        grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        empty = grid.size - len(panels)  # at the end of the first row
-        slots = [*grid[0, : columns - empty], *grid[1:].flat]
-        for axes in grid[0, columns - empty :]:
-            axes.set_visible(False)
-        for names, axes in zip(panels, slots, strict=True):
-            draw_history(axes, dataset, names, over)
-        for axes in grid[:-1].flat:
-            axes.set_xlabel("")
-        set_title(figure, title_of(dataset))
-        return figure
+    columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
+    rows = -(-len(panels) // columns)
+    canvas = new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
+    grid = canvas.subplots(rows, columns, sharex=True, squeeze=False)
+    empty = grid.size - len(panels)  # at the end of the first row
+    slots = [*grid[0, : columns - empty], *grid[1:].flat]
+    for axes in grid[0, columns - empty :]:
+        axes.set_visible(False)
+    for names, axes in zip(panels, slots, strict=True):
+        draw_history(axes, dataset, names, over)
+    for axes in grid[:-1].flat:
+        axes.set_xlabel("")
+    set_title(canvas, title_of(dataset))
+    return canvas
 
 
 def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over: str = "step") -> None:
@@ -142,14 +152,14 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
     place, label = dataset["step"].values, "load step"
     if over != "step":
         along, length = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
-        place, label = _values(dataset, over) * along, _titled(over, length)
+        place, label = values_of(dataset, over) * along, _titled(over, length)
     marker = "o" if place.size <= _MANY else ""
     lines = (COMPUTED, "-", marker), (EXACT, "--", "s" if marker else "")
     for name, (color, dash, mark) in zip(names, lines, strict=False):
-        values = _values(dataset, name) * factor
+        values = values_of(dataset, name) * factor
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
         if (bound := _BOUNDS.get(name, "")) in dataset:
-            around = _values(dataset, bound) * factor
+            around = values_of(dataset, bound) * factor
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
     axes.set(xlabel=label, ylabel=_titled(names[0] if len(names) == 1 else _common(names), unit))
@@ -164,7 +174,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
 
 
 def _titled(name: str, unit: str) -> str:
-    return name.removesuffix("_fit").replace("_", " ") + (f" ({unit})" if unit else "")
+    return spelled(name.removesuffix("_fit")) + (f" ({unit})" if unit else "")
 
 
 def _common(names: Sequence[str]) -> str:
@@ -182,6 +192,7 @@ def _apart(name: str, names: Sequence[str]) -> str:
 # --- load against motion --------------------------------------------------------------------------
 
 
+@figure("loop", "tangential load against shift", needs="tangential load")
 def loop(result: Result | xarray.Dataset) -> Figure:
     """Draw the tangential load against the shift; for similar spheres the closed curve, too.
 
@@ -204,38 +215,35 @@ def loop(result: Result | xarray.Dataset) -> Figure:
     dataset = dataset_of(result)
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
         raise ValueError("a contact without friction has no tangential load")
-    load, shift = (
-        np.stack([_values(dataset, f"{name}_{axis}") for axis in "xy"])
-        for name in ("tangential_load", "shift")
-    )
+    load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
     direction = line_of(load, 1e-6 * _largest(dataset, ["normal_load"]), np.inf)
     if direction is None:
         raise ValueError("there is no tangential load in this result")
     index = {(1.0, 0.0): "_x", (0.0, 1.0): "_y"}.get((round(direction[0], 6), round(direction[1], 6)), "")
     beside = "" if index else f" along {np.degrees(np.arctan2(direction[1], direction[0])):.3g}°"
-    with matplotlib.rc_context(STYLE):
-        figure = new_figure(4.6, 3.8)
-        axes = figure.add_subplot()
-        to_force = _draw_loop(
-            axes,
-            (np.array(direction) @ shift, f"shift $\\Delta{index}$" + beside, "m"),
-            (np.array(direction) @ load, f"tangential load $Q{index}$" + beside, "N"),
-            ClosedForms(dataset).shear_loop(),
-            "Cattaneo–Mindlin,\nMindlin–Deresiewicz",
-        )
-        bound = float(dataset.attrs.get("friction_coefficient", np.inf)) * _values(dataset, "normal_load")[-1]
-        low, high = axes.get_ylim()
-        room = 0.04 * (high - low)
-        for level in (-bound * to_force, bound * to_force):
-            if 1.3 * low < level < 1.3 * high:
-                axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
-                low, high = min(low, level - room), max(high, level + room)
-        axes.set_ylim(low, high)
-        axes.legend(*_once(axes))
-        set_title(figure, title_of(dataset))
-        return figure
+    canvas = new_figure(4.6, 3.8)
+    axes = canvas.add_subplot()
+    to_force = _draw_loop(
+        axes,
+        (np.array(direction) @ shift, f"shift $\\Delta{index}$" + beside, "m"),
+        (np.array(direction) @ load, f"tangential load $Q{index}$" + beside, "N"),
+        ClosedForms(dataset).shear_loop(),
+        "Cattaneo–Mindlin,\nMindlin–Deresiewicz",
+    )
+    bound = float(dataset.attrs.get("friction_coefficient", np.inf)) * values_of(dataset, "normal_load")[-1]
+    low, high = axes.get_ylim()
+    room = 0.04 * (high - low)
+    for level in (-bound * to_force, bound * to_force):
+        if 1.3 * low < level < 1.3 * high:
+            axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
+            low, high = min(low, level - room), max(high, level + room)
+    axes.set_ylim(low, high)
+    axes.legend(*_once(axes))
+    set_title(canvas, title_of(dataset))
+    return canvas
 
 
+@figure("torsion", "torque against twist", needs="torque")
 def torsion(result: Result | xarray.Dataset) -> Figure:
     """Draw the torque against the twist over the load steps; for similar spheres Lubkin's curve, too.
 
@@ -254,21 +262,20 @@ def torsion(result: Result | xarray.Dataset) -> Figure:
         If there is no torque in this result.
     """
     dataset = dataset_of(result)
-    if "twist" not in dataset or not any("torque" in names for names in panels_of(dataset)):
+    if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise ValueError("there is no torque in this result")
-    with matplotlib.rc_context(STYLE):
-        figure = new_figure(4.6, 3.8)
-        axes = figure.add_subplot()
-        _draw_loop(
-            axes,
-            (_values(dataset, "twist"), r"twist $\vartheta$", "rad"),
-            (_values(dataset, "torque"), "torque $M_z$", "N m"),
-            ClosedForms(dataset).torsion_loop(),
-            "Lubkin",
-        )
-        axes.legend()
-        set_title(figure, title_of(dataset))
-        return figure
+    canvas = new_figure(4.6, 3.8)
+    axes = canvas.add_subplot()
+    _draw_loop(
+        axes,
+        (values_of(dataset, "twist"), r"twist $\vartheta$", "rad"),
+        (values_of(dataset, "torque"), "torque $M_z$", "N m"),
+        ClosedForms(dataset).torsion_loop(),
+        "Lubkin",
+    )
+    axes.legend()
+    set_title(canvas, title_of(dataset))
+    return canvas
 
 
 Axis = tuple[Array, str, str]  # values, name and unit of what is along an axis

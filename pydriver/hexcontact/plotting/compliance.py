@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..analytic.friction import MindlinContact
+from ..analytic.hertz_gap import QuadraticGap
 from ..analytic.shear import CIRCULAR
-from ..result.view import QuadraticGap, as_list, dataset_of
-from .style import COMPUTED, EXACT, GUIDE, STYLE, THIRD, new_figure, set_title
+from ..result.view import as_list, dataset_of
+from .history import values_of, vectors_of
+from .registry import SEVERAL_RUNS, figure
+from .style import COMPUTED, EXACT, GUIDE, THIRD, new_figure, set_title
 
 if TYPE_CHECKING:
     import xarray
@@ -20,10 +22,6 @@ if TYPE_CHECKING:
     from ..result.view import Results
 
 Array = NDArray[np.float64]
-
-
-def _values(dataset: xarray.Dataset, name: str) -> Array:
-    return np.asarray(dataset[name].values, dtype=float)
 
 
 def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
@@ -47,11 +45,8 @@ def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
         or gap is None
     ):
         raise ValueError("the tangential compliance is that of spheres with friction")
-    normal = _values(dataset, "normal_load")
-    load, shift = (
-        np.stack([_values(dataset, f"{name}_{axis}") for axis in "xy"])
-        for name in ("tangential_load", "shift")
-    )
+    normal = values_of(dataset, "normal_load")
+    load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
     begun = np.flatnonzero(np.hypot(*load) > 1e-6 * friction * normal)
     if (
         not begun.size
@@ -75,6 +70,7 @@ def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
     return moved / float(mindlin.shift(size)), size / mindlin.sliding_load
 
 
+@figure("compliance", "initial tangential compliance of some files against beta", needs=SEVERAL_RUNS)
 def compliance(results: Results) -> Figure:
     """Draw the initial tangential compliance of spheres against Dundurs' beta, a point for each result.
 
@@ -100,20 +96,19 @@ def compliance(results: Results) -> Figure:
         shares.append(share)
         key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
         series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
-    with matplotlib.rc_context(STYLE):
-        figure = new_figure(4.6, 3.6)
-        axes = figure.add_subplot()
-        axes.axhline(1.0, color=GUIDE, lw=0.8, ls=":", label="Mindlin")
-        colors = dict(zip(sorted({mu for mu, _ in series}), (COMPUTED, EXACT, THIRD), strict=False))
-        for (mu, coupling), points in sorted(series.items()):
-            beta, ratio_of = np.array(sorted(points)).T
-            full = coupling == "full"
-            look: dict[str, Any] = {"marker": "o"} if full else {"marker": "s", "ls": "--", "mfc": "none"}
-            label = f"$\\mu$ = {mu:g}" + ("" if full else f", {coupling.title()}")
-            axes.plot(beta, ratio_of, color=colors.get(mu, "black"), ms=4, lw=0.9, label=label, **look)
-        axes.set(xlabel=r"$|\beta|$", ylabel=r"initial compliance $\Delta/\Delta_\mathrm{Mindlin}$")
-        axes.legend()
-        low, high = min(shares), max(shares)
-        at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
-        set_title(figure, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}")
-        return figure
+    canvas = new_figure(4.6, 3.6)
+    axes = canvas.add_subplot()
+    axes.axhline(1.0, color=GUIDE, lw=0.8, ls=":", label="Mindlin")
+    colors = dict(zip(sorted({mu for mu, _ in series}), (COMPUTED, EXACT, THIRD), strict=False))
+    for (mu, coupling), points in sorted(series.items()):
+        beta, ratio_of = np.array(sorted(points)).T
+        full = coupling == "full"
+        look: dict[str, Any] = {"marker": "o"} if full else {"marker": "s", "ls": "--", "mfc": "none"}
+        label = f"$\\mu$ = {mu:g}" + ("" if full else f", {coupling.title()}")
+        axes.plot(beta, ratio_of, color=colors.get(mu, "black"), ms=4, lw=0.9, label=label, **look)
+    axes.set(xlabel=r"$|\beta|$", ylabel=r"initial compliance $\Delta/\Delta_\mathrm{Mindlin}$")
+    axes.legend()
+    low, high = min(shares), max(shares)
+    at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
+    set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}")
+    return canvas

@@ -1,0 +1,231 @@
+!> The nodes about the edge of a zone, in one list, and operations on values at them.
+!>
+!> Values at the nodes of a band are vectors. Where only some of them are known, a mask goes with them.
+module hc_edge_band
+  use hc_precision, only: wp
+  use hc_lattice, only: equilateral_basis, neighbors
+  use hc_zone_estimators, only: is_boundary
+  implicit none
+  private
+
+  public :: edge_band_t, new_edge_band, to_neighbors
+
+  !> Number of neighbors of a node.
+  integer, parameter :: n_beside = size(neighbors, 2)
+  !> Steps over which nodes next to the edge get a slope from nodes that have one.
+  integer, parameter :: far = 3
+  !> Nodes outside the window that places are looked up for.
+  integer, parameter :: margin = far + 2
+
+  !> Nodes about an edge.
+  type :: edge_band_t
+    !> Number of nodes
+    integer :: n = 0
+    !> Column and row of each in the window, counted from 1; they may lie outside it (2, n)
+    integer, allocatable :: node(:, :)
+    !> Number in the list of each node of the window and `margin` nodes about it; 0: it is not in the band
+    integer, allocatable :: place(:, :)
+    !> Numbers in the list of the six neighbors; 0: they are not in the band (6, n)
+    integer, allocatable :: beside(:, :)
+  contains
+    !> Values of a field at the nodes
+    procedure :: values_of
+    !> Which of the nodes are in a zone of the window
+    procedure :: part_of
+    !> Nodes whose neighbors are all in a part
+    procedure :: surrounded
+    !> Nodes that have a neighbor in a part
+    procedure :: next_to
+    !> Gradient in the plane, per spacing
+    procedure :: gradient
+    !> Values for nodes that have none, from the nearest that have one
+    procedure :: extend
+  end type edge_band_t
+
+contains
+
+  !> Position of the six neighbors, in spacings.
+  pure function to_neighbors() result(to)
+    !> x and y of each (2, 6)
+    real(wp) :: to(2, n_beside)
+    integer :: k
+
+    associate (basis => equilateral_basis(1.0_wp))
+      do k = 1, n_beside
+        to(:, k) = matmul(basis, real(neighbors(:, k), wp))
+      end do
+    end associate
+  end function to_neighbors
+
+  !> The band about the edge of a zone: nodes at most `far` + 1 steps from the boundary nodes.
+  pure subroutine new_edge_band(band, zone)
+    !> Band to be set up
+    type(edge_band_t), intent(out) :: band
+    !> Nodes of the zone (n_col, n_row)
+    logical, intent(in) :: zone(:, :)
+    integer :: col, row, k, step, last
+
+    allocate (band%place(1 - margin:size(zone, 1) + margin, 1 - margin:size(zone, 2) + margin), source=0)
+    allocate (band%node(2, 2*sum(shape(zone))))
+    do row = 1, size(zone, 2)
+      do col = 1, size(zone, 1)
+        if (zone(col, row)) then
+          if (is_boundary(zone, col, row)) call append(band, [col, row])
+        end if
+      end do
+    end do
+    last = 0
+    do step = 1, far + 1
+      associate (first => last + 1)
+        last = band%n
+        do k = first, last
+          call append_neighbors(band, k)
+        end do
+      end associate
+    end do
+    band%node = band%node(:, :band%n)
+    allocate (band%beside(n_beside, band%n))
+    do k = 1, band%n
+      do step = 1, n_beside
+        associate (there => band%node(:, k) + neighbors(:, step))
+          band%beside(step, k) = band%place(there(1), there(2))
+        end associate
+      end do
+    end do
+  end subroutine new_edge_band
+
+  !> Add the neighbors of a node to a band that does not have them.
+  pure subroutine append_neighbors(band, k)
+    !> Band
+    type(edge_band_t), intent(inout) :: band
+    !> Number of the node
+    integer, intent(in) :: k
+    integer :: j, there(2)
+
+    do j = 1, n_beside
+      there = band%node(:, k) + neighbors(:, j)
+      if (band%place(there(1), there(2)) == 0) call append(band, there)
+    end do
+  end subroutine append_neighbors
+
+  !> Add a node to a band.
+  pure subroutine append(band, node)
+    !> Band
+    type(edge_band_t), intent(inout) :: band
+    !> Column and row
+    integer, intent(in) :: node(2)
+    integer, allocatable :: longer(:, :)
+
+    if (band%n == size(band%node, 2)) then
+      allocate (longer(2, 2*band%n))
+      longer(:, :band%n) = band%node
+      call move_alloc(longer, band%node)
+    end if
+    band%n = band%n + 1
+    band%node(:, band%n) = node
+    band%place(node(1), node(2)) = band%n
+  end subroutine append
+
+  !> Values of a field at the nodes of a band; 0 outside the window.
+  pure function values_of(self, field) result(values)
+    class(edge_band_t), intent(in) :: self
+    !> Field over the window (n_col, n_row)
+    real(wp), intent(in) :: field(:, :)
+    real(wp) :: values(self%n)
+    integer :: k
+
+    values = 0.0_wp
+    do k = 1, self%n
+      associate (at => self%node(:, k))
+        if (all(at >= 1 .and. at <= shape(field))) values(k) = field(at(1), at(2))
+      end associate
+    end do
+  end function values_of
+
+  !> Which nodes of a band are in a zone; those outside the window are not.
+  pure function part_of(self, zone) result(part)
+    class(edge_band_t), intent(in) :: self
+    !> Nodes of the zone (n_col, n_row)
+    logical, intent(in) :: zone(:, :)
+    logical :: part(self%n)
+    integer :: k
+
+    part = .false.
+    do k = 1, self%n
+      associate (at => self%node(:, k))
+        if (all(at >= 1 .and. at <= shape(zone))) part(k) = zone(at(1), at(2))
+      end associate
+    end do
+  end function part_of
+
+  !> Nodes of a part of a band whose neighbors are in it, too.
+  pure function surrounded(self, part) result(whole)
+    class(edge_band_t), intent(in) :: self
+    !> Nodes of the part
+    logical, intent(in) :: part(:)
+    logical :: whole(self%n)
+    integer :: k
+
+    do k = 1, self%n
+      whole(k) = part(k) .and. all(self%beside(:, k) > 0)
+      if (whole(k)) whole(k) = all(part(self%beside(:, k)))
+    end do
+  end function surrounded
+
+  !> Nodes of a band that have a neighbor in a part of it.
+  pure function next_to(self, part) result(beside)
+    class(edge_band_t), intent(in) :: self
+    !> Nodes of the part
+    logical, intent(in) :: part(:)
+    logical :: beside(self%n)
+    integer :: k
+
+    do k = 1, self%n
+      associate (around => self%beside(:, k))
+        beside(k) = any(part(pack(around, around > 0)))
+      end associate
+    end do
+  end function next_to
+
+  !> Gradient of values along x and y, per spacing: the mean slope along the three lines of nodes.
+  pure function gradient(self, values, part) result(slopes)
+    class(edge_band_t), intent(in) :: self
+    !> Values at the nodes
+    real(wp), intent(in) :: values(:)
+    !> Nodes where it is found; elsewhere, and at the rim of the band, it is 0
+    logical, intent(in) :: part(:)
+    real(wp) :: slopes(2, self%n), to(2, n_beside)
+    integer :: k
+
+    to = to_neighbors()/3.0_wp
+    slopes = 0.0_wp
+    do k = 1, self%n
+      if (part(k) .and. all(self%beside(:, k) > 0)) slopes(:, k) = matmul(to, values(self%beside(:, k)))
+    end do
+  end function gradient
+
+  !> Fill in what is not known with the mean of the neighbors, from the nearest nodes on.
+  pure subroutine extend(self, values, known)
+    class(edge_band_t), intent(in) :: self
+    !> Values at the nodes
+    real(wp), intent(inout) :: values(:)
+    !> Nodes that have a value
+    logical, intent(inout) :: known(:)
+    logical :: had(self%n), beside_has(n_beside)
+    integer :: k, step
+
+    do step = 1, far
+      had = known
+      do k = 1, self%n
+        if (had(k)) cycle
+        associate (around => self%beside(:, k))
+          beside_has = around > 0
+          where (beside_has) beside_has = had(max(around, 1))
+          known(k) = any(beside_has)
+          if (known(k)) values(k) = sum(values(pack(around, beside_has)))/count(beside_has)
+        end associate
+      end do
+    end do
+  end subroutine extend
+
+end module hc_edge_band

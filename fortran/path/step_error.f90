@@ -1,0 +1,173 @@
+!> How much of a solution depends on the size of the load steps, measured on two that differ in it.
+!>
+!> One path goes through a load history in load steps, another beside it in steps of half the size; they never meet. Both
+!> are wrong by something of the first order in the size, so that what the halves change is what is still wrong with them.
+!>
+!> Equations: docs/theory/step_control.md, (S1).
+module hc_step_error
+  use hc_precision, only: wp
+  use hc_lattice, only: lattice_t
+  use hc_contact_state, only: contact_state_t, separated, slip, stick
+  use hc_friction_law, only: friction_law_t
+  use hc_contact_residuals, only: least_traction
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
+  implicit none
+  private
+
+  public :: step_change_t, compare_halves, stick_edge_of, shear_free
+
+  !> Spacings by which single rings of nodes that enter move the edge of the stick area.
+  real(wp), parameter :: ring = 0.7_wp
+  !> Multiple of the share of the edge at which nodes entered or left along which it may have moved.
+  real(wp), parameter :: entering = 5.0_wp
+  !> Spacings in the radius of a contact below which the lattice alone says where it sticks.
+  real(wp), parameter :: small_radius = 3.0_wp
+  !> Largest gain.
+  real(wp), parameter :: most_gain = 10.0_wp
+  !> Shear tractions, over the largest pressure, that are rounding errors.
+  real(wp), parameter :: no_shear = 1.0e-12_wp
+
+  !> What the halves of a load step change.
+  type :: step_change_t
+    !> Change of the stick area, over the largest contact area
+    real(wp) :: stick = 0.0_wp
+    !> Change of the shear tractions, over what friction can carry
+    real(wp) :: traction = 0.0_wp
+    !> The part of it that this load step added
+    real(wp) :: added = 0.0_wp
+    !> How far entering rings of nodes may move the stick area, whatever the steps, over the largest contact area
+    real(wp) :: lattice = 0.0_wp
+    !> Change of the stick area over that of the tractions, in these units, during the second half
+    real(wp) :: gain = 1.0_wp
+  end type step_change_t
+
+contains
+
+  !> Compare the two solutions at the end of a load step.
+  pure subroutine compare_halves(lattice, candidate, friction, whole, half, halves, whole_before, halves_before, area, change)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Friction law
+    class(friction_law_t), intent(in) :: friction
+    !> End of the path in whole steps, middle and end of the one in halves
+    type(contact_state_t), intent(in) :: whole, half, halves
+    !> Both paths at the beginning of the step
+    type(contact_state_t), intent(in) :: whole_before, halves_before
+    !> Largest contact area of the history [m^2]
+    real(wp), intent(in) :: area
+    !> What the halves change
+    type(step_change_t), intent(out) :: change
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: contact, sticking
+    real(wp) :: carried, scale, grown, loaded
+    integer :: entered
+
+    associate (spacing => lattice%spacing())
+      call edges_of(lattice, candidate, halves, edges)
+      contact = edges%contact_edge()
+      sticking = stick_edge_of(edges, friction, halves)
+      entered = count((halves%zone /= separated) .neqv. (halves_before%zone /= separated))
+      if (contact%radius() < small_radius*spacing) then
+        change%lattice = contact%area/area
+      else if (any(whole%zone == slip) .or. any(half%zone == slip) .or. any(halves%zone == slip)) then
+        change%lattice = ring*spacing*sticking%length()/area &
+                         *min(1.0_wp, entering*entered*spacing/max(contact%length(), spacing))
+      end if
+
+      if (friction%is_bounded()) then
+        carried = sum(bounds(friction, halves))
+      else
+        carried = max(sum(shear(halves)), least_traction*sum(halves%pressure))
+      end if
+      scale = 0.0_wp
+      if (carried > 0.0_wp) scale = min(1.0_wp, contact%area/area)/carried
+      change%traction = scale*sum(norm2(whole%traction - halves%traction, dim=3))
+      change%added = scale*sum(norm2(whole%traction - halves%traction - (whole_before%traction - halves_before%traction), dim=3))
+    end associate
+
+    grown = abs(sticking%area - stick_area(lattice, candidate, friction, half))/area
+    loaded = scale*sum(norm2(half%traction - halves%traction, dim=3))
+    if (loaded > 0.0_wp) change%gain = min(max(1.0_wp, grown/loaded), most_gain)
+    change%stick = (sticking%area - stick_area(lattice, candidate, friction, whole))/area
+  end subroutine compare_halves
+
+  !> A path of states without shear tractions has no history.
+  pure logical function shear_free(state)
+    !> State
+    type(contact_state_t), intent(in) :: state
+    shear_free = maxval(shear(state)) <= no_shear*max(maxval(state%pressure), tiny(1.0_wp))
+  end function shear_free
+
+  !> The edges of a contact at the end of a load step.
+  pure subroutine edges_of(lattice, candidate, state, edges)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> State
+    type(contact_state_t), intent(in) :: state
+    !> Its edges
+    type(contact_edges_t), intent(out) :: edges
+    call new_contact_edges(edges, lattice, state%pressure, state%gap, state%zone /= separated, candidate)
+  end subroutine edges_of
+
+  !> The edge of the stick area of a state.
+  pure function stick_edge_of(edges, friction, state) result(edge)
+    !> Edges of the contact
+    type(contact_edges_t), intent(in) :: edges
+    !> Friction law
+    class(friction_law_t), intent(in) :: friction
+    !> State
+    type(contact_state_t), intent(in) :: state
+    type(zone_edge_t) :: edge
+    real(wp), allocatable :: reserve(:, :)
+
+    ! without slip the reserve is not looked at
+    allocate (reserve, source=0.0_wp*state%pressure)
+    if (friction%is_bounded()) reserve = bounds(friction, state) - shear(state)
+    edge = edges%stick_edge(state%zone == stick, reserve)
+  end function stick_edge_of
+
+  !> Stick area of a state [m^2].
+  pure real(wp) function stick_area(lattice, candidate, friction, state)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Friction law
+    class(friction_law_t), intent(in) :: friction
+    !> State
+    type(contact_state_t), intent(in) :: state
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: edge
+
+    call edges_of(lattice, candidate, state, edges)
+    edge = stick_edge_of(edges, friction, state)
+    stick_area = edge%area
+  end function stick_area
+
+  !> Largest traction that friction allows at each node [Pa].
+  pure function bounds(friction, state) result(bound)
+    !> Friction law
+    class(friction_law_t), intent(in) :: friction
+    !> State
+    type(contact_state_t), intent(in) :: state
+    real(wp) :: bound(size(state%pressure, 1), size(state%pressure, 2))
+    integer :: row
+
+    do row = 1, size(bound, 2)
+      call friction%find_bounds((row - 1)*size(bound, 1) + 1, state%pressure(:, row), bound(:, row))
+    end do
+  end function bounds
+
+  !> Magnitude of the shear tractions [Pa].
+  pure function shear(state)
+    !> State
+    type(contact_state_t), intent(in) :: state
+    real(wp) :: shear(size(state%traction, 1), size(state%traction, 2))
+    shear = hypot(state%traction(:, :, 1), state%traction(:, :, 2))
+  end function shear
+
+end module hc_step_error

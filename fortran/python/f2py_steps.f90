@@ -1,0 +1,175 @@
+!> Adaptive load steps for Python: flat procedures for f2py, no mathematics.
+!>
+!> A control is its six numbers, a change its five, an attempt its five, in the order of the types of the core.
+module hc_f2py_steps
+  use iso_c_binding, only: c_double, c_int
+  use hc_error, only: error_t
+  use hc_f2py_handles, only: report, friction_of
+  use hc_lattice, only: lattice_t, new_lattice
+  use hc_contact_state, only: contact_state_t
+  use hc_step_error, only: step_change_t, compare_halves, shear_free
+  use hc_step_control, only: step_control_t, step_attempt_t
+  implicit none
+  private
+
+  public :: change_by_halving, is_shear_free, first_attempt, judge_attempt, accept_attempt
+
+  !> Fields of a state that are compared: pressure, gap, traction along x and along y.
+  integer, parameter :: n_field = 4
+
+contains
+
+  !> What the halves of a load step change.
+  subroutine change_by_halving(n_col, n_row, basis, candidate, coefficient, fields, zones, area, change, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> Not zero where a node may come into contact
+    integer(c_int), intent(in) :: candidate(n_col, n_row)
+    !> Coefficient of friction; infinite or huge: no slip
+    real(c_double), intent(in) :: coefficient
+    !> Fields and zones of five states: the end of the whole step, the middle and the end of the halves, both at the beginning
+    real(c_double), intent(in) :: fields(n_col, n_row, 4, 5)
+    integer(c_int), intent(in) :: zones(n_col, n_row, 5)
+    !> Largest contact area of the history [m^2]
+    real(c_double), intent(in) :: area
+    !> What the halves change
+    real(c_double), intent(out) :: change(5)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+    type(contact_state_t) :: state(5)
+    type(step_change_t) :: found
+    integer :: k
+
+    change = 0.0_c_double
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
+    if (.not. allocated(error)) then
+      do k = 1, size(state)
+        state(k)%pressure = fields(:, :, 1, k)
+        state(k)%gap = fields(:, :, 2, k)
+        state(k)%traction = fields(:, :, 3:n_field, k)
+        state(k)%zone = zones(:, :, k)
+      end do
+      call compare_halves(lattice, candidate /= 0, friction_of(coefficient), state(1), state(2), state(3), state(4), &
+                          state(5), area, found)
+      change = [found%stick, found%traction, found%added, found%lattice, found%gain]
+    end if
+    call report(error, code, message)
+  end subroutine change_by_halving
+
+  !> Does a state have no shear tractions?
+  subroutine is_shear_free(n_col, n_row, pressure, traction_x, traction_y, shearless)
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Pressure and shear tractions [Pa]
+    real(c_double), intent(in) :: pressure(n_col, n_row), traction_x(n_col, n_row), traction_y(n_col, n_row)
+    !> Not zero: none
+    integer(c_int), intent(out) :: shearless
+    type(contact_state_t) :: state
+
+    allocate (state%pressure, source=pressure)
+    allocate (state%traction(n_col, n_row, 2))
+    state%traction(:, :, 1) = traction_x
+    state%traction(:, :, 2) = traction_y
+    shearless = merge(1, 0, shear_free(state))
+  end subroutine is_shear_free
+
+  !> The first attempt at a load step.
+  subroutine first_attempt(control, fraction, largest, attempt)
+    !> What decides about load steps; at the beginning of a segment its first size follows from that of the last one
+    real(c_double), intent(inout) :: control(6)
+    !> Part of the segment that is done, largest load step
+    real(c_double), intent(in) :: fraction, largest
+    !> The attempt
+    real(c_double), intent(out) :: attempt(5)
+    type(step_control_t) :: steps
+
+    steps = control_of(control)
+    if (fraction <= 0.0_c_double) call steps%begin_segment()
+    control = numbers_of_control(steps)
+    attempt = numbers_of_attempt(steps%first_attempt(fraction, largest))
+  end subroutine first_attempt
+
+  !> Decide what becomes of an attempt.
+  subroutine judge_attempt(control, attempt, converged, change, tolerance, verdict)
+    !> What decides about load steps
+    real(c_double), intent(in) :: control(6)
+    !> The attempt; if it is rejected, the next one
+    real(c_double), intent(inout) :: attempt(5)
+    !> Not zero: it was solved
+    integer(c_int), intent(in) :: converged
+    !> What the halves change
+    real(c_double), intent(in) :: change(5)
+    !> What a step may change
+    real(c_double), intent(in) :: tolerance
+    !> 0: rejected, 1: accepted, 2: smaller ones are of no use, 3: it did not converge and is the smallest there is
+    integer(c_int), intent(out) :: verdict
+    type(step_control_t) :: steps
+    type(step_attempt_t) :: tried
+
+    steps = control_of(control)
+    tried = attempt_of(attempt)
+    call steps%judge(tried, converged /= 0, change_of(change), tolerance, verdict)
+    attempt = numbers_of_attempt(tried)
+  end subroutine judge_attempt
+
+  !> Take over an attempt.
+  subroutine accept_attempt(control, attempt, change, tolerance, verdict, bound)
+    !> What decides about load steps
+    real(c_double), intent(inout) :: control(6)
+    !> The attempt
+    real(c_double), intent(in) :: attempt(5)
+    !> What the halves change
+    real(c_double), intent(in) :: change(5)
+    !> What a step may change
+    real(c_double), intent(in) :: tolerance
+    !> What became of it
+    integer(c_int), intent(in) :: verdict
+    !> Bound on the error of the stick area, over the largest contact area
+    real(c_double), intent(out) :: bound
+    type(step_control_t) :: steps
+
+    steps = control_of(control)
+    call steps%accept(attempt_of(attempt), change_of(change), tolerance, verdict)
+    bound = steps%bound(change_of(change))
+    control = numbers_of_control(steps)
+  end subroutine accept_attempt
+
+  !> A control from its numbers.
+  pure type(step_control_t) function control_of(numbers)
+    real(c_double), intent(in) :: numbers(6)
+    control_of = step_control_t(numbers(1), numbers(2), numbers(3), numbers(4), numbers(5), numbers(6))
+  end function control_of
+
+  !> A control as numbers.
+  pure function numbers_of_control(control) result(numbers)
+    type(step_control_t), intent(in) :: control
+    real(c_double) :: numbers(6)
+    numbers = [control%size, control%first, control%stick, control%traction, control%past_stick, control%past_traction]
+  end function numbers_of_control
+
+  !> An attempt from its numbers.
+  pure type(step_attempt_t) function attempt_of(numbers)
+    real(c_double), intent(in) :: numbers(5)
+    attempt_of = step_attempt_t(numbers(1), numbers(2), nint(numbers(3)), numbers(4), numbers(5))
+  end function attempt_of
+
+  !> An attempt as numbers.
+  pure function numbers_of_attempt(attempt) result(numbers)
+    type(step_attempt_t), intent(in) :: attempt
+    real(c_double) :: numbers(5)
+    numbers = [attempt%begin, attempt%end, real(attempt%n_rejected, c_double), attempt%last_excess, attempt%last_size]
+  end function numbers_of_attempt
+
+  !> A change from its numbers.
+  pure type(step_change_t) function change_of(numbers)
+    real(c_double), intent(in) :: numbers(5)
+    change_of = step_change_t(numbers(1), numbers(2), numbers(3), numbers(4), numbers(5))
+  end function change_of
+
+end module hc_f2py_steps

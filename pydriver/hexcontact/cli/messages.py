@@ -1,0 +1,150 @@
+"""What a command that solves says: progress, log, the tables or the object at its end."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import typer
+
+from ..errors import AccuracyWarning, DeckError
+from ..result.store import open_result
+from ..solve import log
+from ..solve import run as solving
+from ..solve.interruption import Interrupted, in_background
+from ..solve.progress import reporter
+from ..text import visible
+from . import json_output, tables
+from .guard import complain, say
+from .options import LogLevel
+from .plot import picture_of
+
+if TYPE_CHECKING:
+    from ..problem.problem import Problem
+    from ..result.result import Step
+    from ..result.store import Store
+
+
+@dataclasses.dataclass(frozen=True)
+class Messages:
+    """The messages of a command that solves, from its options.
+
+    Attributes
+    ----------
+    command : str
+        Name of the command.
+    quiet, as_json : bool
+        Print nothing but errors; print an object in the end instead of tables.
+    log_file, log_level : Path, LogLevel or None
+        Options of the log.
+    """
+
+    command: str
+    quiet: bool = False
+    as_json: bool = False
+    log_file: Path | None = None
+    log_level: LogLevel | None = None
+
+    def __post_init__(self) -> None:
+        if self.quiet and self.log_level and self.log_file is None:
+            raise DeckError("--log-level: expected --log-file with it, since --quiet prints nothing")
+
+    def logging(self, *spare: Path) -> contextlib.AbstractContextManager[None]:
+        """Write the log, but never into one of the files that the command reads or writes."""
+        return log.kept(self.log_file, self.log_level, spare)
+
+    @property
+    def silent(self) -> bool:
+        """Whether no progress is shown: if quiet, or where the log is shown instead."""
+        return self.quiet or (self.log_level is not None and self.log_file is None)
+
+    def interrupted(self, signaled: Interrupted, kept: str, **about: Any) -> NoReturn:
+        """Say what is kept after a signal and end the process, whatever the core is doing."""
+        message = f"interrupted; {kept}"
+        with contextlib.suppress(OSError):  # standard error is closed
+            log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", **about))
+            log.logger.disabled = True  # for what is still at work
+            complain(message)
+            if self.as_json:
+                json_output.write(self.command, json_output.error(message, signaled.exit_code))
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(signaled.exit_code)
+
+    def conclude(
+        self,
+        case: Problem,
+        histories: list[Any],
+        target: Path,
+        picture: Path | None,
+        warnings: Sequence[str] = (),
+    ) -> dict[str, Any] | None:
+        """Print, or return, what came out; complain of an accuracy that was not reached."""
+        refined = open_result(target) if case.accuracy else None
+        summary = tables.Summary.of_run(case, histories, refined)
+        shortfall = refined.shortfall if refined is not None else ""
+        if shortfall:
+            complain(shortfall)
+        if self.as_json:
+            code = AccuracyWarning.exit_code if shortfall else 0
+            notes = [*warnings, *summary.remarks, *([shortfall] if shortfall else [])]
+            written = {"output": target, "picture": picture, "warnings": notes, "exit_code": code}
+            return written | summary.as_run()
+        if not self.quiet:
+            summary.print()
+            files = f"{target}, {picture}" if picture else f"{target}"
+            tables.console().print(visible(f"written: {files}"), soft_wrap=True)
+        if shortfall:
+            raise typer.Exit(AccuracyWarning.exit_code)
+        return None
+
+    def was_finished(self, file: Path, picture: Path | None) -> dict[str, Any] | None:
+        """Say, or return, that nothing was left to do."""
+        if self.as_json:
+            summary = tables.Summary.of_result(open_result(file))
+            written = {"output": file, "picture": picture, "warnings": summary.remarks}
+            return written | summary.as_run()
+        if not self.quiet:
+            drawn = f"; written: {picture}" if picture else ""
+            say(f"{file} is finished, all its load steps are there{drawn}")
+        return None
+
+
+def solved(
+    case: Problem,
+    store: Store,
+    pipe: tuple[int, int],
+    name: str,
+    messages: Messages,
+    before: Sequence[Step] = (),
+) -> list[Any]:
+    """Solve a case into a store and return the histories of all its steps.
+
+    Signals end the process, unless the last step is finished: then the output is completed.
+    """
+
+    def ends(signaled: Interrupted) -> bool:
+        if store.has_all_steps:
+            return False
+        store.close(f"interrupted ({signaled.name})")
+        return not store.finished
+
+    histories: list[Any] = [step.history for step in before]
+    listener = solving.listeners(case, reporter(messages.silent), lambda step: histories.append(step.history))
+    title = (case.title or name) + (f", after step {len(before)}" if before else "")
+    try:
+        with listener.following(title, case.planned_steps):
+            in_background(lambda: solving.run_into(case, store, listener, before), pipe, ends)
+    except Interrupted as signaled:
+        messages.interrupted(signaled, store.kept or "no load step was finished", done=len(store.heads))
+    return histories
+
+
+def overview(path: Path) -> Path:
+    """Draw a result beside its file."""
+    return picture_of([open_result(path)], "overview", path.with_suffix(".png"), {})

@@ -1,0 +1,90 @@
+"""A load step in several pictures: maps, a section, the history."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+from matplotlib.figure import Figure
+
+from ..analytic.shear import ClosedForms
+from ..result.view import StepView, dataset_of
+from .history import draw_history, fitted
+from .maps import LEAST_ASPECT, draw_field
+from .plane import Part
+from .registry import figure
+from .sections import Cut, draw_section, draw_shear
+from .style import legend_above, legend_below, new_figure, set_title
+from .zones import draw_zones, zone_legend
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..result.result import Result
+
+
+@figure("overview", "pressure and a section; with friction shear and zones, too", first=True)
+def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
+    """Draw a load step in several pictures.
+
+    Without friction that is the pressure over the plane and along x; with friction the shear traction, the
+    zones and the history, too.
+
+    Parameters
+    ----------
+    result : Result or xarray.Dataset
+        What a run returned, or `open_result` read.
+    step : int
+        Number of the load step, from 1; -1 is the last one.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    IndexError
+        If there is no such step.
+    ValueError
+        If the pressure of that step was not kept.
+    """
+    view = StepView.of(result, step)
+    with_friction = view.friction > 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)
+    canvas = _frictional(dataset_of(result), view) if with_friction else _frictionless(view)
+    set_title(canvas, view.title)
+    return canvas
+
+
+def _frictionless(view: StepView) -> Figure:
+    canvas = new_figure(8.6, 3.7)
+    left, right = cast(Any, canvas.subfigures(1, 2, width_ratios=(1.15, 1)))
+    axes, part = left.add_subplot(), Part.around([view])
+    part.show(axes)
+    draw_field(left, [axes], [view], "pressure", part)
+    if view.hertz is not None:
+        legend_above(axes)
+    draw_section(right, view, 0.0)
+    return canvas
+
+
+def _frictional(dataset: xarray.Dataset, view: StepView) -> Figure:
+    """Draw maps of pressure, shear traction and zones; below them a section and the history."""
+    part = Part.around([view], least_aspect=LEAST_ASPECT)
+    exact = ClosedForms(dataset).partial_slip(view.number)
+    canvas = new_figure(9.6, 6.2)
+    upper, lower = cast(Any, canvas.subfigures(2, 1, height_ratios=(1.05, 1)))
+    panels = upper.subplots(1, 3)
+    for axes in panels:
+        part.show(axes)
+    draw_field(upper, panels[:1], [view], "pressure", part)
+    draw_field(upper, panels[1:2], [view], "traction", part)
+    draw_zones(panels[2], view, exact, part)
+    legend_below(panels[2], handles=zone_legend([view], [exact]), ncols=2, handlelength=1.4, fontsize=8)
+    several = dataset.sizes["step"] > 1
+    below = lower.subplots(1, 3 if several else 1)
+    draw_shear(below[0] if several else below, view, exact, Cut.of([view], 0.0, None))
+    if several:
+        draw_history(below[1], dataset, fitted(dataset, ("contact_area", "stick_area")))
+        draw_history(below[2], dataset, ("max_pressure",))
+        for axes in below[1:]:
+            axes.axvline(view.number, color="0.8", lw=3.0, zorder=0)
+    return canvas

@@ -1,0 +1,95 @@
+"""The figures by name: a figure is a decorated function; the command, its help and the tests follow."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ParamSpec
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from .style import STYLE
+
+P = ParamSpec("P")
+Draw = Callable[P, Figure]
+
+SEVERAL_RUNS = "several runs"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A figure that can be drawn.
+
+    Attributes
+    ----------
+    name : str
+        Name of the figure on the command line.
+    help : str
+        What it shows, in a line.
+    needs : str
+        What a result must have to be worth drawing: "friction", "torque", or `SEVERAL_RUNS`; may be empty.
+    draw : callable
+        The function; its parameters besides the result are the options that there are.
+    first : bool
+        Whether lists begin with it.
+    """
+
+    name: str
+    help: str
+    needs: str
+    draw: Callable[..., Figure]
+    first: bool = False
+
+    @property
+    def options(self) -> Mapping[str, inspect.Parameter]:
+        """Parameters of the function by name."""
+        return inspect.signature(self.draw).parameters
+
+    @property
+    def of_a_result(self) -> bool:
+        """Whether it shows a result, and not what belongs to none."""
+        return self.of_several or "result" in self.options
+
+    @property
+    def of_several(self) -> bool:
+        """Whether it may show several results."""
+        return "results" in self.options
+
+
+_ENTRIES: dict[str, Entry] = {}
+
+
+def entries() -> dict[str, Entry]:
+    """Return the figures by name, in the order of lists."""
+    return dict(sorted(_ENTRIES.items(), key=lambda item: not item[1].first))
+
+
+def styled(draw: Draw[P]) -> Draw[P]:
+    """Draw in the style of all figures."""
+
+    @functools.wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with matplotlib.rc_context(STYLE):
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def figure(name: str, help: str, needs: str = "", first: bool = False) -> Callable[[Draw[P]], Draw[P]]:
+    """Register a function that draws a figure.
+
+    Parameters
+    ----------
+    name, help, needs, first : str, str, str, bool
+        See `Entry`.
+    """
+
+    def register(draw: Draw[P]) -> Draw[P]:
+        drawn = styled(draw)
+        _ENTRIES[name] = Entry(name, help, needs, drawn, first)
+        return drawn
+
+    return register

@@ -1,0 +1,264 @@
+"""What a page draws of a result: curves of its history, and fields, from which the page makes its maps.
+
+Each load step is small gray pictures, with 255 shades from 0 to the largest value of its step; shade 0 is
+outside of the contact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+
+from ..result.history import step_rows
+from ..result.raster import Plane, png_of
+from ..result.view import StepView, scaled, worded
+from ..variables import LOADS, MAPS, RESIDUALS, VARIABLES, spelled
+from .history import panels_of, peak
+from .plane import Limits, Part
+from .sections import line_of
+
+if TYPE_CHECKING:
+    from ..result.result import Result
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 120  # whose maps a page shows; of longer histories evenly chosen ones
+_BYTES = 2.5e6  # of all smooth maps together, about: pages that a browser opens at once
+_ZONES = 480  # pixels of the longer side of a zone map
+_ARROWS = 15  # along the longer side
+_CUT = 201  # points of a section
+_NOISE = 1e-7  # share of the approach up to which slip is no more than the tolerance leaves
+
+
+def rounded(values: Any, digits: int = 4) -> list[float | None]:
+    """Return numbers as JSON may hold them; None for those that are not finite."""
+    return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.ravel(values).tolist()]
+
+
+def kept_steps(result: Result) -> list[int]:
+    """Return the numbers of the steps that can be shown as maps, the last among them."""
+    if "pressure" not in result.dataset:
+        return []
+    numbers = result.dataset["step"].values.tolist()
+    every = int(result.dataset.attrs.get("output_every", 1))
+    kept = [n for n in numbers if n % every == 0 or n == numbers[-1]]
+    stride = math.ceil(len(kept) / MOST_STEPS)
+    return kept[::-1][::stride][::-1]
+
+
+def drawn_data(
+    result: Result, histories: Sequence[Mapping[str, Any]], numbers: Sequence[int]
+) -> dict[str, Any]:
+    """Return all that a page draws, as its JSON holds it.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    histories : sequence of mapping
+        History of each step, with its number.
+    numbers : sequence of int
+        The steps with maps, see `kept_steps`.
+    """
+    palette = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, 255))[:, :3]
+    return {
+        "palette": np.round(255 * palette).astype(int).ravel().tolist(),
+        "numbers": [history["step"] for history in histories],
+        "labels": [str(history.get("label", "")) for history in histories],
+        "states": [step_rows(history) for history in histories],
+        "charts": charts_of(histories),
+        "fields": maps_of(result, numbers) if numbers else None,
+    }
+
+
+# --- maps -----------------------------------------------------------------------------------------
+
+
+def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
+    """Return the maps of some load steps, and sections through them along x.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    numbers : sequence of int
+        The steps; their pressure was kept.
+
+    Returns
+    -------
+    dict
+        What the page reads as JSON: limits, maps (pictures in base64), arrows, zones, sections.
+    """
+    last = StepView.of(result, numbers[-1])
+    part = Part.around((StepView.of(result, number) for number in numbers), 1.2, 0.2)
+    known = {title: names for title, names in MAPS.items() if set(names) <= set(last.data)}
+    if last.friction == 0.0:
+        known = {title: names for title, names in known.items() if not VARIABLES[names[0]].frictional}
+    pixels = int(np.clip(math.sqrt(_BYTES / (0.45 * len(known) * len(numbers))), 70, 260))
+    plane, fine = Plane(part.limits, pixels), Plane(part.limits, _ZONES)
+    shown: dict[str, dict[str, Any]] = {
+        title: {
+            "name": names[0].removesuffix("_x"),
+            "title": title,
+            "common": "increment" not in names[0],  # all steps have one color scale at first
+            "unit": VARIABLES[names[0]].units,
+            "images": [],
+            "max": [],
+            "arrows": [],
+        }
+        for title, names in known.items()
+    }
+    zones: list[str] = []
+    sections = []
+    noise = _NOISE * float(np.abs(result.dataset["approach"].values).max())
+    line = line_of((StepView.of(result, number) for number in numbers), 0.0)
+    place = np.linspace(0.0, line.length, _CUT)
+    for number in numbers:
+        view = StepView.of(result, number)
+        contact = view.at(*plane.points) > 0.0
+        weight = np.where(contact, view.at(*plane.points, view.contact.astype(float)), 1.0)
+        for title, names in known.items():
+            entry, slip = shown[title], VARIABLES[names[0]].units == "m"
+            values = [np.nan_to_num(view.data[name].values) for name in names]
+            size = np.sqrt(sum(view.at(*plane.points, component) ** 2 for component in values))
+            if slip:  # does not go to zero at the edge: nodes beyond it have no say
+                size = size / weight
+            largest = float(np.sqrt(sum(component**2 for component in values))[view.contact].max(initial=0.0))
+            if slip and largest < noise:
+                largest = 0.0
+            entry["images"].append(_gray(size, largest, contact))
+            entry["max"].append(largest)
+            if len(names) == 2:
+                entry["arrows"].append(_arrows(view, part.limits, values, largest) if largest else [])
+        if view.friction and "zone" in view.data:
+            row, col, inside = fine.nearest(view)
+            zones.append(png_of(np.where(inside, view.data["zone"].values[row, col], 0).astype("u1")))
+        sections.append(_section(view, *line.points(place)))
+    for title, entry in list(shown.items()):
+        if entry["unit"] == "m" and not any(entry["max"]):
+            del shown[title]
+            continue
+        factor, entry["unit"] = scaled(max(entry["max"]), entry["unit"])
+        entry["max"] = rounded([factor * largest for largest in entry["max"]])
+    return {
+        "steps": list(numbers),
+        "limits": rounded([part.factor * value for value in part.limits], 6),
+        "length": part.unit,
+        "maps": list(shown.values()),
+        "zones": zones,
+        "sections": _scaled_sections(sections, (line.start[0] + place) * part.factor),
+        "section_y": worded(line.start[1], "m"),
+    }
+
+
+def _gray(values: Array, largest: float, contact: NDArray[np.bool_]) -> str:
+    shades = np.zeros(values.shape) if largest == 0.0 else np.clip(values / largest, 0.0, 1.0)
+    return png_of(np.where(contact, 1 + np.round(254 * shades), 0).astype("u1"))
+
+
+def _arrows(view: StepView, limits: Limits, components: Sequence[Array], largest: float) -> list[int]:
+    """Return arrows on a triangular pattern: four whole numbers for each.
+
+    x and y in thousandths of the map, from its upper left corner, and components in percent of the largest.
+    """
+    x0, x1, y0, y1 = limits
+    pitch = max(x1 - x0, y1 - y0) / _ARROWS
+    rows, cols = math.ceil((y1 - y0) / pitch / 0.866), math.ceil((x1 - x0) / pitch)
+    j, i = np.meshgrid(np.arange(-rows, rows + 1), np.arange(-cols, cols + 1), indexing="ij")
+    x = 0.5 * (x0 + x1) + pitch * (i + 0.5 * (j % 2))
+    y = np.asarray(0.5 * (y0 + y1) + 0.866 * pitch * j, dtype=np.float64)
+    inside = (x > x0) & (x < x1) & (y > y0) & (y < y1)
+    x, y = x[inside], y[inside]
+    u, v = (view.at(x, y, part) for part in components)
+    size = np.hypot(u, v)
+    seen = (view.at(x, y) > 0.0) & (size > 0.03 * largest)
+    if not seen.any():
+        return []
+    columns = (1000 * (x - x0) / (x1 - x0), 1000 * (y1 - y) / (y1 - y0), 100 * u / largest, 100 * v / largest)
+    table = np.stack([np.round(column[seen]) for column in columns], axis=1)
+    return [int(number) for number in table.ravel()]
+
+
+def _section(view: StepView, x: Array, y: Array) -> dict[str, Array]:
+    """Return pressure and tractions along a line, and what bounds them or is known of them."""
+    curves = {"p": view.at(x, y)}
+    mu = view.friction
+    if mu > 0.0 and {"traction_x", "traction_y"} <= set(view.data):
+        for axis in "xy":
+            curves[f"q_{axis}"] = view.at(x, y, np.nan_to_num(view.data[f"traction_{axis}"].values))
+        if math.isfinite(mu):
+            curves["μp"] = mu * curves["p"]
+    if view.hertz is not None and view.hertz_holds:
+        curves["p (Hertz)"] = view.hertz.pressure(x - view.center[0], y - view.center[1])
+    return curves
+
+
+def _scaled_sections(sections: Sequence[dict[str, Array]], x: Array) -> dict[str, Any]:
+    """Bring the curves of all steps to one unit; leave out components that are nothing but noise."""
+    names = list(dict.fromkeys(name for section in sections for name in section))
+    peak = {name: max(float(np.abs(s[name]).max()) for s in sections if name in s) for name in names}
+    shear = max((peak[name] for name in peak if name.startswith("q")), default=0.0)
+    names = [name for name in names if not name.startswith("q") or peak[name] > 1e-3 * shear > 0.0]
+    panels = []
+    for title, chosen in (("Pressure", ["p", "p (Hertz)"]), ("Shear traction", ["q_x", "q_y", "μp"])):
+        curves = [name for name in chosen if name in names]
+        if not curves or (title != "Pressure" and curves == ["μp"]):
+            continue
+        factor, unit = scaled(max(peak[name] for name in curves), "Pa")
+        values = {n: [rounded(factor * s[n]) if n in s else [] for s in sections] for n in curves}
+        panels.append({"title": title, "unit": unit, "curves": values})
+    return {"x": rounded(x, 5), "panels": panels}
+
+
+# --- curves ---------------------------------------------------------------------------------------
+
+
+def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the curves of a history as the page draws them; none of a single load step.
+
+    Parameters
+    ----------
+    histories : sequence of mapping
+        History of each step, with its number.
+    """
+    if len(histories) < 2:
+        return []
+
+    def curves_of(names: Mapping[str, str]) -> dict[str, Any]:
+        """Return the unit of some quantities, and their values by what the curves are called."""
+        largest = max(peak(name, histories) for name in names)
+        factor, unit = scaled(largest, VARIABLES[next(iter(names))].units)
+        values = {
+            word: rounded([factor * float(history[name]) for history in histories], 5)
+            for name, word in names.items()
+        }
+        return {"unit": unit, "curves": values}
+
+    steps = [history["step"] for history in histories]
+    panels = panels_of(histories)
+    charts = [
+        {"title": title, "x": steps, "xlabel": "step", **curves_of(names)} for title, names in panels.items()
+    ]
+    shown = {name for names in panels.values() for name in names}
+    for motion, (load, way) in LOADS.items():
+        if motion != "z" and {load, way} <= shown:
+            title = f"{VARIABLES[load].title} over {VARIABLES[way].title.lower()}"
+            over = curves_of({way: ""})
+            charts.append(
+                {
+                    "title": title + (f", {motion}" if motion in "xy" else ""),
+                    "x": over["curves"][""],
+                    "xlabel": f"{spelled(way)} [{over['unit']}]",
+                    **curves_of({load: ""}),
+                    "points": True,
+                }
+            )
+    residuals = {name: sign for sign, name in RESIDUALS.items() if name in histories[0]}
+    residuals = {name: sign for name, sign in residuals.items() if peak(name, histories)}
+    found = curves_of(residuals) if residuals else {"unit": "", "curves": {}}
+    return [*charts, {"title": "Residuals", "x": steps, "xlabel": "step", **found, "log": True}]

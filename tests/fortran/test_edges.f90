@@ -1,0 +1,330 @@
+!> Sizes and edges of zones, and fields between the nodes: made-up fields whose answer is known.
+module test_edges
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+  use hc_precision, only: wp, pi
+  use hc_error, only: error_t, status
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_lapack, only: least_squares
+  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
+  use hc_zone_estimators, only: area_radius, boundary, boundary_circle, circle_fit_t, edge_ellipse, edge_radius, &
+    ellipse_t, moment_ellipse, pressure_center
+  use hc_contact_edges, only: contact_edges_t, cut_triangles, new_contact_edges, zone_edge_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_contact_state, only: contact_state_t, force_control
+  use hc_normal_contact, only: normal_contact_t, new_normal_contact
+  use testing, only: test_t, new_test, check, check_raised, check_true
+  implicit none
+  private
+
+  public :: collect_edges
+
+  !> Windows of 2 n + 1 nodes along both sides.
+  integer, parameter :: n = 50
+  !> Semi-axes, direction and center of an elliptic contact, in spacings.
+  real(wp), parameter :: semi_major = 24.3_wp, semi_minor = 15.7_wp, angle = 0.4_wp, center(2) = [0.3_wp, -0.4_wp]
+
+contains
+
+  subroutine collect_edges(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('least_squares', test_least_squares), &
+      new_test('boundary', test_boundary), &
+      new_test('circle', test_circle), &
+      new_test('ellipses', test_ellipses), &
+      new_test('no_ellipse', test_no_ellipse), &
+      new_test('ring', test_ring), &
+      new_test('rim_of_a_punch', test_punch), &
+      new_test('stick', test_stick), &
+      new_test('few_nodes_stick', test_few_nodes), &
+      new_test('between_nodes', test_between), &
+      new_test('pressure_between_nodes', test_pressure_between) &
+    ]
+  end subroutine collect_edges
+
+  !> A lattice of unit spacing, and the coordinates of its nodes.
+  subroutine new_window(lattice, x, y, error)
+    type(lattice_t), intent(out) :: lattice
+    real(wp), allocatable, intent(out) :: x(:, :), y(:, :)
+    type(error_t), allocatable, intent(out) :: error
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-n, -n], [2*n + 1, 2*n + 1], error)
+    allocate (x(2*n + 1, 2*n + 1), y(2*n + 1, 2*n + 1))
+    call lattice%coordinates(x, y)
+  end subroutine new_window
+
+  !> Square of the pressure of Hertz over an ellipse; negative beyond it.
+  elemental real(wp) function hertz_square(x, y)
+    real(wp), intent(in) :: x, y
+
+    associate (dx => x - center(1), dy => y - center(2))
+      hertz_square = 1.0_wp - ((dx*cos(angle) + dy*sin(angle))/semi_major)**2 - ((dy*cos(angle) - dx*sin(angle))/semi_minor)**2
+    end associate
+  end function hertz_square
+
+  !> The mean of three equations that contradict each other.
+  subroutine test_least_squares(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: a(3, 2), x(2)
+
+    a = reshape([1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 2.0_wp], [3, 2])
+    call least_squares(a, [1.0_wp, 0.0_wp, 5.0_wp], x, error)
+    if (.not. allocated(error)) call check(error, x, [0.0_wp, 2.0_wp], 1.0e-14_wp, 'line through three points')
+  end subroutine test_least_squares
+
+  !> The rim of a hexagon is its outermost ring; at the rim of the window every node has a neighbor outside.
+  subroutine test_boundary(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: distance(13, 13), col, row
+
+    do row = 1, 13
+      do col = 1, 13
+        distance(col, row) = max(abs(row - 7), abs(col - 7), abs(row + col - 14))
+      end do
+    end do
+    call check_true(error, all(boundary(distance <= 3) .eqv. distance == 3), 'rim of a hexagon')
+    if (allocated(error)) return
+    call check(error, count(boundary(distance >= 0)), 4*12, 'rim of the window')
+    if (allocated(error)) return
+    call check(error, cut_triangles(distance <= 0), 6, 'triangles about a node')
+  end subroutine test_boundary
+
+  !> Six nodes around one; and p^2 that is linear in r^2.
+  subroutine test_circle(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(circle_fit_t) :: fit
+    real(wp), allocatable :: x(:, :), y(:, :), pressure(:, :)
+    real(wp) :: radii(6)
+    integer :: k
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    radii = 0.5_wp + [(hypot(cos(k*pi/3) - 0.2_wp, sin(k*pi/3)), k=1, 6)]
+    fit = boundary_circle(x, y, hypot(x, y) < 1.1_wp, 1.0_wp, [0.2_wp, 0.0_wp])
+    associate (mean => sum(radii)/6)
+      call check(error, [fit%radius, fit%mean_deviation, fit%standard_deviation], &
+                 [mean, sum(abs(radii - mean))/(6*mean), sqrt(sum((radii - mean)**2)/6)/mean], 1.0e-14_wp, 'circle')
+    end associate
+    if (allocated(error)) return
+    call check(error, fit%count, 6, 'boundary nodes')
+    if (allocated(error)) return
+    call check(error, area_radius(100, pi), 10.0_wp, 1.0e-14_wp, 'radius of an area')
+    if (allocated(error)) return
+    allocate (pressure, source=sqrt(max(0.0_wp, 1.0_wp - ((x - center(1))**2 + (y - center(2))**2)/11.37_wp**2)))
+    call check(error, edge_radius(x, y, pressure, 1.0_wp, center), 11.37_wp, 1.0e-12_wp, 'radius of the edge')
+    if (allocated(error)) return
+    call check(error, pressure_center(x, y, merge(3.0_wp, 0.0_wp, abs(x - 4.0_wp) + abs(y) < 0.1_wp) + &
+                                      merge(1.0_wp, 0.0_wp, abs(x) + abs(y) < 0.1_wp)), [3.0_wp, 0.0_wp], 1.0e-14_wp, 'centroid')
+    if (allocated(error)) return
+    pressure = 0.0_wp
+    call check_true(error, ieee_is_nan(edge_radius(x, y, pressure, 1.0_wp, center)) .and. &
+                    all(ieee_is_nan(pressure_center(x, y, pressure))), 'nothing is known without pressure')
+  end subroutine test_circle
+
+  !> The ellipse of Hertz, exactly from the pressure and roughly from the nodes.
+  subroutine test_ellipses(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(ellipse_t) :: edge, nodes
+    real(wp), allocatable :: x(:, :), y(:, :)
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    call edge_ellipse(x, y, sqrt(max(hertz_square(x, y), 0.0_wp)), 1.0_wp, edge, error)
+    if (allocated(error)) return
+    call check(error, [edge%semi_major, edge%semi_minor, edge%angle, edge%center], &
+               [semi_major, semi_minor, angle, center], 1.0e-9_wp, 'ellipse of the edge')
+    if (allocated(error)) return
+    nodes = moment_ellipse(x, y, hertz_square(x, y) > 0.0_wp)
+    call check(error, [nodes%semi_major, nodes%semi_minor, nodes%angle], [semi_major, semi_minor, angle], 0.1_wp, &
+               'ellipse of the nodes')
+    if (allocated(error)) return
+    nodes = moment_ellipse(x, y, abs(x) < 0.1_wp)
+    call check(error, [nodes%angle, nodes%semi_minor], [0.5_wp*pi, 0.0_wp], 1.0e-6_wp, 'a line along y')
+  end subroutine test_ellipses
+
+  !> A few nodes are no ellipse, nor is a saddle.
+  subroutine test_no_ellipse(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: failure
+    type(lattice_t) :: lattice
+    type(ellipse_t) :: ellipse
+    real(wp), allocatable :: x(:, :), y(:, :)
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    call edge_ellipse(x, y, merge(1.0_wp, 0.0_wp, hypot(x, y) < 1.5_wp), 1.0_wp, ellipse, failure)
+    call check_raised(error, failure, status%invalid_input, 'too few nodes')
+    if (allocated(error)) return
+    call edge_ellipse(x, y, merge(sqrt(max(1.0_wp + (x/12)**2 - (y/13)**2, 0.0_wp)), 0.0_wp, hypot(x, y) < 12.0_wp), 1.0_wp, &
+                      ellipse, failure)
+    call check_raised(error, failure, status%invalid_input, 'a saddle')
+  end subroutine test_no_ellipse
+
+  !> Outer and inner edges of a ring, from the exact squares: only the layer of the lattice, 0.04, is in the way.
+  subroutine test_ring(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: edge
+    real(wp), allocatable :: x(:, :), y(:, :), inside(:, :)
+    real(wp), parameter :: outer = 30.7_wp, inner = 10.2_wp, layer = 0.04_wp
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    allocate (inside, source=min(hypot(x, y) - inner, outer - hypot(x, y)))
+    call new_contact_edges(edges, lattice, sqrt(max(inside, 0.0_wp)), 3.0_wp*max(-inside, 0.0_wp)**1.5_wp, &
+                           inside > 0.0_wp, inside < huge(1.0_wp))
+    edge = edges%contact_edge()
+    call check(error, edge%area, pi*((outer + layer)**2 - (inner - layer)**2), 0.03_wp, 'area of a ring')
+    if (allocated(error)) return
+    call check(error, edge%radius(), sqrt(edge%area/pi), 1.0e-12_wp, 'its radius')
+    if (allocated(error)) return
+    call check(error, edge%length(), 2.0_wp*pi*(outer + inner), 0.04_wp, 'length of its edges')
+    if (allocated(error)) return
+    associate (r => norm2(edge%segments, dim=1))
+      call check_true(error, maxval(min(abs(r - outer), abs(r - inner))) < 0.052_wp, 'its edges are circles')
+    end associate
+  end subroutine test_ring
+
+  !> Where a contact ends at nodes that can never touch it has the cells of its nodes, and no edge.
+  subroutine test_punch(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: edge
+    real(wp), allocatable :: x(:, :), y(:, :)
+    logical, allocatable :: punch(:, :)
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    allocate (punch, source=hypot(x, y) < 20.3_wp)
+    call new_contact_edges(edges, lattice, merge(1.0_wp, 0.0_wp, punch), 0.0_wp*x, punch, punch)
+    edge = edges%contact_edge()
+    call check(error, edge%area, count(punch)*lattice%cell_area(), 1.0e-9_wp, 'area of a punch')
+    if (allocated(error)) return
+    call check(error, size(edge%segments), 0, 'pieces of its edge')
+    if (allocated(error)) return
+    edge = edges%stick_edge(punch, 1.0_wp + 0.0_wp*x)
+    call check(error, edge%area, count(punch)*lattice%cell_area(), 1.0e-9_wp, 'area, all of it stuck')
+  end subroutine test_punch
+
+  !> The reserve of friction within a contact: a disc, from the inside alone; where all sticks, the edge of the contact.
+  subroutine test_stick(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: edge, contact
+    real(wp), allocatable :: x(:, :), y(:, :), inside(:, :), square(:, :)
+    real(wp), parameter :: radius = 11.4_wp
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    allocate (inside, source=30.7_wp - hypot(x, y))
+    call new_contact_edges(edges, lattice, sqrt(max(inside, 0.0_wp)), 3.0_wp*max(-inside, 0.0_wp)**1.5_wp, &
+                           inside > 0.0_wp, inside < huge(1.0_wp))
+    contact = edges%contact_edge()
+    edge = edges%stick_edge(inside > 0.0_wp, 0.0_wp*x + 1.0_wp)
+    call check(error, edge%area, contact%area, 1.0e-9_wp, 'stick up to the edge of the contact')
+    if (allocated(error)) return
+    allocate (square, source=1.0_wp - (x**2 + y**2)/radius**2)
+    edge = edges%stick_edge(square > 0.0_wp, sqrt(max(square, 0.0_wp)))
+    call check(error, edge%radius(), radius, 0.12_wp, 'a disc that sticks')
+    if (allocated(error)) return
+    edge = edges%stick_edge(square > 2.0_wp, square)
+    call check(error, edge%area, 0.0_wp, 0.0_wp, 'no node sticks')
+  end subroutine test_stick
+
+  !> Of a node with its neighbors the gradient is zero but for rounding, which must not turn the edge.
+  subroutine test_few_nodes(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: edge, again
+    real(wp), allocatable :: x(:, :), y(:, :), reserve(:, :)
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    call new_contact_edges(edges, lattice, 0.0_wp*x + 1.0_wp, 0.0_wp*x, x < huge(1.0_wp), x < huge(1.0_wp))
+    allocate (reserve, source=sqrt(max(1.0_wp - (x**2 + y**2)/1.4_wp**2, 0.0_wp)))
+    edge = edges%stick_edge(hypot(x, y) < 1.1_wp, reserve)
+    call check(error, edge%radius(), 1.4_wp, 0.3_wp, 'seven nodes that stick')
+    if (allocated(error)) return
+    again = edges%stick_edge(hypot(x, y) < 1.1_wp, reserve*(1.0_wp + 1.0e-15_wp*sin(9.0_wp*x + 5.0_wp*y)))
+    call check(error, again%area, edge%area, 1.0e-13_wp, 'the same, with other rounding errors')
+  end subroutine test_few_nodes
+
+  !> Linear fields are met anywhere; zones are those of the nearest node.
+  subroutine test_between(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    real(wp), allocatable :: x(:, :), y(:, :), values(:, :)
+    integer :: node(2)
+    logical :: inside
+    real(wp), parameter :: point(2) = [1.23_wp, -4.56_wp], away = -7.0_wp
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    allocate (values, source=2.0_wp*x - 3.0_wp*y)
+    call check(error, interpolate(lattice, values, point, away), 2.0_wp*point(1) - 3.0_wp*point(2), 1.0e-7_wp, 'a linear field')
+    if (allocated(error)) return
+    call check(error, interpolate(lattice, values, [x(7, 9), y(7, 9)], away), values(7, 9), 1.0e-12_wp, 'at a node')
+    if (allocated(error)) return
+    call check(error, interpolate(lattice, values, [1.0e9_wp, 0.0_wp], away), away, 0.0_wp, 'outside')
+    if (allocated(error)) return
+    call check(error, interpolate(lattice, 0.0_wp*x + 1.0_wp, [x(1, 9) - 0.25_wp, y(1, 9)], away), &
+               0.75_wp + 0.25_wp*away, 1.0e-8_wp, 'a quarter of the way to a node outside')
+    if (allocated(error)) return
+    associate (near => minloc(hypot(x - point(1), y - point(2))))
+      call nearest_node(lattice, point, node, inside)
+      call check_true(error, inside .and. all(node == near - 1), 'the nearest node')
+    end associate
+    if (allocated(error)) return
+    call nearest_node(lattice, [x(1, 9) - 0.6_wp, y(1, 9)], node, inside)
+    call check_true(error, .not. inside .and. all(node == [0, 8]), 'the nearest is outside')
+    if (allocated(error)) return
+    call nearest_node(lattice, [1.0e30_wp, y(1, 9)], node, inside)
+    call check_true(error, .not. inside, 'a point far away')
+  end subroutine test_between
+
+  !> Between the nodes at the edge the pressure of Hertz, of unit radius: three times closer than straight lines.
+  subroutine test_pressure_between(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(normal_contact_t) :: contact
+    type(contact_state_t) :: state
+    type(contact_edges_t) :: edges
+    real(wp), allocatable :: x(:, :), y(:, :), squares(:, :)
+    real(wp) :: at(2), off(2), exact
+    integer :: k
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp/20), [-30, -30], [61, 61], error, origin=[0.011_wp, 0.007_wp])
+    if (allocated(error)) return
+    allocate (x(61, 61), y(61, 61))
+    call lattice%coordinates(x, y)
+    call new_normal_contact(contact, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), 0.5_wp*(x**2 + y**2), x < 9.0_wp, error)
+    if (allocated(error)) return
+    call contact%solve(force_control, 4.0_wp/3.0_wp, 1.0e-9_wp, 60, state, error)
+    if (allocated(error)) return
+    call new_contact_edges(edges, lattice, state%pressure, state%gap, state%pressure > 0.0_wp, x < 9.0_wp)
+    allocate (squares, source=edges%squares())
+    call check_true(error, ieee_is_nan(squares(31, 31)), 'in the middle there are no squares')
+    if (allocated(error)) return
+    off = 0.0_wp
+    do k = 1, 2000
+      at = (0.85_wp + 0.0001_wp*k)*[cos(1.7_wp*k), sin(1.7_wp*k)]
+      exact = 2.0_wp/pi*sqrt(max(1.0_wp - norm2(at)**2, 0.0_wp))
+      off(1) = off(1) + (interpolate_pressure(lattice, state%pressure, squares, at) - exact)**2
+      off(2) = off(2) + (interpolate(lattice, state%pressure, at, 0.0_wp) - exact)**2
+    end do
+    call check_true(error, 3.0_wp*sqrt(off(1)) < sqrt(off(2)), 'pressure near the edge')
+    if (allocated(error)) return
+    at = [0.12_wp, 0.34_wp]
+    call check(error, interpolate_pressure(lattice, state%pressure, squares, at), &
+               interpolate(lattice, state%pressure, at, 0.0_wp), 0.0_wp, 'pressure in the middle')
+  end subroutine test_pressure_between
+
+end module test_edges

@@ -1,0 +1,358 @@
+!> Adaptive load steps: what halving changes, what becomes of attempts, and paths of the real method.
+module test_steps
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
+  use hc_precision, only: wp, pi
+  use hc_error, only: error_t, status
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, along_x, about_z, &
+    displacement_control, rim_reached, stick
+  use hc_coulomb, only: coulomb_t
+  use hc_frictional_contact, only: frictional_contact_t
+  use hc_load_path, only: advance
+  use hc_step_error, only: compare_halves, shear_free, step_change_t
+  use hc_step_control, only: accepted, failed, least_step, limited, rejected, step_attempt_t, step_control_t
+  use hc_adaptive_path, only: adaptive_path_t
+  use hc_state_measures, only: elastic_energy, nodal_normal_residual, nodal_tangential_residual, zone_extent
+  use hc_discretization_error, only: limits_of_error
+  use test_friction, only: new_sphere
+  use testing, only: test_t, new_test, check, check_raised, check_true, largest
+  implicit none
+  private
+
+  public :: collect_steps
+
+  real(wp), parameter :: thr = 1.0e-14_wp, mu = 0.3_wp, load = 4.0_wp/3.0_wp
+
+contains
+
+  subroutine collect_steps(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('first_attempts', test_first_attempts), &
+      new_test('verdicts', test_verdicts), &
+      new_test('no_convergence', test_no_convergence), &
+      new_test('next_size', test_next_size), &
+      new_test('halving', test_halving), &
+      new_test('path', test_path), &
+      new_test('path_to_the_rim', test_rim), &
+      new_test('nodal_residuals', test_nodal_residuals), &
+      new_test('energy', test_energy), &
+      new_test('limits_of_error', test_limits) &
+    ]
+  end subroutine collect_steps
+
+  !> The first step of a segment follows from that of the last one; the last two steps are equally large.
+  subroutine test_first_attempts(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(step_control_t) :: control
+    type(step_attempt_t) :: attempt
+
+    call control%begin_segment()
+    attempt = control%first_attempt(0.0_wp, 1.0_wp)
+    call check(error, [attempt%begin, attempt%end], [0.0_wp, 1.0_wp], thr, 'a whole segment')
+    if (allocated(error)) return
+    attempt = control%first_attempt(0.0_wp, 0.2_wp)
+    call check(error, attempt%end, 0.2_wp, thr, 'the largest step that is allowed')
+    if (allocated(error)) return
+    control%first = 0.2_wp
+    call control%begin_segment()
+    attempt = control%first_attempt(0.3_wp, 1.0_wp)
+    call check(error, attempt%end, 0.65_wp, thr, 'half of what is left')
+  end subroutine test_first_attempts
+
+  !> Within the tolerance; above it; no smaller by a smaller step; by an error that earlier steps have left.
+  subroutine test_verdicts(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(step_control_t) :: control
+    type(step_attempt_t) :: attempt
+    integer :: verdict
+    real(wp), parameter :: tolerance = 0.02_wp
+
+    call control%judge(attempt, .true., step_change_t(stick=0.009_wp, added=0.009_wp), tolerance, verdict)
+    call check(error, verdict, accepted, 'below the tolerance')
+    if (allocated(error)) return
+    call control%judge(attempt, .true., step_change_t(stick=-0.02_wp), tolerance, verdict)
+    call check(error, verdict, rejected, 'twice the tolerance')
+    if (allocated(error)) return
+    call check(error, [attempt%end, attempt%last_excess, attempt%last_size], [0.4_wp, 2.0_wp, 1.0_wp], thr, 'a smaller step')
+    if (allocated(error)) return
+    call control%judge(attempt, .true., step_change_t(stick=-0.0195_wp), tolerance, verdict)
+    call check(error, verdict, limited, 'the smaller one changes as much')
+    if (allocated(error)) return
+    call control%judge(attempt, .true., step_change_t(stick=0.02_wp, lattice=0.05_wp), tolerance, verdict)
+    call check(error, verdict, accepted, 'rings of nodes')
+    if (allocated(error)) return
+    call control%judge(attempt, .true., step_change_t(stick=0.009_wp, added=0.011_wp), tolerance, verdict)
+    call check_true(error, verdict /= accepted, 'tractions')
+    if (allocated(error)) return
+    control%stick = -0.018_wp
+    attempt = step_attempt_t()
+    call control%judge(attempt, .true., step_change_t(stick=-0.02_wp), tolerance, verdict)
+    call check(error, verdict, accepted, 'the steps before have left it')
+  end subroutine test_verdicts
+
+  !> A step that does not converge is made four times smaller, down to the least.
+  subroutine test_no_convergence(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(step_control_t) :: control
+    type(step_attempt_t) :: attempt
+    integer :: verdict, k
+
+    do k = 1, 5
+      call control%judge(attempt, .false., step_change_t(), 0.02_wp, verdict)
+      call check(error, verdict, rejected, 'a smaller step is tried')
+      if (allocated(error)) return
+      call check(error, attempt%end, max(least_step, 0.25_wp**k), thr, 'its size')
+      if (allocated(error)) return
+    end do
+    call control%judge(attempt, .false., step_change_t(), 0.02_wp, verdict)
+    call check(error, verdict, failed, 'there is no smaller one')
+    if (allocated(error)) return
+    call check(error, attempt%n_rejected, 5, 'attempts before')
+  end subroutine test_no_convergence
+
+  !> The next step aims at 0.8 of what is allowed, and grows by two at most; changes fade from the bound.
+  subroutine test_next_size(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(step_control_t) :: control
+    type(step_attempt_t) :: attempt
+    type(step_change_t) :: change
+    real(wp), parameter :: tolerance = 0.02_wp
+
+    attempt = step_attempt_t(begin=0.0_wp, end=0.1_wp)
+    change = step_change_t(stick=0.008_wp, traction=0.001_wp, gain=2.0_wp, lattice=0.003_wp)
+    call control%accept(attempt, change, tolerance, accepted)
+    call check(error, [control%size, control%first], [0.1_wp, 0.1_wp], thr, 'on the aim')
+    if (allocated(error)) return
+    call check(error, control%bound(change), 2.0_wp*0.008_wp + 1.5_wp*2.0_wp*0.001_wp + 0.003_wp, thr, 'bound')
+    if (allocated(error)) return
+    attempt = step_attempt_t(begin=0.1_wp, end=0.2_wp, n_rejected=1)
+    call control%accept(attempt, step_change_t(), tolerance, accepted)
+    call check(error, [control%size, control%first], [0.1_wp, 0.1_wp], thr, 'no growth after a rejection')
+    if (allocated(error)) return
+    call check(error, control%bound(step_change_t()), 2.0_wp*0.004_wp + 1.5_wp*0.0008_wp, thr, 'changes fade')
+    if (allocated(error)) return
+    call control%accept(attempt, step_change_t(added=10.0_wp), tolerance, limited)
+    call check(error, control%size, 0.2_wp, thr, 'larger where smaller ones are of no use')
+  end subroutine test_next_size
+
+  !> One step against two: the change of the tractions as it is defined, of the stick area with the right sign.
+  subroutine test_halving(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, whole, half, halves
+    type(step_change_t) :: change
+    real(wp) :: expected
+
+    call new_sphere(contact, 12, 0.5_wp, 0.3_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, contact%problem%lattice)
+    call check_true(error, shear_free(virgin), 'no shear before the first load')
+    if (allocated(error)) return
+    call press(contact, virgin, load, whole, error)
+    if (.not. allocated(error)) call press(contact, virgin, 0.5_wp*load, half, error)
+    if (.not. allocated(error)) call press(contact, half, load, halves, error)
+    if (allocated(error)) return
+    call check_true(error, .not. shear_free(whole), 'unlike bodies shear each other')
+    if (allocated(error)) return
+    associate (p => contact%problem)
+      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, virgin, virgin, 4.0_wp, change)
+      expected = sum(norm2(whole%traction - halves%traction, dim=3))/(mu*sum(halves%pressure))
+      ! of a contact area of pi, where the largest one is 4
+      call check(error, change%traction, expected*pi/4.0_wp, 0.05_wp*expected, 'change of the tractions')
+      if (allocated(error)) return
+      call check(error, change%added, change%traction, thr, 'all of it in this step')
+      if (allocated(error)) return
+      call check(error, change%stick, p%lattice%cell_area()*(count(halves%zone == stick) - count(whole%zone == stick))/4.0_wp, &
+                 0.06_wp, 'change of the stick area, against that of its nodes')
+      if (allocated(error)) return
+      call check_true(error, change%lattice > 0.0_wp .and. change%gain >= 1.0_wp, 'rings of nodes enter')
+      if (allocated(error)) return
+      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, whole, halves, 4.0_wp, change)
+      call check(error, [change%added, change%lattice], [0.0_wp, 0.0_wp], thr, 'nothing added, no node entered')
+    end associate
+  end subroutine test_halving
+
+  !> Press to a normal load in one step.
+  subroutine press(contact, state, force, next, error)
+    type(frictional_contact_t), intent(inout) :: contact
+    type(contact_state_t), intent(in) :: state
+    real(wp), intent(in) :: force
+    type(contact_state_t), intent(out) :: next
+    type(error_t), allocatable, intent(out) :: error
+
+    call advance(contact, state, load_target_t(value=[force, 0.0_wp, 0.0_wp, 0.0_wp]), .false., 1.0e-9_wp, 60, 0, next, error)
+    if (.not. allocated(error)) call check_true(error, next%converged, 'the step converges')
+  end subroutine press
+
+  !> Pressed and sheared: bodies alike need one step for the pressure; smaller tolerances make more steps, smaller bounds.
+  subroutine test_path(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(error_t), allocatable :: failure
+    type(adaptive_path_t) :: path
+    integer :: steps(2), k
+    real(wp) :: bound(2), tolerance
+    logical :: within
+
+    call new_sphere(contact, 12, 0.0_wp, 0.3_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    do k = 1, 2
+      tolerance = merge(0.2_wp, 0.02_wp, k == 1)
+      call run(contact, tolerance, path, steps(k), within, error)
+      if (allocated(error)) return
+      bound(k) = path%stick_area_error
+      call check_true(error, within .or. path%limited, 'each step is within the tolerance')
+      if (allocated(error)) return
+      call check(error, path%state%load(along_x), 0.3_wp*mu*load, 1.0e-8_wp, 'end of the path')
+      if (allocated(error)) return
+    end do
+    call check_true(error, steps(2) > steps(1), 'a smaller tolerance needs more steps')
+    if (allocated(error)) return
+    call check_true(error, bound(2) < bound(1), 'and has the smaller bound')
+    if (allocated(error)) return
+    call path%advance(contact, load_target_t(), 0.0_wp, 1.0e-8_wp, 60, 6, failure)
+    call check_raised(error, failure, status%invalid_input, 'no tolerance')
+  end subroutine test_path
+
+  !> A path up to a normal load, then along x.
+  subroutine run(contact, tolerance, path, n_step, within, error)
+    type(frictional_contact_t), intent(inout) :: contact
+    !> What a step may change
+    real(wp), intent(in) :: tolerance
+    type(adaptive_path_t), intent(out) :: path
+    !> Steps
+    integer, intent(out) :: n_step
+    !> No step added more to the change of the tractions than it may
+    logical, intent(out) :: within
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: state
+    type(load_target_t) :: target
+    integer :: segment
+
+    call new_friction_state(state, contact%problem%lattice)
+    call path%begin(state, pi)
+    n_step = 0
+    within = .true.
+    do segment = 1, 2
+      target%value = [load, merge(0.0_wp, 0.3_wp*mu*load, segment == 1), 0.0_wp, 0.0_wp]
+      do
+        call path%advance(contact, target, tolerance, 1.0e-8_wp, 60, 6, error)
+        if (allocated(error)) return
+        call check_true(error, path%state%converged, 'the step converges')
+        if (allocated(error)) return
+        n_step = n_step + 1
+        within = within .and. (path%limited .or. path%change%added <= 0.5_wp*tolerance)
+        if (path%fraction >= 1.0_wp) exit
+      end do
+    end do
+  end subroutine run
+
+  !> A path ends where the contact reaches the rim of the window in a part of a step.
+  subroutine test_rim(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(adaptive_path_t) :: path
+    type(contact_state_t) :: state
+    type(load_target_t) :: target
+
+    call new_sphere(contact, 8, 0.5_wp, 0.3_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call path%begin(state, pi)
+    target%value(normal) = 20.0_wp*load
+    call path%advance(contact, target, 0.05_wp, 1.0e-8_wp, 60, 6, error)
+    if (allocated(error)) return
+    call check_true(error, path%state%clipped .or. path%state%stopped == rim_reached, 'contact at the rim')
+  end subroutine test_rim
+
+  !> The largest of them are the residuals of the state; away from the contact they are zero.
+  subroutine test_nodal_residuals(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, state
+    type(coulomb_t) :: friction
+    real(wp), allocatable :: along_normal(:, :), tangential(:, :)
+    integer :: k
+
+    do k = 1, 2
+      friction = merge(coulomb_t(mu), coulomb_t(no_slip=.true.), k == 1)
+      call new_sphere(contact, 10, 0.5_wp, 0.3_wp, friction, error)
+      if (allocated(error)) return
+      call new_friction_state(virgin, contact%problem%lattice)
+      call advance(contact, virgin, load_target_t(value=[load, 0.2_wp, 0.0_wp, 0.0_wp]), .true., 1.0e-5_wp, 60, 0, state, error)
+      if (allocated(error)) return
+      allocate (along_normal, source=nodal_normal_residual(contact%problem%lattice, contact%problem%pair, state))
+      allocate (tangential, source=nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, friction, state))
+      call check(error, [maxval(along_normal), maxval(tangential)], [state%residual_normal, state%residual_tangential], &
+                 1.0e-12_wp, 'largest residuals')
+      if (allocated(error)) return
+      call check_true(error, state%residual_normal > 0.0_wp .and. all(tangential <= 0.0_wp .or. state%zone > 0), 'in contact')
+      if (allocated(error)) return
+      deallocate (along_normal, tangential)
+    end do
+    call check(error, largest(nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, coulomb_t(), state)), &
+               0.0_wp, 0.0_wp, 'nothing to fulfil without friction')
+  end subroutine test_nodal_residuals
+
+  !> Pressed, U = 2/5 P delta of Hertz; a twist adds M beta/2 when all sticks, wherever the origin lies.
+  subroutine test_energy(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, pressed, twisted
+    type(load_target_t) :: target
+    real(wp) :: center(2), lower(2), upper(2), energy
+    real(wp), allocatable :: x(:, :), y(:, :)
+
+    call new_sphere(contact, 12, 0.0_wp, 0.0_wp, coulomb_t(no_slip=.true.), error)
+    if (allocated(error)) return
+    call new_friction_state(virgin, contact%problem%lattice)
+    call press(contact, virgin, load, pressed, error)
+    if (allocated(error)) return
+    energy = elastic_energy(contact%problem%lattice, contact%problem%initial_gap, pressed)
+    call check(error, energy, 0.4_wp*load*pressed%motion(normal), 0.004_wp, 'energy of Hertz')
+    if (allocated(error)) return
+    target%control(about_z) = displacement_control
+    target%value = [load, 0.0_wp, 0.0_wp, 0.01_wp]
+    call advance(contact, pressed, target, .false., 1.0e-9_wp, 60, 0, twisted, error)
+    if (allocated(error)) return
+    call check(error, elastic_energy(contact%problem%lattice, contact%problem%initial_gap, twisted) - energy, &
+               0.5_wp*twisted%load(about_z)*0.01_wp, 1.0e-8_wp, 'energy of the twist')
+    if (allocated(error)) return
+    allocate (x, y, mold=pressed%pressure)
+    call contact%problem%lattice%coordinates(x, y)
+    call zone_extent(x, y, pressed%zone == stick, center, lower, upper)
+    call check(error, [center, lower + upper], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 1.0e-13_wp, 'a zone about the origin')
+    if (allocated(error)) return
+    call check(error, upper, [1.0_wp, 1.0_wp], 0.09_wp, 'as large as the contact')
+    if (allocated(error)) return
+    call zone_extent(x, y, pressed%zone > 2, center, lower, upper)
+    call check_true(error, all(ieee_is_nan([center, lower, upper])), 'no nodes')
+  end subroutine test_energy
+
+  !> q + c h^p: the extrapolation is exact, so that only the safety factor is left; scatter gives a floor.
+  subroutine test_limits(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: failure
+    real(wp) :: spacings(7), values(7, 5), errors(5)
+
+    spacings = [1.0_wp, sqrt(2.0_wp), 2.0_wp, 2.0_wp, 2.0_wp, 2.0_wp, 2.0_wp]
+    values(:, 1) = 3.0_wp + 0.1_wp*spacings
+    values(:, 2) = 1.0e9_wp*(3.0_wp + 0.1_wp*spacings**2)
+    values(:, 3) = [1.0_wp, 1.0_wp, 1.0_wp, 1.02_wp, 0.98_wp, 1.01_wp, 0.99_wp]
+    values(:, 4) = 0.0_wp
+    values(:, 5) = ieee_value(1.0_wp, ieee_quiet_nan)
+    call limits_of_error(spacings, values, errors, error)
+    if (allocated(error)) return
+    call check(error, [errors(1), errors(2)/1.0e9_wp], [0.125_wp, 0.125_wp], 1.0e-6_wp, 'trends')
+    if (allocated(error)) return
+    call check_true(error, errors(3) > 0.005_wp .and. errors(3) < 0.0332_wp, 'scatter')
+    if (allocated(error)) return
+    call check_true(error, errors(4) <= 0.0_wp .and. ieee_is_nan(errors(5)), 'nothing, and no value')
+    if (allocated(error)) return
+    call limits_of_error(spacings(:3), values(:3, :), errors, failure)
+    call check_raised(error, failure, status%invalid_input, 'three lattices')
+  end subroutine test_limits
+
+end module test_steps

@@ -22,9 +22,9 @@ program tester
   use test_laws, only: collect_laws
   use test_load_path, only: collect_load_path
   use test_direct_friction, only: collect_direct_friction
-  use test_analytic, only: collect_analytic
   use test_edges, only: collect_edges
   use test_steps, only: collect_steps
+  use test_analytic, only: collect_analytic
   implicit none
 
   type(suite_t), allocatable :: suites(:)
@@ -49,9 +49,9 @@ program tester
     new_suite('laws', collect_laws), &
     new_suite('load_path', collect_load_path), &
     new_suite('direct_friction', collect_direct_friction), &
-    new_suite('analytic', collect_analytic), &
     new_suite('edges', collect_edges), &
-    new_suite('steps', collect_steps) &
+    new_suite('steps', collect_steps), &
+    new_suite('analytic', collect_analytic) &
   ]
   call run_suites(suites, n_failed)
   if (n_failed > 0) stop 1, quiet=.true.

@@ -4,7 +4,7 @@ hc_f2py_normal: Any
 hc_f2py_friction: Any
 hc_f2py_influence: Any
 hc_f2py_cache: Any
-hc_f2py_analytic: Any
-hc_f2py_axisymmetric: Any
 hc_f2py_measures: Any
 hc_f2py_steps: Any
+hc_f2py_analytic: Any
+hc_f2py_axisymmetric: Any

@@ -4,6 +4,7 @@
 !> R. D. Mindlin and H. Deresiewicz, J. Appl. Mech. 20 (1953) 327-344.
 !> A load beyond the sliding load has no solution: the results are not numbers.
 module hc_partial_slip
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi
   implicit none
   private
@@ -66,7 +67,7 @@ contains
     real(wp), intent(in) :: load
     real(wp) :: stick_radius
 
-    stick_radius = self%contact_radius*(1.0_wp - abs(load)/self%sliding_load())**(1.0_wp/3.0_wp)
+    stick_radius = self%contact_radius*reserve(load, self%sliding_load())**(1.0_wp/3.0_wp)
   end function stick_radius
 
   !> Rigid shift under the first loading to Q: Delta_s [1 - (1 - Q/mu P)^(2/3)] [m].
@@ -77,7 +78,7 @@ contains
     real(wp), intent(in) :: load
     real(wp) :: shift
 
-    shift = sign(self%sliding_shift(), load)*(1.0_wp - (1.0_wp - abs(load)/self%sliding_load())**(2.0_wp/3.0_wp))
+    shift = sign(self%sliding_shift(), load)*(1.0_wp - reserve(load, self%sliding_load())**(2.0_wp/3.0_wp))
   end function shift
 
   !> Tangential load under a first prescribed shift: mu P [1 - (1 - Delta/Delta_s)^(3/2)] [N].
@@ -153,7 +154,7 @@ contains
     real(wp), intent(in) :: load
     real(wp) :: stick_half_width
 
-    stick_half_width = self%half_width*sqrt(1.0_wp - abs(load)/(self%friction_coefficient*self%normal_load))
+    stick_half_width = self%half_width*sqrt(reserve(load, self%friction_coefficient*self%normal_load))
   end function stick_half_width
 
   !> Shear traction under a first loading to Q' [Pa].
@@ -169,6 +170,16 @@ contains
     traction = semicircles(self%half_width, self%stick_half_width(load), x)
     traction = sign(2.0_wp*self%friction_coefficient*self%normal_load/(pi*self%half_width**2), load)*traction
   end function plane_traction
+
+  !> 1 - |Q|/(mu P); not a number beyond sliding.
+  elemental function reserve(load, sliding)
+    !> Q and mu P [N or N/m]
+    real(wp), intent(in) :: load, sliding
+    real(wp) :: reserve
+
+    reserve = 1.0_wp - abs(load)/sliding
+    if (reserve < 0.0_wp) reserve = ieee_value(reserve, ieee_quiet_nan)
+  end function reserve
 
   !> sqrt(a^2 - x^2) - sqrt(c^2 - x^2), each 0 outside.
   elemental function semicircles(a, c, x)

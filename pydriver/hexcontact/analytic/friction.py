@@ -56,7 +56,7 @@ class MindlinContact:
     def _bounded(self, load: ArrayLike) -> Array:
         """Return loads (N), none of which exceeds the sliding load."""
         loads = reals(load, "load")
-        if np.any(np.abs(loads) > self.sliding_load):
+        if np.any(np.abs(loads / self.sliding_load) > 1.0):
             raise ValueError("the tangential load is larger than mu P")
         return loads
 
@@ -203,7 +203,7 @@ class PlaneCattaneo:
 
     def stick_half_width(self, load: float) -> float:
         """Half the width (m) of the stick strip under Q' (N/m): c = b sqrt(1 - Q'/mu P')."""
-        if abs(load) > self.friction_coefficient * self.normal_load:
+        if abs(load) / (self.friction_coefficient * self.normal_load) > 1.0:
             raise ValueError("the tangential load is larger than mu P'")
         return float(flat.plane_stick_half_width(astuple(self), load))
 

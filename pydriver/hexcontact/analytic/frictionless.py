@@ -135,9 +135,9 @@ def _contact(
     value: float,
 ) -> AxisymmetricContact:
     """Solve the contact with a body of the Fortran library."""
-    radius, *others = solve(body, _GIVEN.index(name), value).tolist()
+    radius, approach, load, peak = solve(body, _GIVEN.index(name), value).tolist()
     return AxisymmetricContact(
-        body[0], radius, *others, _pressure=lambda r: at_points(pressure, body, [r], radius)
+        body[0], radius, approach, load, peak, lambda r: at_points(pressure, body, [r], radius)
     )
 
 

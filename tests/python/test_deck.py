@@ -95,7 +95,7 @@ def test_a_deck_in_si() -> None:
     assert (deck.load[0].normal_load, deck.load[0].steps, deck.load[0].label) == (31.5, 10, "press")
     assert deck.load[1].twist == pytest.approx(math.radians(0.1), rel=1e-15)
     assert (deck.output.file, deck.output.fields, deck.output.every) == (
-        "fretting.nc",
+        Path("fretting.nc"),
         ("pressure", "traction_x"),
         5,
     )

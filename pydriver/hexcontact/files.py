@@ -31,10 +31,9 @@ def text_of(path: str | Path, expected: str) -> str:
     """
     fault = ""
     try:
-        # a pipe that nobody writes to would block
-        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+        with open(path, "rb", opener=_opened) as file:
             if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                content = file.read(LARGEST_TEXT + 1)
+                content = file.read(LARGEST_TEXT + 1) or b""  # None: a file of the kernel has no more yet
                 if len(content) <= LARGEST_TEXT:
                     return content.decode("utf-8-sig")
                 fault = f"is larger than {LARGEST_TEXT >> 20} MB"
@@ -49,6 +48,19 @@ def text_of(path: str | Path, expected: str) -> str:
     except (OSError, ValueError) as error:
         fault = f"cannot be read ({getattr(error, 'strerror', None) or error})"
     raise DeckError(f"{path}: {fault}; expected {expected}")
+
+
+def beginning(path: Path, size: int) -> bytes:
+    """Read the first bytes of a file; none of what cannot be read, and of devices and pipes."""
+    with contextlib.suppress(OSError), open(path, "rb", opener=_opened) as file:
+        if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            return file.read(size) or b""
+    return b""
+
+
+def _opened(name: str, flags: int) -> int:
+    """Open a file; a pipe that nobody writes to would block."""
+    return os.open(name, flags | os.O_NONBLOCK)
 
 
 def require_ordinary(path: str | os.PathLike[str], expected: str) -> None:
@@ -75,8 +87,8 @@ def require_utf8(path: str | os.PathLike[str], expected: str) -> None:
 
 @contextlib.contextmanager
 def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
-    """Turn what goes wrong on reading a damaged or foreign file into one sentence."""
-    require_utf8(path, kind)
+    """Turn what goes wrong on reading a damaged or foreign file, or a device, into one sentence."""
+    require_ordinary(path, kind)
     try:
         yield
     except (HexcontactError, FileNotFoundError, MemoryError):

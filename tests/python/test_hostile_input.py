@@ -1,6 +1,7 @@
 """Text and files that are made to do harm: shown as text, or refused in one sentence, never obeyed."""
 
 import csv
+import io
 import json
 import os
 import re
@@ -21,10 +22,12 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, DeckError, Study, open_result
 from hexcontact.cli.app import app
+from hexcontact.cli.options import beside
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.read import MOST_INCLUDED, MOST_SERIES
 from hexcontact.deck.series import MOST_STEPS, read_series
 from hexcontact.files import LARGEST_TEXT, text_of
+from hexcontact.result.journal import Journal
 from hexcontact.solve.progress import Bar
 from hexcontact.text import html_table, text_table, visible
 
@@ -374,6 +377,53 @@ def test_series_are_bounded(folder: Path) -> None:
     many = {**BODIES, "load": [{"series": {"file": "one.csv"}}] * (MOST_SERIES + 1)}
     with pytest.raises(DeckError, match=f"load: expected at most {MOST_SERIES} files of series"):
         Case.from_dict(many)
+
+
+@pytest.mark.parametrize("device", ["pipe", "/dev/zero"])
+@pytest.mark.parametrize("name", ["000001.npz", "lattices/trials.json"])
+def test_a_journal_holds_no_devices(name: str, device: str, folder: Path) -> None:
+    Path("deck.toml").write_text(toml(BODIES) + PRESS)
+    os.mkfifo("pipe")
+    record = Path("deck.nc.d", name)
+    record.parent.mkdir(parents=True)
+    record.symlink_to(Path(device).absolute())
+    for words in (("info", "deck.nc"), ("resume", "deck.nc")):
+        assert f"{record.name}: is not a regular file" in sentence(*words)
+    for more in ((), ("--overwrite",)):
+        assert f"{record.name} may not be of hexcontact" in sentence("run", "deck.toml", *more)
+
+
+def test_why_a_run_stopped_is_read_from_a_file(folder: Path) -> None:
+    os.mkfifo("stopped.txt")
+    assert Journal(folder).stopped == ""
+    Path("stopped.txt").unlink()
+    Path("stopped.txt").symlink_to("/dev/zero")
+    assert Journal(folder).stopped == ""
+
+
+def test_a_file_of_the_kernel_that_has_nothing_to_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Nothing(io.BufferedReader):
+        def read(self, size: int | None = -1) -> bytes:
+            return None  # type: ignore[return-value]  # as BufferedReader after EAGAIN
+
+    Path("kmsg").touch()
+    monkeypatch.setattr("builtins.open", lambda name, *_, **__: Nothing(io.FileIO(name)))
+    assert text_of("kmsg", "a deck") == ""
+
+
+def test_results_are_named_beside_the_current_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for words in (
+        ("plot", "."),
+        ("plot", "/"),
+        ("plot", "..", "--what", "all"),
+        ("report", "."),
+        ("info", "."),
+    ):
+        assert "is a folder without finished steps" in sentence(*words)
+    (folder / "deck.nc.d").mkdir()
+    monkeypatch.chdir(folder / "deck.nc.d")
+    assert beside(Path(), "_zones.png") == folder / "deck.nc_zones.png"
+    assert beside(Path("a/x.nc"), ".html") == Path("a/x.html")
 
 
 # --- what a study keeps -------------------------------------------------------------------------------------

@@ -72,6 +72,12 @@ def steps_of(text: str) -> list[int]:
         raise DeckError(f"--step {text}: expected a number of a load step, or several as 10,20,30") from None
 
 
+def beside(file: Path, ending: str) -> Path:
+    """Return the name of a file beside a result; a result may be the current folder, a journal."""
+    there = file if file.name not in ("", "..") else file.resolve()
+    return there.parent / f"{there.stem}{ending}"
+
+
 def case_of(deck: Path, settings: list[str] | None) -> Case:
     """Read a deck with the keys that ``--set`` replaces."""
     from ..case import Case

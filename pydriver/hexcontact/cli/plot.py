@@ -15,7 +15,7 @@ from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError
 from ..text import did_you_mean, listed
 from .guard import command, say
-from .options import steps_of
+from .options import beside, steps_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -148,10 +148,10 @@ def plot(
     if what == _ALL:
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
-        first = output or files[0].with_suffix(suffix)
+        first = output or beside(files[0], suffix)
         say("\n".join(all_pictures(open_result(files[0]), first, chosen)))
         return
-    default = files[0].with_name(f"{files[0].stem}_{what}{suffix}") if files else Path(f"{what}{suffix}")
+    default = beside(files[0], f"_{what}{suffix}") if files else Path(f"{what}{suffix}")
     say(f"written: {picture_of([open_result(file) for file in files], what, output or default, chosen)}")
 
 

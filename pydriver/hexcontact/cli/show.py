@@ -9,7 +9,7 @@ import typer
 
 from ..errors import DeckError
 from .guard import Content, command, say
-from .options import AsJson, ResultFile, steps_of
+from .options import AsJson, ResultFile, beside, steps_of
 
 
 @command("hexcontact info hertz_spheres.nc")
@@ -36,7 +36,7 @@ def report(
     from ..result.store import open_result
     from .report import write_report
 
-    say(f"written: {write_report(open_result(file), output or file.with_suffix('.html'))}")
+    say(f"written: {write_report(open_result(file), output or beside(file, '.html'))}")
 
 
 @command("hexcontact export fretting.nc --vtk")
@@ -63,8 +63,8 @@ def export(
     from ..result import export as write
     from ..result.store import open_result
 
-    result, folder = open_result(file), output or file.with_name(f"{file.stem}_export")
-    steps, stem = None if step is None else steps_of(step), file.stem
+    result, folder = open_result(file), output or beside(file, "_export")
+    steps, stem = None if step is None else steps_of(step), beside(file, "").name
     written = [write.to_vtk(result, folder, stem, steps)] if vtk else []
     written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps)] if ugrid else []
     written += write.to_csv(result, folder, stem, steps) if csv else []

@@ -7,7 +7,6 @@ all of it, and damage never leads further than to an error.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import math
@@ -25,7 +24,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import DeckError
-from ..files import reading
+from ..files import beginning, reading
 from .check import MATERIALS, fault_of_record
 from .layout import Layout, Metadata, assemble
 from .result import Result
@@ -33,6 +32,7 @@ from .step import Step
 
 SUFFIX = ".npz"
 STOPPED = "stopped.txt"  # why the run ended before its time
+_LONGEST_REASON = 10_000  # bytes of it that are read
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _TEMPORARY = ".tmp"
 VERSION = 1
@@ -93,9 +93,7 @@ class Journal:
     @property
     def stopped(self) -> str:
         """Why the run ended before its time; empty if it goes on, was killed or has finished."""
-        with contextlib.suppress(FileNotFoundError):
-            return (self.folder / STOPPED).read_text(encoding="utf-8", errors="replace")
-        return ""
+        return beginning(self.folder / STOPPED, _LONGEST_REASON).decode(errors="replace")
 
     @property
     def complete(self) -> bool:
@@ -222,9 +220,8 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
 
 def begins_like_record(path: Path) -> bool:
     """Tell whether a file begins like a record, be it damaged."""
-    with contextlib.suppress(OSError), path.open("rb") as file:
-        return file.read(30)[:4] == b"PK\x03\x04" and file.read(len(_ABOUT)) == _ABOUT.encode()
-    return False
+    head = beginning(path, 30 + len(_ABOUT))
+    return head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode()
 
 
 def fault_of_sequence(before: Metadata, after: Metadata) -> str:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..core import memory
 from ..errors import DeckError
-from ..files import reading, require_ordinary
+from ..files import reading
 from ..variables import SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
@@ -195,7 +195,6 @@ def read_output(path: Path) -> Result:
     """
     import netCDF4
 
-    require_ordinary(path, "a netCDF file")
     with reading(path):
         sealed = check_seal(path)
     with reading(path), _alone(), netCDF4.Dataset(path) as file:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DeckError
-from ..files import reading, replacing
+from ..files import beginning, reading, replacing
 from ..lock import names_a_run
 from .journal import Journal, journal_of
 from .layout import Metadata
@@ -165,9 +165,7 @@ class TrialFolder:
     @property
     def is_ours(self) -> bool:
         """Whether a run has written the list of finished lattices."""
-        with contextlib.suppress(OSError):
-            return b'"trials_version": ' in self.ledger.read_bytes()[:200]
-        return False
+        return b'"trials_version": ' in beginning(self.ledger, 200)
 
     def foreign(self) -> Iterator[Path]:
         """Go through the files with names of a run's, in a folder with no list of finished lattices."""

@@ -46,6 +46,11 @@ module hexcontact
   use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
   use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
   use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
+  use hc_elliptic_contact, only: elliptic_contact_t, hertz_ellipse, crossed_cylinders_hessian
+  use hc_partial_slip, only: mindlin_t, plane_cattaneo_t, turning_points
+  use hc_torsion, only: lubkin_t
+  use hc_self_similar, only: no_slip_constants, goodman_stick_ratio, goodman_stick_ratio_plane
+  use hc_axisymmetric, only: axisymmetric_t, power_law_t, rounded_punch_t, flat_punch_t
   implicit none
   public
 end module hexcontact

@@ -14,7 +14,7 @@ CHANGES = {
     "extended": {r"\brk => wp\b": "rk => xp"},
     "single": {
         r"\bonly: wp\b": "only: wp => sp",
-        r"\bhc_(fftw|row_pairs|column_blocks|spectral_product)\b": r"hc_\1_single",
+        r"\bhc_(fftw|fft_layout|fft_passes)\b": r"hc_\1_single",
         r"=> c_double_complex\b": "=> c_float_complex",
         r"=> c_double\b": "=> c_float",
         r"'fftw_": "'fftwf_",

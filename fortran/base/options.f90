@@ -8,7 +8,8 @@ module hc_options
   implicit none
   private
 
-  public :: options_t, contact_options_t, newton_options_t, multilevel_options_t, direct_options_t, entry_options_t
+  public :: options_t, contact_options_t, normal_options_t, newton_options_t, multilevel_options_t, &
+            direct_options_t, entry_options_t
 
   !> What all methods share (docs/theory/friction.md, "The classification parameter", "Globalisation", "Gross sliding").
   type :: contact_options_t
@@ -29,6 +30,29 @@ module hc_options
     integer :: max_limit_motions = 100
     real(wp) :: least_limit_gain = 1.0e-9_wp
   end type contact_options_t
+
+  !> Frictionless contact on FFTs (docs/theory/normal_contact.md, "FFT method").
+  type :: normal_options_t
+    !> Length of a projected step, (N3): M is a little more than the inverse of the operator
+    real(wp) :: step_length = 0.85_wp
+    !> Factor by which projected steps have to bring the residual down every other time, or sets are held: on rough
+    !> surfaces they would change on and on
+    real(wp) :: progress = 0.5_wp
+    !> Steps that are not judged by it: the first ones cut off most of a wrong start
+    integer :: first_steps = 3
+    !> A set that is held is given up when its residual has come down by this factor: then the next one can be trusted
+    real(wp) :: held_accuracy = 0.1_wp
+    !> Share of a residual, and of the tolerance, that errors of single precision may make up
+    real(wp) :: residual_share = 0.01_wp, tolerance_share = 0.1_wp
+    !> Times that the pressure of a solution is fitted to the load: a tolerance below rounding errors is not reached by more
+    integer :: max_fits = 3
+    !> Tolerance on coarser lattices, which only have to give a start
+    real(wp) :: coarse_tolerance = 3.0e-2_wp
+    !> Tolerance on a part of the window: the product over the window sees what single precision left
+    real(wp) :: part_tolerance = 0.8_wp
+    !> Lattices with fewer nodes are left to one thread: waking the others for each of the short passes takes longer
+    integer :: worth_sharing = 150000
+  end type normal_options_t
 
   !> Newton's method on FFTs (docs/theory/friction.md, "Staggered sweep", "Coupled sweep", "Globalisation").
   type :: newton_options_t
@@ -132,6 +156,7 @@ module hc_options
   !> All of them.
   type :: options_t
     type(contact_options_t) :: contact
+    type(normal_options_t) :: normal
     type(newton_options_t) :: newton
     type(multilevel_options_t) :: multilevel
     type(direct_options_t) :: direct

@@ -24,8 +24,7 @@ module hc_contact_problem
     tangential_residual, force_residual, least_traction
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t, unilateral_t
-  use hc_transfer, only: restrict_field, restrict_mask
-  use hc_window_part, only: part_of
+  use hc_transfer, only: coarsen_bodies
   implicit none
   private
 
@@ -130,15 +129,13 @@ contains
     !> The problem there
     type(friction_problem_t), intent(out) :: coarse
 
-    coarse%lattice = self%lattice%coarsened()
+    call coarsen_bodies(self%lattice, self%initial_gap, self%candidate, coarse%lattice, coarse%initial_gap, coarse%candidate)
     coarse%pair = self%pair
     call self%friction%on_lattice(self%lattice, coarse%lattice, coarse%friction)
     allocate (coarse%normal_law, source=self%normal_law)
     coarse%goodman = self%goodman
     coarse%options = self%options
     coarse%space = self%space
-    allocate (coarse%initial_gap, source=restrict_field(self%lattice, self%initial_gap, coarse%lattice))
-    allocate (coarse%candidate, source=restrict_mask(self%lattice, self%candidate, coarse%lattice))
     allocate (coarse%x, coarse%y, mold=coarse%initial_gap)
     call coarse%lattice%coordinates(coarse%x, coarse%y)
     coarse%normal_compliance = normal_self_compliance(coarse%lattice, coarse%pair)
@@ -153,7 +150,7 @@ contains
     !> The problem there
     type(friction_problem_t), intent(out) :: part
 
-    part%lattice = part_of(self%lattice, low, high)
+    part%lattice = self%lattice%subwindow(low, high)
     part%pair = self%pair
     call self%friction%on_lattice(self%lattice, part%lattice, part%friction)
     allocate (part%normal_law, source=self%normal_law)

@@ -9,7 +9,6 @@ module hc_subwindow
   use hc_options, only: multilevel_options_t
   use hc_lattice, only: lattice_t
   use hc_contact_state, only: contact_state_t
-  use hc_window_part, only: frame, is_worth
   implicit none
   private
 
@@ -38,11 +37,11 @@ contains
     high = lattice%extent
     if (.not. found) return
     if (try == 1) then
-      call frame(state%pressure > 0.0_wp, low, high)
+      call lattice%enclose(state%pressure > 0.0_wp, low, high)
     else
-      call frame(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. candidate), low, high)
+      call lattice%enclose(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. candidate), low, high)
     end if
-    found = is_worth(low, high, lattice)
+    found = lattice%is_worth_parting(low, high)
   end subroutine next_part
 
 end module hc_subwindow

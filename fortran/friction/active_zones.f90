@@ -6,7 +6,7 @@ module hc_active_zones
   use hc_contact_state, only: separated, stick, slip, along_x, along_y, about_z, n_motion, force_control
   use hc_coulomb, only: normal_to
   use hc_friction_iterate, only: friction_iterate_t
-  use hc_spring_blend, only: soft
+  use hc_symbol_preconditioner, only: soft
   use hc_load_constraints, only: driven_motions_t, new_driven_motions, hold_nodes
   implicit none
   private

@@ -28,7 +28,8 @@ module hc_coupled_newton
   use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
   use hc_coupled_system, only: coupled_system_t
-  use hc_krylov, only: projected_gmres, fulfil
+  use hc_linear_system, only: fulfil
+  use hc_projected_gmres, only: projected_gmres
   implicit none
   private
 

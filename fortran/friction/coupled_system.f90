@@ -6,7 +6,7 @@ module hc_coupled_system
   use hc_preconditioner_extension, only: edge_extension_t
   use hc_elastic_operators, only: operators_t
   use hc_shear_system, only: shear_system_t
-  use hc_krylov, only: linear_system_t
+  use hc_linear_system, only: linear_system_t
   implicit none
   private
 

@@ -18,7 +18,7 @@ module hc_lattice_solver
   use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: staggered_sweep
   use hc_coupled_newton, only: coupled_sweep
-  use hc_krylov, only: solution_broke_off
+  use hc_linear_system, only: solution_broke_off
   implicit none
   private
 

@@ -7,18 +7,18 @@
 !>     R^T T R + D,     R: frame -> (x, y)
 !>
 !> is symmetric positive definite on these unknowns. Its preconditioner is the inverse symbol in stick, and goes
-!> over to 1/D where a node slips far (see spring_blend).
+!> over to 1/D where a node slips far (see symbol_preconditioner).
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_shear_system
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
-  use hc_spring_blend, only: node_compliance, blend
+  use hc_symbol_preconditioner, only: node_compliance, blend
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
   use hc_elastic_operators, only: operators_t
-  use hc_krylov, only: linear_system_t
-  use hc_active_set, only: packing_t, new_packing
+  use hc_linear_system, only: linear_system_t
+  use hc_active_set, only: active_set_t, new_active_set
   implicit none
   private
 
@@ -47,7 +47,7 @@ module hc_shear_system
     type(edge_extension_t), private :: edge
     !> Nodes in contact
     logical, allocatable, private :: contact(:)
-    type(packing_t), private :: nodes
+    type(active_set_t), private :: nodes
     !> Components along x and y of what is multiplied (zero off the contact) or preconditioned, and what comes of it
     real(wp), allocatable, private :: from(:), onto(:)
     real(sp), allocatable, private :: displacement(:), traction(:)
@@ -91,7 +91,7 @@ contains
       all_nodes(i) = .true.
     end do
     !$omp end parallel do
-    call new_packing(self%nodes, all_nodes, self%space)
+    call new_active_set(self%nodes, all_nodes, self%space)
   end subroutine new_shear_system
 
   !> Take the nodes in contact; weigh the preconditioners by the compliances.
@@ -107,7 +107,7 @@ contains
     if (.not. known) then
       self%contact = contact
       call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%space)
-      call new_packing(self%nodes, contact, self%space)
+      call new_active_set(self%nodes, contact, self%space)
       call self%space%fill(self%from, 0.0_wp)
     end if
     used = .false.

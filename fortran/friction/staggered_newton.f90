@@ -29,7 +29,8 @@ module hc_staggered_newton
   use hc_load_constraints, only: driven_motions_t
   use hc_active_zones, only: find_contact, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
-  use hc_krylov, only: projected_cg, precondition_constraints, fulfil, solution_accurate
+  use hc_linear_system, only: precondition_constraints, fulfil, solution_accurate
+  use hc_projected_cg, only: projected_cg
   implicit none
   private
 

@@ -27,7 +27,7 @@ module hc_subwindow_solver
     !> First and last column and row of the part
     integer :: low(2) = 0, high(2) = 0
     !> Threads that were asked for; 0: as many as OpenMP would take
-    integer :: n_threads = 0
+    integer :: threads = 0
     !> Spectra that are kept
     type(kernel_cache_t), pointer :: cache => null()
   contains
@@ -51,7 +51,7 @@ contains
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     self%problem = problem
-    if (present(n_threads)) self%n_threads = n_threads
+    if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
     call new_frictional_contact(self%whole, problem, error, n_threads, self%cache)
     if (allocated(error)) return
@@ -147,7 +147,7 @@ contains
     self%high = high
     call self%problem%take_part(low, high, problem)
     allocate (self%part)
-    call new_frictional_contact(self%part, problem, error, self%n_threads, self%cache)
+    call new_frictional_contact(self%part, problem, error, self%threads, self%cache)
   end subroutine take_part
 
   !> A step on the part, judged on the window.

@@ -7,56 +7,47 @@
 module hc_normal_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_options, only: multilevel_options_t
+  use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
-  use hc_convolution_single, only: convolution_memory
+  use hc_fft_layout_single, only: convolution_memory
   use hc_flexibility_fft, only: fft_memory
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, normal
   use hc_contact_solver, only: contact_solver_t
   use hc_symbol_preconditioner, only: preconditioner_memory
-  use hc_normal_lattice, only: normal_level_t
-  use hc_normal_iterate, only: iterate_t
-  use hc_normal_lattice_solver, only: solve_level
+  use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_iterate, only: normal_iterate_t
+  use hc_normal_lattice_solver, only: solve_on_normal_lattice
   use hc_subwindow, only: next_part
-  use hc_window_part, only: part_of
-  use hc_transfer, only: level_count, prolong_edge, restrict_field, restrict_mask
+  use hc_transfer, only: level_count, prolong_edge, coarsen_bodies
   implicit none
   private
 
   public :: normal_contact_t, new_normal_contact, normal_contact_memory
 
-  !> Windows below this many nodes a side are not coarsened any further.
-  integer, parameter :: smallest_side = 20
-  !> Coarse lattices only have to give a start.
-  real(wp), parameter :: coarse_tolerance = 3.0e-2_wp
-
-  !> Lattices with fewer nodes are left to one thread.
-  integer, parameter :: worth_sharing = 150000
-  !> Tolerance on a part of the window, relative to that on the whole.
-  real(wp), parameter :: part_tolerance = 0.8_wp
-
   !> A frictionless contact problem on a hierarchy of lattices.
   type, extends(contact_solver_t) :: normal_contact_t
     private
     !> From the finest to the coarsest lattice
-    type(normal_level_t), allocatable :: level(:)
+    type(normal_lattice_t), allocatable :: level(:)
     !> Fields of the iterations on each of them, from one solution to the next
-    type(iterate_t), allocatable :: iterate(:)
+    type(normal_iterate_t), allocatable :: iterate(:)
     !> The part of the finest lattice around the contact, and its first column and row there
-    type(normal_level_t), allocatable :: inner
+    type(normal_lattice_t), allocatable :: inner
     integer :: corner(2) = 0
     type(elastic_pair_t) :: pair
+    !> Tuning numbers
+    type(options_t) :: options
     !> The kernel, as far as it was needed
     type(normal_kernel_t) :: kernel
     !> Spectra that are kept
     type(kernel_cache_t), pointer :: cache => null()
     !> Threads that were asked for; 0: as many as OpenMP would take
-    integer :: n_threads = 0
+    integer :: threads = 0
   contains
     procedure :: solve_step
     !> Solve for a normal load or an approach
@@ -66,7 +57,7 @@ module hc_normal_contact
 contains
 
   !> Operators of a problem on all its lattices.
-  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads, cache)
+  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads, cache, options)
     !> Problem to be set up
     type(normal_contact_t), intent(out) :: self
     !> Lattice and window
@@ -83,27 +74,30 @@ contains
     integer, intent(in), optional :: n_threads
     !> Spectra that are kept; it has to outlive the problem
     type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> Tuning numbers; absent: the usual ones
+    type(options_t), intent(in), optional :: options
 
     integer :: l
 
     self%pair = pair
-    if (present(n_threads)) self%n_threads = n_threads
+    if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
+    if (present(options)) self%options = options
     call check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
     if (allocated(error)) return
-    allocate (self%level(level_count(lattice%extent, smallest_side)))
+    allocate (self%level(level_count(lattice%extent, self%options%multilevel%smallest_side)))
     allocate (self%iterate(size(self%level)))
     do l = 1, size(self%level)
       associate (level => self%level(l))
+        level%options = self%options
         if (l == 1) then
           level%lattice = lattice
           level%initial_gap = initial_gap
           level%candidate = candidate
         else
           associate (finer => self%level(l - 1))
-            level%lattice = finer%lattice%coarsened()
-            level%initial_gap = restrict_field(finer%lattice, finer%initial_gap, level%lattice)
-            level%candidate = restrict_mask(finer%lattice, finer%candidate, level%lattice)
+            call coarsen_bodies(finer%lattice, finer%initial_gap, finer%candidate, level%lattice, level%initial_gap, &
+                                level%candidate)
           end associate
         end if
         ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
@@ -183,7 +177,8 @@ contains
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
-          call solve_level(level, self%iterate(l), control, target, max(tolerance, coarse_tolerance), max_sweeps, state, error)
+          call solve_on_normal_lattice(level, self%iterate(l), control, target, &
+                                       max(tolerance, self%options%normal%coarse_tolerance), max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
@@ -202,12 +197,14 @@ contains
     type(lattice_t), intent(in) :: lattice
 
     space_of%threads = 1
-    if (self%n_threads > 0 .or. lattice%size() >= worth_sharing) space_of = space_over(lattice%extent, self%n_threads)
+    if (self%threads > 0 .or. lattice%size() >= self%options%normal%worth_sharing) then
+      space_of = space_over(lattice%extent, self%threads)
+    end if
   end function space_of
 
   !> Nodes of a part of a lattice over those of the whole.
   pure real(wp) function share_of(part, whole)
-    type(normal_level_t), intent(in) :: part, whole
+    type(normal_lattice_t), intent(in) :: part, whole
     share_of = real(part%lattice%size(), wp)/whole%lattice%size()
   end function share_of
 
@@ -232,21 +229,21 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: part
-    type(multilevel_options_t) :: options
     integer :: low(2), high(2), sweeps, try
     logical :: found
 
     associate (whole => self%level(1))
       sweeps = 0
-      do try = 1, options%max_parts + 1
-        call next_part(try, options, whole%lattice, whole%candidate, state, low, high, found)
+      do try = 1, self%options%multilevel%max_parts + 1
+        call next_part(try, self%options%multilevel, whole%lattice, whole%candidate, state, low, high, found)
         if (.not. found) exit
         call take_part(self, low, high, error)
         if (allocated(error)) return
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
           part%pressure = state%pressure(first(1):last(1), first(2):last(2))
           ! the product over the window sees what single precision left
-          call solve_level(inner, self%iterate(1), control, target, part_tolerance*tolerance, max_sweeps, part, error)
+          call solve_on_normal_lattice(inner, self%iterate(1), control, target, &
+                                       self%options%normal%part_tolerance*tolerance, max_sweeps, part, error)
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
           sweeps = sweeps + part%sweeps
@@ -265,7 +262,7 @@ contains
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
       call whole%prepare(self%pair, self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)
       if (allocated(error)) return
-      call solve_level(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
+      call solve_on_normal_lattice(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
       state%sweeps = state%sweeps + sweeps
       work = work + whole%work()
@@ -288,7 +285,8 @@ contains
     allocate (self%inner)
     self%corner = low
     associate (inner => self%inner, whole => self%level(1))
-      inner%lattice = part_of(whole%lattice, low, high)
+      inner%lattice = whole%lattice%subwindow(low, high)
+      inner%options = self%options
       inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
       inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
       call inner%prepare(self%pair, self%kernel, .true., .true., space_of(self, inner%lattice), error, self%cache)

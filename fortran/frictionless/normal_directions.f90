@@ -3,22 +3,20 @@
 !> Equations: docs/theory/normal_contact.md, (N3) to (N5).
 module hc_normal_directions
   use hc_precision, only: wp, sp
-  use hc_normal_lattice, only: normal_level_t
-  use hc_normal_iterate, only: iterate_t
+  use hc_conjugate_gradient, only: conjugate_gradient_t
+  use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_iterate, only: normal_iterate_t
   implicit none
   private
 
-  public :: find_residual, projected_step, next_direction, step_share
-
-  !> Length c of a projected step: M is a little more than the inverse.
-  real(wp), parameter :: step_length = 0.85_wp
+  public :: find_residual, projected_step, next_direction, find_step
 
 contains
 
   !> r = approach - h - w on the active nodes.
   subroutine find_residual(level, now)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     real(wp) :: gap, scale
     integer :: col, row
 
@@ -36,15 +34,16 @@ contains
 
   !> d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or what is left of p, on a set to be held.
   subroutine projected_step(level, now, held, by_load, pressures)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     logical, intent(in) :: held, by_load
     !> Sum of the pressures under a prescribed load
     real(wp), intent(in) :: pressures
-    real(wp) :: part(size(now%p, 2)), aim, mean, row_sum
+    real(wp) :: part(size(now%p, 2)), aim, mean, row_sum, step_length
     real(sp) :: lack
     integer :: col, row
 
+    step_length = level%options%normal%step_length
     mean = 0.0_wp
     if (by_load .and. .not. held) then
       !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, row_sum)
@@ -96,15 +95,16 @@ contains
   end subroutine projected_step
 
   !> Direction of conjugate gradients.
-  subroutine next_direction(level, now, by_load, rz)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+  subroutine next_direction(level, now, by_load, recurrence)
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     logical, intent(in) :: by_load
-    !> r^T z of the last direction, 0: there is none; on return that of the new one
-    real(wp), intent(inout) :: rz
+    !> That of the last direction; on return that of the new one
+    type(conjugate_gradient_t), intent(inout) :: recurrence
     real(wp), dimension(size(now%p, 2)) :: part, sum_z
-    real(wp) :: rz_new, z, product_z, total_z
+    real(wp) :: share, z, product_z, total_z
     real(sp) :: back, mean
+    logical :: anew
     integer :: col, row
 
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, z, product_z, total_z)
@@ -121,14 +121,13 @@ contains
       sum_z(row) = total_z
     end do
     !$omp end parallel do
-    rz_new = sum(part)
-    back = 0.0_sp
-    if (rz > 0.0_wp) back = real(rz_new/rz, sp)
+    call recurrence%last_share(sum(part), share, anew)
+    back = real(share, sp)
     mean = 0.0_sp
     if (by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(col)
     do row = 1, size(now%p, 2)
-      if (.not. rz > 0.0_wp) now%d(:, row, 1) = 0.0_sp
+      if (anew) now%d(:, row, 1) = 0.0_sp
       !$omp simd
       do col = now%span(1, row), now%span(2, row)
         now%d(col, row, 1) = merge(now%z(col, row, 1) + back*now%d(col, row, 1), 0.0_sp, now%active(col, row))
@@ -140,16 +139,14 @@ contains
       end do
     end do
     !$omp end parallel do
-    rz = rz_new
   end subroutine next_direction
 
   !> Length of a step of conjugate gradients; 0 if there is no curvature.
-  real(wp) function step_share(level, now, rz)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(in) :: now
-    !> r^T z
-    real(wp), intent(in) :: rz
-    real(wp) :: part(size(now%p, 2)), curvature
+  real(wp) function find_step(level, now, recurrence)
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(in) :: now
+    type(conjugate_gradient_t), intent(in) :: recurrence
+    real(wp) :: part(size(now%p, 2))
     integer :: row
 
     !$omp parallel do schedule(static) num_threads(level%space%threads)
@@ -159,9 +156,7 @@ contains
       end associate
     end do
     !$omp end parallel do
-    curvature = sum(part)
-    step_share = 0.0_wp
-    if (curvature > 0.0_wp .and. rz > 0.0_wp) step_share = rz/curvature
-  end function step_share
+    find_step = recurrence%step_length(sum(part))
+  end function find_step
 
 end module hc_normal_directions

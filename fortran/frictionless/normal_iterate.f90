@@ -5,15 +5,12 @@ module hc_normal_iterate
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
-  use hc_normal_lattice, only: normal_level_t
+  use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_rows, only: judge_row, add_row, largest_of
   implicit none
   private
 
-  public :: iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, push_only
-
-  !> Scale of the classification parameter: r = this/(2 pi lambda_1 a), a the contact radius.
-  real(wp), parameter :: classification_scale = 10.0_wp
+  public :: normal_iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, push_only
 
   !> Error of a product in single precision, relative to its largest value.
   real(wp), parameter :: single_error = epsilon(1.0_sp)
@@ -22,7 +19,7 @@ module hc_normal_iterate
   !>
   !> Those in single precision are zero off the active nodes, r but for the rings of the
   !> continuation and z and kd everywhere; their units are p_unit and p_unit times that of the preconditioner.
-  type :: iterate_t
+  type :: normal_iterate_t
     !> Pressure [Pa] and the closing of the gap that it causes [m]
     real(wp), allocatable :: p(:, :), w(:, :)
     !> Residual, preconditioned residual, direction and its product
@@ -44,14 +41,14 @@ module hc_normal_iterate
     real(wp) :: residual = huge(1.0_wp), residual_active = huge(1.0_wp)
     !> Active nodes, now and next
     integer :: n_active = 0, n_next = 0
-  end type iterate_t
+  end type normal_iterate_t
 
 contains
 
   !> Pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
   subroutine begin(level, now, by_load, target, candidate, start, error)
-    type(normal_level_t), intent(inout) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(inout) :: level
+    type(normal_iterate_t), intent(inout) :: now
     logical, intent(in) :: by_load
     real(wp), intent(in) :: target
     logical, intent(in) :: candidate(:, :)
@@ -121,8 +118,8 @@ contains
 
   !> Scale the pressure so that it has the least energy under a prescribed approach.
   subroutine rescale(level, now)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     real(wp) :: overlap(size(now%p, 2)), resistance(size(now%p, 2)), factor
     integer :: row
 
@@ -147,8 +144,8 @@ contains
   !> The residual then has no part along the motion of the punch; before there is one, the mean gap
   !> under the pressure vanishes.
   subroutine balance(level, now)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     real(wp) :: weight(size(now%p, 2)), lift(size(now%p, 2)), w, l, u
     integer :: col, row
 
@@ -183,8 +180,8 @@ contains
 
   !> Residuals, and the set that the present pressure and gap call for.
   subroutine judge(level, now, candidate, next, changed, error)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     logical, intent(in), contiguous :: candidate(:, :)
     logical, intent(out), contiguous :: next(:, :)
     !> The new set is another one
@@ -194,7 +191,9 @@ contains
     real(wp) :: r, stiffness, p_max, worst, worst_active
     integer :: row, n_next, n_changed, n_wrong
 
-    r = classification_scale/(2.0_wp*pi*level%pair%lambda_1*sqrt(level%lattice%cell_area()*now%n_active/pi))
+    ! (N2)
+    r = level%options%contact%classification_scale/(2.0_wp*pi*level%pair%lambda_1 &
+                                                    *sqrt(level%lattice%cell_area()*now%n_active/pi))
     stiffness = 1.0_wp/level%compliance
     p_max = 0.0_wp
     worst = 0.0_wp
@@ -226,8 +225,8 @@ contains
 
   !> Take a new set of active nodes.
   subroutine take_set(level, now, next)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     !> The new set; on return the old one
     logical, allocatable, intent(inout) :: next(:, :)
     logical, allocatable :: swap(:, :)
@@ -253,7 +252,7 @@ contains
 
   !> Columns between which the active nodes of each row lie, those of earlier sets included.
   subroutine find_span(now, space)
-    type(iterate_t), intent(inout) :: now
+    type(normal_iterate_t), intent(inout) :: now
     type(field_space_t), intent(in) :: space
     integer :: row
 
@@ -268,8 +267,8 @@ contains
 
   !> Pressure of a rigid punch over the active nodes, about, and nowhere negative.
   subroutine press_punch(level, now)
-    type(normal_level_t), intent(inout) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(inout) :: level
+    type(normal_iterate_t), intent(inout) :: now
 
     integer :: row
 
@@ -290,8 +289,8 @@ contains
 
   !> p <- p + share d, w <- w + share K d.
   subroutine advance(level, now, share)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     real(wp), intent(in) :: share
     real(wp) :: step, lift
     real(sp) :: largest
@@ -316,8 +315,8 @@ contains
 
   !> Leave no tension: what is within the tolerance.
   subroutine push_only(level, now, pulls)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     !> There was some
     logical, intent(out) :: pulls
     integer :: row
@@ -335,8 +334,8 @@ contains
 
   !> What the sum of the pressures lacks because of rounding.
   real(wp) function load_lack(level, now, pressures)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(in) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(in) :: now
     !> What it should be
     real(wp), intent(in) :: pressures
 
@@ -345,8 +344,8 @@ contains
 
   !> Make up for it.
   subroutine fit_load(level, now, pressures)
-    type(normal_level_t), intent(in) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(inout) :: now
     real(wp), intent(in) :: pressures
     real(wp) :: lack
 

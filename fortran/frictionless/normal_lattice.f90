@@ -5,6 +5,7 @@
 module hc_normal_lattice
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
+  use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -17,22 +18,23 @@ module hc_normal_lattice
   use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t
   use hc_contact_state, only: contact_state_t
   use hc_contact_residuals, only: conclude, normal_self_compliance
-  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner, single_cost
+  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner, single_cost
   use hc_preconditioner_extension, only: edge_extension_t
   implicit none
   private
 
-  public :: normal_level_t
+  public :: normal_lattice_t
 
   !> The problem on one lattice.
-  type :: normal_level_t
+  type :: normal_lattice_t
     type(lattice_t) :: lattice
     !> Initial gap (n_col, n_row) [m]
     real(wp), allocatable :: initial_gap(:, :)
     !> Nodes that may come into contact (n_col, n_row)
     logical, allocatable :: candidate(:, :)
     type(elastic_pair_t) :: pair
-    type(preconditioner_t) :: preconditioner
+    type(options_t) :: options
+    type(symbol_preconditioner_t) :: preconditioner
     !> The flexibility in single precision, in the unit of the preconditioner
     type(convolution_t) :: single
     !> The flexibility in double precision; is it there, and is the rest?
@@ -53,7 +55,7 @@ module hc_normal_lattice
     procedure :: multiply, precondition, multiply_exactly
     !> Work so far, in applications of the full operator
     procedure :: work
-  end type normal_level_t
+  end type normal_lattice_t
 
   !> The kernel of the pressure in single precision.
   type, extends(kernel_source_t) :: rounded_kernel_t
@@ -66,7 +68,7 @@ contains
 
   !> Operators of a problem whose lattice, gap and candidates are known; those that are there are kept.
   subroutine prepare(self, pair, kernel, exact, iterating, space, error, cache)
-    class(normal_level_t), intent(inout) :: self
+    class(normal_lattice_t), intent(inout) :: self
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
     !> The kernel, as far as it is at hand
@@ -88,13 +90,13 @@ contains
     self%compliance = normal_self_compliance(self%lattice, pair)
     self%space = space
     if (exact .and. .not. self%exact) then
-      call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., n_threads=space%threads, &
+      call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., space=space, &
                                kernel=kernel, cache=cache)
       if (allocated(error)) return
       self%exact = .true.
     end if
     if (self%iterating .or. .not. iterating) return
-    call new_preconditioner(self%preconditioner, self%lattice, pair, space, error, cache=cache)
+    call new_symbol_preconditioner(self%preconditioner, self%lattice, pair, space, error, cache=cache)
     if (allocated(error)) return
     call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, space, error)
     if (allocated(error)) return
@@ -124,7 +126,7 @@ contains
 
   !> Gap, zones, load and residuals of a given pressure at a given approach.
   subroutine conclude_anew(self, control, target, tolerance, state, error)
-    class(normal_level_t), intent(inout) :: self
+    class(normal_lattice_t), intent(inout) :: self
     !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
@@ -151,7 +153,7 @@ contains
 
   !> K d in single precision, in units of the preconditioner.
   subroutine multiply(self, d, kd)
-    class(normal_level_t), intent(inout) :: self
+    class(normal_lattice_t), intent(inout) :: self
     !> Pressure (n_col, n_row, 1)
     real(sp), intent(in), contiguous :: d(:, :, :)
     !> Closing of the gap (n_col, n_row, 1)
@@ -163,7 +165,7 @@ contains
 
   !> z = M r in single precision.
   subroutine precondition(self, edge, r, z)
-    class(normal_level_t), intent(inout) :: self
+    class(normal_lattice_t), intent(inout) :: self
     !> Continuation beyond the active nodes
     type(edge_extension_t), intent(in) :: edge
     !> Displacement on the active nodes (n_col, n_row, 1); changed on the rings around them
@@ -177,7 +179,7 @@ contains
 
   !> w = K p in double precision.
   subroutine multiply_exactly(self, p, w, error)
-    class(normal_level_t), intent(inout) :: self
+    class(normal_lattice_t), intent(inout) :: self
     !> Pressure [Pa] and closing of the gap [m] (n_col, n_row)
     real(wp), intent(in), contiguous, target :: p(:, :)
     real(wp), intent(out), contiguous, target :: w(:, :)
@@ -191,7 +193,7 @@ contains
   end subroutine multiply_exactly
 
   pure real(wp) function work(self)
-    class(normal_level_t), intent(in) :: self
+    class(normal_lattice_t), intent(in) :: self
     work = self%flexibility%applications + self%single_work
   end function work
 

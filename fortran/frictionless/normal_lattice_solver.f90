@@ -16,35 +16,26 @@
 module hc_normal_lattice_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: normal_options_t
+  use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
   use hc_contact_residuals, only: conclude
-  use hc_normal_lattice, only: normal_level_t
-  use hc_normal_iterate, only: iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, &
-                               push_only
-  use hc_normal_directions, only: find_residual, projected_step, next_direction, step_share
+  use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_iterate, only: normal_iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, &
+                               fit_load, push_only
+  use hc_normal_directions, only: find_residual, projected_step, next_direction, find_step
   implicit none
   private
 
-  public :: solve_level
-
-  !> Projected steps have to bring the residual down by this factor every other time, or sets are held.
-  real(wp), parameter :: progress = 0.5_wp
-  !> Steps that are not judged.
-  integer, parameter :: first_steps = 3
-  !> A set that is held is given up when its residual has come down by this factor.
-  real(wp), parameter :: held_accuracy = 0.1_wp
-  !> Share of a residual, and of the tolerance, that errors of single precision may make up.
-  real(wp), parameter :: residual_share = 0.01_wp, tolerance_share = 0.1_wp
-  !> Times that the pressure of a solution is fitted to the load: a tolerance below rounding errors is not reached by more.
-  integer, parameter :: max_fits = 3
+  public :: solve_on_normal_lattice
 
 contains
 
   !> Solve for a normal load or an approach.
-  subroutine solve_level(level, now, control, target, tolerance, max_sweeps, state, error)
-    type(normal_level_t), intent(inout) :: level
+  subroutine solve_on_normal_lattice(level, now, control, target, tolerance, max_sweeps, state, error)
+    type(normal_lattice_t), intent(inout) :: level
     !> Iterate of an earlier solution, whose memory is used again
-    type(iterate_t), intent(inout) :: now
+    type(normal_iterate_t), intent(inout) :: now
     !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
@@ -87,12 +78,12 @@ contains
       state%motion(normal) = now%approach
     end if
     call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%space, error)
-  end subroutine solve_level
+  end subroutine solve_on_normal_lattice
 
   !> Iterations up to the tolerance.
   subroutine iterate(level, now, by_load, target, tolerance, max_sweeps, start, sweeps, error)
-    type(normal_level_t), intent(inout) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(inout) :: level
+    type(normal_iterate_t), intent(inout) :: now
     !> The normal load is prescribed, not the approach
     logical, intent(in) :: by_load
     !> Normal load [N] or approach [m]
@@ -106,10 +97,13 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     logical, allocatable :: candidate(:, :), next(:, :)
-    real(wp) :: history(3), held_start, rz_old, pressures, share
+    real(wp) :: history(3), held_start, pressures, share
+    type(conjugate_gradient_t) :: recurrence
     logical :: changed, held, fresh
     integer :: fits
+    type(normal_options_t) :: options
 
+    options = level%options%normal
     allocate (candidate, source=level%candidate)
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
     if (.not. by_load) candidate = candidate .and. level%initial_gap < target
@@ -121,21 +115,21 @@ contains
     held = .false.
     fresh = .false.
     held_start = 1.0_wp
-    rz_old = 0.0_wp
     sweeps = 0
     fits = 0
     do
       if (by_load) call balance(level, now)
       call judge(level, now, candidate, next, changed, error)
       if (allocated(error)) return
-      if (level%exact .and. now%stale > level%compliance*now%p_max*max(residual_share*now%residual, tolerance_share*tolerance)) then
+      if (level%exact .and. now%stale > level%compliance*now%p_max*max(options%residual_share*now%residual, &
+                                                                       options%tolerance_share*tolerance)) then
         if (by_load) call fit_load(level, now, pressures)
         call find_closing(level, now, error)
         if (allocated(error)) return
         cycle
       end if
-      if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < max_fits) then
-        if (abs(load_lack(level, now, pressures)) > tolerance_share*tolerance*pressures) then
+      if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < options%max_fits) then
+        if (abs(load_lack(level, now, pressures)) > options%tolerance_share*tolerance*pressures) then
           fits = fits + 1
           call fit_load(level, now, pressures)
           call find_closing(level, now, error)
@@ -148,10 +142,10 @@ contains
       if (sweeps == 1) changed = .true.
 
       ! has the residual come down, compared with the best but the last two?
-      if (.not. held .and. sweeps > first_steps) held = now%residual > progress*history(3)
+      if (.not. held .and. sweeps > options%first_steps) held = now%residual > options%progress*history(3)
       history = [now%residual, history(1), min(history(2), history(3))]
       if (held .and. changed) then
-        if (fresh .and. now%residual_active > held_accuracy*held_start) then
+        if (fresh .and. now%residual_active > options%held_accuracy*held_start) then
           changed = .false.
         else
           held_start = min(now%residual, 1.0_wp)
@@ -161,7 +155,7 @@ contains
 
       if (changed) then
         call take_set(level, now, next)
-        rz_old = 0.0_wp
+        call recurrence%restart()
       end if
       if (by_load .and. .not. allocated(now%punch)) call press_punch(level, now)
       if (.not. (changed .and. held)) then
@@ -173,11 +167,11 @@ contains
         call projected_step(level, now, held, by_load, pressures)
         share = 1.0_wp
       else
-        call next_direction(level, now, by_load, rz_old)
+        call next_direction(level, now, by_load, recurrence)
       end if
       call level%multiply(now%d, now%kd)
       if (.not. changed) then
-        share = step_share(level, now, rz_old)
+        share = find_step(level, now, recurrence)
         if (.not. share > 0.0_wp) then
           ! nothing is left to gain in single precision, and perhaps at all
           if (.not. (level%exact .and. now%stale > 0.0_wp)) return
@@ -192,8 +186,8 @@ contains
 
   !> w = K p in double precision: nothing of single precision is left in it.
   subroutine find_closing(level, now, error)
-    type(normal_level_t), intent(inout) :: level
-    type(iterate_t), intent(inout) :: now
+    type(normal_lattice_t), intent(inout) :: level
+    type(normal_iterate_t), intent(inout) :: now
     type(error_t), allocatable, intent(out) :: error
 
     call level%multiply_exactly(now%p, now%w, error)

@@ -26,6 +26,13 @@ module hc_lattice
   !> Nodes of a window and size of an index that default integers can still work with.
   integer, parameter :: most_nodes = 2**29 - 1, largest_index = most_nodes
 
+  !> A part is worth operators of its own below this share of the nodes of the window.
+  real(wp), parameter :: worth = 0.6_wp
+  !> Nodes around the contact: so many, and its extent over this.
+  integer, parameter :: least_margin = 6, margin_part = 16
+  !> Sides of parts grow in steps of about this share of them.
+  integer, parameter :: step_part = 16
+
   !> Basis, origin and index window of a lattice.
   type :: lattice_t
     !> Basis vectors as columns [m]
@@ -49,6 +56,8 @@ module hc_lattice
     procedure :: coarsened
     !> Basis vectors over the spacing
     procedure :: unit_basis
+    !> The part of the window around some nodes: its columns and rows, whether it pays, its lattice
+    procedure :: enclose, is_worth_parting, subwindow
   end type lattice_t
 
 contains
@@ -179,5 +188,55 @@ contains
     integer, intent(in) :: n
     floor_half = (n - modulo(n, 2))/2
   end function floor_half
+
+  !> First and last column and row of the part around some nodes, with a margin as far as the window goes.
+  !>
+  !> It depends on nothing else, so that a load gives the same bits whatever came before it.
+  pure subroutine enclose(self, nodes, low, high)
+    class(lattice_t), intent(in) :: self
+    !> The nodes (n_col, n_row)
+    logical, intent(in) :: nodes(:, :)
+    !> Columns and rows, from 1 on
+    integer, intent(out) :: low(2), high(2)
+    integer :: d, margin, step
+    logical :: line(maxval(self%extent))
+
+    do d = 1, 2
+      line = .false.
+      line(:self%extent(d)) = any(nodes, dim=3 - d)
+      low(d) = max(findloc(line, .true., dim=1), 1)
+      high(d) = findloc(line, .true., dim=1, back=.true.)
+      if (high(d) == 0) high(d) = self%extent(d)
+      margin = least_margin + (high(d) - low(d) + 1)/margin_part
+      ! in steps of a power of two, so that loads that are alike share a part
+      step = least_margin
+      do while (step*step_part < high(d) - low(d))
+        step = 2*step
+      end do
+      low(d) = max((low(d) - margin - 1)/step*step + 1, 1)
+      high(d) = min((high(d) + margin + step - 1)/step*step, self%extent(d))
+    end do
+  end subroutine enclose
+
+  !> Is the part so much smaller than the window that operators of its own pay?
+  pure logical function is_worth_parting(self, low, high)
+    class(lattice_t), intent(in) :: self
+    !> First and last column and row of the part
+    integer, intent(in) :: low(2), high(2)
+    is_worth_parting = product(high - low + 1) <= worth*self%size()
+  end function is_worth_parting
+
+  !> Lattice and window of a part.
+  pure function subwindow(self, low, high) result(part)
+    class(lattice_t), intent(in) :: self
+    !> First and last column and row of the part
+    integer, intent(in) :: low(2), high(2)
+    type(lattice_t) :: part
+
+    part%basis = self%basis
+    part%origin = self%origin
+    part%first = self%first + low - 1
+    part%extent = high - low + 1
+  end function subwindow
 
 end module hc_lattice

@@ -11,6 +11,7 @@ module hc_transfer
   private
 
   public :: level_count, prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
+  public :: coarsen_bodies
 
 contains
 
@@ -29,6 +30,24 @@ contains
       level_count = level_count + 1
     end do
   end function level_count
+
+  !> Gap of the undeformed bodies and candidates on the lattice of every second node.
+  pure subroutine coarsen_bodies(lattice, initial_gap, candidate, coarse_lattice, coarse_gap, coarse_candidate)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Initial gap (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> The same on the coarser lattice
+    type(lattice_t), intent(out) :: coarse_lattice
+    real(wp), allocatable, intent(out) :: coarse_gap(:, :)
+    logical, allocatable, intent(out) :: coarse_candidate(:, :)
+
+    coarse_lattice = lattice%coarsened()
+    coarse_gap = restrict_field(lattice, initial_gap, coarse_lattice)
+    coarse_candidate = restrict_mask(lattice, candidate, coarse_lattice)
+  end subroutine coarsen_bodies
 
   !> Interpolate a field from the coarse to the fine lattice; zero outside the coarse window.
   subroutine prolong(coarse_lattice, coarse, fine_lattice, fine, space)

@@ -9,13 +9,13 @@ module hc_active_set
   implicit none
   private
 
-  public :: packing_t, new_packing
+  public :: active_set_t, new_active_set
 
   !> Nodes that one thread looks through at a time.
   integer, parameter :: block_size = 8192
 
   !> Runs of active nodes.
-  type :: packing_t
+  type :: active_set_t
     !> Number of active nodes
     integer :: n_active = 0
     type(field_space_t), private :: space
@@ -30,14 +30,14 @@ module hc_active_set
     procedure :: pack_columns
     !> Put them where they belong, the rest of the field stays as it is
     procedure :: unpack => unpack_field
-  end type packing_t
+  end type active_set_t
 
 contains
 
   !> Find the runs of active nodes; they end at the ends of blocks, too.
-  subroutine new_packing(self, active, space)
-    !> Packing to be set up
-    type(packing_t), intent(out) :: self
+  subroutine new_active_set(self, active, space)
+    !> Set to be set up
+    type(active_set_t), intent(out) :: self
     !> Active nodes
     logical, intent(in), contiguous :: active(:)
     !> Space of the fields
@@ -80,7 +80,7 @@ contains
       start = (block - 1)*block_size + 1
     end function start
 
-  end subroutine new_packing
+  end subroutine new_active_set
 
   !> Number of runs of active nodes.
   pure integer function count_runs(active)
@@ -116,7 +116,7 @@ contains
 
   !> The active nodes of a field.
   subroutine pack_field(self, field, packed)
-    class(packing_t), intent(in) :: self
+    class(active_set_t), intent(in) :: self
     !> Field over all nodes
     real(wp), intent(in), contiguous :: field(:)
     !> Its values at the active nodes (n_active)
@@ -135,7 +135,7 @@ contains
 
   !> Several vectors on the active nodes.
   subroutine pack_columns(self, columns, packed)
-    class(packing_t), intent(in) :: self
+    class(active_set_t), intent(in) :: self
     !> Vectors over all nodes (n, number of vectors)
     real(wp), intent(in), contiguous :: columns(:, :)
     !> Vectors on the active nodes (n_active, number of vectors)
@@ -150,7 +150,7 @@ contains
 
   !> Put values where they belong.
   subroutine unpack_field(self, packed, field)
-    class(packing_t), intent(in) :: self
+    class(active_set_t), intent(in) :: self
     !> Values at the active nodes (n_active)
     real(wp), intent(in), contiguous :: packed(:)
     !> Field over all nodes; the rest stays as it is

@@ -8,7 +8,7 @@ module hc_elastic_operators
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
-  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner, preconditioner_memory
+  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner, preconditioner_memory
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_preconditioner_extension, only: edge_extension_t
   implicit none
@@ -19,7 +19,7 @@ module hc_elastic_operators
   !> Operator and preconditioners over one window, and the work they did.
   type :: operators_t
     type(fft_flexibility_t) :: flexibility
-    type(preconditioner_t) :: normal, tangential
+    type(symbol_preconditioner_t) :: normal, tangential
     !> Space of the fields
     type(field_space_t) :: space
     !> Work of the preconditioners, in applications of the full operator
@@ -50,11 +50,11 @@ contains
     !> Spectra that are kept
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
-    call new_fft_flexibility(self%flexibility, lattice, pair, error, n_threads=space%threads, cache=cache)
+    call new_fft_flexibility(self%flexibility, lattice, pair, error, space=space, cache=cache)
     if (allocated(error)) return
-    call new_preconditioner(self%normal, lattice, pair, space, error, cache=cache)
+    call new_symbol_preconditioner(self%normal, lattice, pair, space, error, cache=cache)
     if (allocated(error)) return
-    call new_preconditioner(self%tangential, lattice, pair, space, error, tangential=.true., cache=cache)
+    call new_symbol_preconditioner(self%tangential, lattice, pair, space, error, tangential=.true., cache=cache)
     self%space = space
   end subroutine new_operators
 

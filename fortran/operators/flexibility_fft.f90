@@ -8,7 +8,8 @@ module hc_flexibility_fft
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility, only: flexibility_t, check_operator, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
-  use hc_convolution, only: convolution_t, new_convolution, convolution_memory, transform_memory, kernel_source_t
+  use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
+  use hc_fft_layout, only: convolution_memory, transform_memory
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_pressure_kernel, only: normal_kernel_t
@@ -39,19 +40,19 @@ module hc_flexibility_fft
 contains
 
   !> Plans and spectra of the operator over a window.
-  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, n_threads, kernel, cache)
+  subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, space, kernel, cache)
     !> Operator to be set up
     type(fft_flexibility_t), intent(out) :: operator
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
-    !> Allocated on failure: a lattice, constants or threads of no use, not enough memory
+    !> Allocated on failure: a lattice or constants of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
     !> Only the action of the pressure on the gap will be asked for
     logical, intent(in), optional :: normal_only
-    !> Threads to use; absent or 0: as many as OpenMP would take
-    integer, intent(in), optional :: n_threads
+    !> Space of the fields; absent: as many threads as OpenMP would take
+    type(field_space_t), intent(in), optional :: space
     !> With `normal_only`: the kernel, as far as it is at hand
     type(normal_kernel_t), intent(inout), optional :: kernel
     !> Spectra that are kept
@@ -60,19 +61,20 @@ contains
     type(lattice_blocks_t) :: source
     type(normal_kernel_t) :: made
     type(kernel_key_t) :: key
-    type(field_space_t) :: space
+    type(field_space_t) :: shared
     logical :: only_normal, found
 
-    call check_operator(lattice, pair, error, n_threads)
+    call check_operator(lattice, pair, error)
     if (allocated(error)) return
-    space = space_over(lattice%extent, n_threads)
+    shared = space_over(lattice%extent)
+    if (present(space)) shared = space
     only_normal = .false.
     if (present(normal_only)) only_normal = normal_only
     operator%lattice = lattice
     operator%pair = pair
     operator%n_component = merge(1, 3, only_normal)
     call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
-                         merge(1, n_block, only_normal), operator%n_component, space, error, &
+                         merge(1, n_block, only_normal), operator%n_component, shared, error, &
                          first_odd=first_odd_block)
     if (allocated(error)) return
     operator%convolution%factor = pair%lambda_1*lattice%spacing()
@@ -80,10 +82,10 @@ contains
     call operator%convolution%take_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
     if (only_normal .and. present(kernel)) then
-      call kernel%cover(lattice, space)
+      call kernel%cover(lattice, shared)
       call operator%convolution%transform_kernels(kernel, error)
     else if (only_normal) then
-      call made%cover(lattice, space)
+      call made%cover(lattice, shared)
       call operator%convolution%transform_kernels(made, error)
     else
       source%basis = lattice%unit_basis()

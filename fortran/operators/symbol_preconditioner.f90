@@ -4,10 +4,17 @@
 !> as large, so that one application costs about a quarter of a product. It is symmetric
 !> and positive definite, also when it is restricted to a set of nodes.
 !>
-!> For shear tractions there is a second one, of a body whose every node has a soft
-!> spring (see spring_blend).
+!> For shear tractions there is a second one, of a body whose every node has a soft spring: which one suits a slipping node
+!> depends on the compliance D of its spring.
+!> The elastic compliance of a traction is the greater the longer its waves are: from that of a
+!> single node, t_h, for the shortest ones to that of the whole contact. A spring that is
+!> softer than all of them leaves 1/D, one that is stiffer than all of them leaves the inverse symbol.
+!> In between short waves see the spring and long ones the elastic body: there the
+!> inverse symbol is taken of the body on springs of one compliance. The three go over into each other with log D,
 !>
-!> Equations: docs/theory/preconditioner.md, (P1), (P4).
+!>     M = sqrt(chi_1) T^-1 sqrt(chi_1) + sqrt(chi_2) (T + D_soft)^-1 sqrt(chi_2) + chi_3/D,     sum of chi = 1.
+!>
+!> Equations: docs/theory/preconditioner.md, (P1), (P4) to (P6).
 module hc_symbol_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
@@ -15,19 +22,24 @@ module hc_symbol_preconditioner
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
-  use hc_convolution_single, only: convolution_t, new_convolution, convolution_memory
+  use hc_convolution_single, only: convolution_t, new_convolution
+  use hc_fft_layout_single, only: convolution_memory
   use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_preconditioner_extension, only: edge_extension_t
-  use hc_spring_blend, only: node_ratio, soft
   use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
 
-  public :: preconditioner_t, new_preconditioner, preconditioner_memory
+  public :: symbol_preconditioner_t, new_symbol_preconditioner, preconditioner_memory
+  public :: node_compliance, blend, soft
 
   !> A transform in single precision moves half of the bytes, and is counted as half of one.
   real(wp), parameter, public :: single_cost = 0.5_wp
+
+  !> Compliances, over that of a node, up to which a spring counts as stiff, where it counts as soft, and
+  !> from where on nothing else counts.
+  real(wp), parameter :: stiff = 0.5_wp, soft = 8.0_wp, loose = 64.0_wp
 
   !> Blocks (onto, from) of the symmetric inverse.
   integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
@@ -35,7 +47,7 @@ module hc_symbol_preconditioner
   integer, parameter :: n_tangential = 3
 
   !> Approximate inverse of the normal or of the tangential flexibility.
-  type :: preconditioner_t
+  type :: symbol_preconditioner_t
     type(convolution_t), private :: convolution
     !> Displacement per traction that the single precision numbers are scaled with [m/Pa]
     real(wp) :: unit = 1.0_wp
@@ -50,14 +62,14 @@ module hc_symbol_preconditioner
     procedure :: apply
     !> The same in single precision, displacements and tractions in any units of ratio `unit`
     procedure :: apply_single
-  end type preconditioner_t
+  end type symbol_preconditioner_t
 
 contains
 
   !> Plans and inverse symbol over a window.
-  subroutine new_preconditioner(self, lattice, pair, space, error, tangential, cache)
+  subroutine new_symbol_preconditioner(self, lattice, pair, space, error, tangential, cache)
     !> Preconditioner to be set up
-    type(preconditioner_t), intent(out) :: self
+    type(symbol_preconditioner_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
@@ -118,7 +130,7 @@ contains
     end do
     !$omp end parallel do
     call self%convolution%share_spectra(cache, key)
-  end subroutine new_preconditioner
+  end subroutine new_symbol_preconditioner
 
   !> Inverse of a symmetric matrix.
   pure function inverse(matrix)
@@ -145,7 +157,7 @@ contains
   end function preconditioner_memory
 
   subroutine apply(self, displacement, traction, edge)
-    class(preconditioner_t), intent(inout) :: self
+    class(symbol_preconditioner_t), intent(inout) :: self
     !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2) [m]
     real(wp), intent(in), contiguous :: displacement(:, :, :)
     !> Pressure, or shear tractions (n_col, n_row, 1 or 2) [Pa]
@@ -184,7 +196,7 @@ contains
   end subroutine apply
 
   subroutine apply_single(self, displacement, traction, edge, on_springs)
-    class(preconditioner_t), intent(inout) :: self
+    class(symbol_preconditioner_t), intent(inout) :: self
     !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
     real(sp), intent(inout), contiguous, target :: displacement(:, :, :)
     !> Pressure, or shear tractions (n_col, n_row, 1 or 2)
@@ -215,5 +227,42 @@ contains
       call edge%fold(field)
     end do
   end subroutine apply_single
+
+  !> Elastic compliance t_h = 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa].
+  pure real(wp) function node_compliance(lattice, pair)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+
+    node_compliance = node_ratio(pair)*pair%lambda_1*lattice%spacing()
+  end function node_compliance
+
+  !> t_h over lambda_1 and the spacing.
+  pure real(wp) function node_ratio(pair)
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+
+    node_ratio = 2.0_wp + pair%gamma()
+  end function node_ratio
+
+  !> sqrt(chi) of the inverse symbols without and with soft springs; the rest of the squares belongs to 1/D.
+  pure function blend(ratio) result(weight)
+    !> Compliance of the spring over that of the node
+    real(wp), intent(in) :: ratio
+    real(wp) :: weight(2)
+    real(wp) :: share
+
+    if (ratio <= stiff) then
+      weight = [1.0_wp, 0.0_wp]
+    else if (ratio < soft) then
+      share = log(ratio/stiff)/log(soft/stiff)
+      weight = sqrt([1.0_wp - share, share])
+    else if (ratio < loose) then
+      weight = [0.0_wp, sqrt(log(loose/ratio)/log(loose/soft))]
+    else
+      weight = 0.0_wp
+    end if
+  end function blend
 
 end module hc_symbol_preconditioner

@@ -128,7 +128,7 @@ contains
       else
         allocate (fft)
         slot%operator => fft
-        call new_fft_flexibility(fft, slot%lattice, pair_of(lambda), error, n_threads=n_threads, cache=kernel_cache)
+        call new_fft_flexibility(fft, slot%lattice, pair_of(lambda), error, space=slot%space, cache=kernel_cache)
       end if
     end if
     if (allocated(error)) call free_slot(handle)

@@ -24,6 +24,7 @@ program tester
   use test_direct_friction, only: collect_direct_friction
   use test_edges, only: collect_edges
   use test_steps, only: collect_steps
+  use test_analytic, only: collect_analytic
   implicit none
 
   type(suite_t), allocatable :: suites(:)
@@ -49,7 +50,8 @@ program tester
     new_suite('load_path', collect_load_path), &
     new_suite('direct_friction', collect_direct_friction), &
     new_suite('edges', collect_edges), &
-    new_suite('steps', collect_steps) &
+    new_suite('steps', collect_steps), &
+    new_suite('analytic', collect_analytic) &
   ]
   call run_suites(suites, n_failed)
   if (n_failed > 0) stop 1, quiet=.true.

@@ -14,8 +14,7 @@ module test_flexibility
   use hc_contact_residuals, only: normal_self_compliance
   use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   use hc_triangle_integrals, only: linear_load_displacement
-  use hc_spring_blend, only: node_compliance, soft
-  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner
+  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner, node_compliance, soft
   use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
   private
@@ -304,9 +303,9 @@ contains
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [53, 61], error)
     if (allocated(error)) return
-    call new_fft_flexibility(one, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, n_threads=1)
+    call new_fft_flexibility(one, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, space=field_space_t(1))
     if (allocated(error)) return
-    call new_fft_flexibility(three, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, n_threads=3)
+    call new_fft_flexibility(three, lattice, elastic_pair_t(1.0_wp, 0.2_wp, 0.5_wp), error, space=field_space_t(3))
     if (allocated(error)) return
     call random_number(traction)
     call one%apply(all_components, traction, all_components, u, error)
@@ -490,7 +489,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(fft_flexibility_t) :: fft
-    type(preconditioner_t) :: preconditioner
+    type(symbol_preconditioner_t) :: preconditioner
     type(elastic_pair_t) :: pair
     real(wp), dimension(65, 65, 1) :: traction, closing, back
     real(wp) :: x(65, 65), y(65, 65)
@@ -500,7 +499,7 @@ contains
     if (allocated(error)) return
     call new_fft_flexibility(fft, lattice, pair, error, normal_only=.true.)
     if (allocated(error)) return
-    call new_preconditioner(preconditioner, lattice, pair, field_space_t(), error)
+    call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), error)
     if (allocated(error)) return
     ! waves of zero mean under a wide envelope
     call lattice%coordinates(x, y)
@@ -516,7 +515,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(fft_flexibility_t) :: fft
-    type(preconditioner_t) :: preconditioner
+    type(symbol_preconditioner_t) :: preconditioner
     type(elastic_pair_t) :: pair
     real(wp), dimension(65, 65, 2) :: traction, displacement, back
     real(wp) :: x(65, 65), y(65, 65)
@@ -527,7 +526,7 @@ contains
     if (allocated(error)) return
     call new_fft_flexibility(fft, lattice, pair, error)
     if (allocated(error)) return
-    call new_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=.true.)
+    call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=.true.)
     if (allocated(error)) return
     call lattice%coordinates(x, y)
     traction(:, :, 1) = cos(0.9_wp*x + 0.5_wp*y)*exp(-(x**2 + y**2)/100.0_wp)
@@ -548,7 +547,7 @@ contains
   subroutine test_preconditioner_definite(error)
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
-    type(preconditioner_t) :: preconditioner
+    type(symbol_preconditioner_t) :: preconditioner
     type(elastic_pair_t) :: pair
     integer, parameter :: n_col = 9, n_row = 6
     real(wp), allocatable :: matrix(:, :), unit(:), answer(:, :, :), values(:), work(:)
@@ -558,7 +557,7 @@ contains
     call new_lattice(lattice, equilateral_basis(0.2_wp), [-4, 7], [n_col, n_row], error)
     if (allocated(error)) return
     do n_component = 1, 2
-      call new_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=n_component == 2)
+      call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=n_component == 2)
       if (allocated(error)) return
       n = n_col*n_row*n_component
       if (allocated(matrix)) deallocate (matrix, unit, answer, values, work)

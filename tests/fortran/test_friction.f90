@@ -14,7 +14,7 @@ module test_friction
   use hc_coulomb, only: coulomb_t, linearize, on_cone, normal_to
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
-  use hc_krylov, only: projected_cg
+  use hc_projected_cg, only: projected_cg
   use hc_elastic_operators, only: operators_t, new_operators
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact

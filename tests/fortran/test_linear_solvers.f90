@@ -3,7 +3,10 @@ module test_linear_solvers
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
-  use hc_krylov, only: linear_system_t, projected_cg, projected_gmres, precondition_constraints, fulfil, solution_accurate, &
+  use hc_conjugate_gradient, only: conjugate_gradient_t
+  use hc_projected_cg, only: projected_cg
+  use hc_projected_gmres, only: projected_gmres
+  use hc_linear_system, only: linear_system_t, precondition_constraints, fulfil, solution_accurate, &
     iterations_used_up, solution_broke_off
   use testing, only: test_t, new_test, check, check_true
   implicit none
@@ -28,6 +31,7 @@ contains
     type(test_t), allocatable, intent(out) :: tests(:)
 
     tests = [ &
+      new_test('recurrence', test_recurrence), &
       new_test('projected_cg', test_projected_cg), &
       new_test('three_constraints', test_three_constraints), &
       new_test('outcomes', test_outcomes), &
@@ -36,6 +40,36 @@ contains
       new_test('ends_of_gmres', test_ends_of_gmres) &
     ]
   end subroutine collect_linear_solvers
+
+  !> Shares and steps of the recurrence; it begins again after a restart, and where r^T z was not positive.
+  subroutine test_recurrence(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(conjugate_gradient_t) :: recurrence
+    real(wp) :: share
+    logical :: anew
+
+    call recurrence%last_share(4.0_wp, share, anew)
+    call check_true(error, anew .and. abs(share) <= 0.0_wp, 'nothing of a direction that there is not')
+    if (allocated(error)) return
+    call check(error, recurrence%step_length(8.0_wp), 0.5_wp, 0.0_wp, 'length of the step')
+    if (allocated(error)) return
+    call check(error, recurrence%step_length(0.0_wp), 0.0_wp, 0.0_wp, 'no step without curvature')
+    if (allocated(error)) return
+    call recurrence%last_share(1.0_wp, share, anew)
+    call check_true(error, .not. anew, 'there is a last direction')
+    if (allocated(error)) return
+    call check(error, share, 0.25_wp, 0.0_wp, 'share of the last direction')
+    if (allocated(error)) return
+    call recurrence%last_share(-1.0_wp, share, anew)
+    call check(error, recurrence%step_length(8.0_wp), 0.0_wp, 0.0_wp, 'no step uphill')
+    if (allocated(error)) return
+    call recurrence%last_share(1.0_wp, share, anew)
+    call check_true(error, anew, 'a direction uphill is forgotten')
+    if (allocated(error)) return
+    call recurrence%restart()
+    call recurrence%last_share(1.0_wp, share, anew)
+    call check_true(error, anew, 'begun again')
+  end subroutine test_recurrence
 
   !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
   subroutine test_projected_cg(error)

@@ -13,7 +13,7 @@ module test_normal_contact
   use hc_lattice_symbol, only: kernel_symbols, normal_symbols
   use hc_transfer, only: prolong, prolong_edge
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
-  use hc_symbol_preconditioner, only: preconditioner_t, new_preconditioner
+  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner
   use hc_contact_state, only: contact_state_t, force_control, displacement_control
   use hc_contact_residuals, only: normal_residual, normal_self_compliance
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
@@ -193,7 +193,7 @@ contains
     integer, parameter :: n = 121
     type(lattice_t) :: lattice
     type(fft_flexibility_t) :: flexibility
-    type(preconditioner_t) :: preconditioner
+    type(symbol_preconditioner_t) :: preconditioner
     type(edge_extension_t) :: edge
     logical :: active(n, n)
     real(wp), dimension(n, n, 1) :: x, r, z, d, kd
@@ -205,7 +205,7 @@ contains
       call new_fft_flexibility(flexibility, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error, normal_only=.true.)
     end if
     if (allocated(error)) return
-    call new_preconditioner(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), field_space_t(), error)
+    call new_symbol_preconditioner(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), field_space_t(), error)
     if (allocated(error)) return
     active = disc(n, 40.3_wp)
     call new_edge_extension(edge, active, field_space_t(2))

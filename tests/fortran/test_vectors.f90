@@ -7,7 +7,7 @@ module test_vectors
   use hc_coulomb, only: coulomb_t, cone_row, linearize, on_cone, residual_row, zone_row
   use hc_shear_system, only: soften_row
   use hc_contact_state, only: separated
-  use hc_active_set, only: packing_t, new_packing
+  use hc_active_set, only: active_set_t, new_active_set
   use testing, only: test_t, new_test, check, check_true, largest
   !$ use omp_lib, only: omp_get_max_threads
   implicit none
@@ -155,7 +155,7 @@ contains
   subroutine test_packing(error)
     type(error_t), allocatable, intent(out) :: error
     integer, parameter :: n = 20011
-    type(packing_t) :: packing
+    type(active_set_t) :: packing
     logical :: active(n)
     real(wp) :: x(n), back(n)
     real(wp), allocatable :: packed(:)
@@ -180,7 +180,7 @@ contains
         active([1, 8192, 8193, 16384, n]) = .true.
       end select
       do threads = 1, 2
-        call new_packing(packing, active, field_space_t(threads))
+        call new_active_set(packing, active, field_space_t(threads))
         call check_true(error, packing%n_active == count(active), 'number of active nodes')
         if (allocated(error)) return
         call check_true(error, sum(packing%last - packing%first + 1) == count(active), 'length of the runs')

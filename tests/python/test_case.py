@@ -19,8 +19,11 @@ from hexcontact.case import Body, Case
 from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck import starters, tables
+from hexcontact.deck.faults import Source
 from hexcontact.deck.surfaces import SHAPES, Cylinder, Paraboloid, Punch, Separation, Sphere
+from hexcontact.deck.write import written
 from hexcontact.errors import DeckError
+from hexcontact.problem.overview import case_rows
 from hexcontact.problem.window import estimate_contact, rim_sides
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -224,11 +227,32 @@ def test_arguments_and_deck_make_the_same_case() -> None:
 def test_a_body_is_checked_when_it_is_made() -> None:
     body = Body(210e9, 0.3, surface=Sphere(radius=0.01))
     assert (body.young_modulus, body.poisson_ratio, body.rigid) == (210e9, 0.3, False)
-    assert sphere_on_flat(nodes_across=21, body_1=body).body_1 == tables.Body(**dict(body))
+    case = sphere_on_flat(nodes_across=21, body_1=body)
+    assert case.body_1 == body
+    assert case.body_2 == Body(210e9, 0.3, False, None)
+    assert Body(None, None, True) == Body(rigid=True)
+    with pytest.raises(TypeError):
+        Body(210e9, 0.3, False, None, "steel")  # type: ignore[call-arg]
     with pytest.raises(DeckError, match=r"^poisson_ratio = 0.6: expected a number above -1 and at most 0.5$"):
         Body(210e9, 0.6)
     with pytest.raises(DeckError, match=r"^poisson_ratio: missing; expected a number such as 0.3"):
         Body(young_modulus=210e9, poisson_ratio=None)
+
+
+@pytest.mark.parametrize("said", ["", 'surface = { shape = "flat", offset = ["1 um", "0 um"] }'])
+def test_a_flat_body_has_no_surface(said: str) -> None:
+    text = DECK.replace("[body.2]", f"[body.2]\n{said}")
+    case = Case.from_text(text)
+    assert case.body_2.surface is None
+    assert dict(case_rows(case))["body 2"].endswith("; flat")
+    assert case.initial_gap(case.lattice)[0].min() == 0
+
+
+def test_the_file_of_the_output_is_a_path() -> None:
+    case = Case.from_text(DECK, overrides={"output.file": "out/a.nc"})
+    assert case.output.file == Path("out/a.nc")
+    assert tables.Deck.parse(tomllib.loads(written(case.deck)), Source()).output == case.output
+    assert Case.from_text(DECK).output.file is None
 
 
 def test_a_dictionary_may_change_after_the_case_was_made() -> None:

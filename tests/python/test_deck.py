@@ -13,7 +13,7 @@ from hexcontact.deck import tables
 from hexcontact.deck.faults import Source
 from hexcontact.deck.location import places
 from hexcontact.deck.model import Table, kind_of
-from hexcontact.deck.surfaces import SHAPES, Flat, Sphere, Surface
+from hexcontact.deck.surfaces import SHAPES, Sphere, Surface
 from hexcontact.deck.tables import Deck, Load, Segment
 from hexcontact.deck.toml import parse_toml, read_toml, with_overrides
 from hexcontact.errors import DeckError
@@ -85,7 +85,7 @@ def test_a_deck_in_si() -> None:
     assert deck.body.body_1.young_modulus == 432e9
     assert deck.body.body_1.surface == Sphere(radius=1e-3)
     assert deck.body.body_2.young_modulus == 72e9
-    assert deck.body.body_2.surface == Flat()
+    assert deck.body.body_2.surface is None
     assert deck.friction is not None
     assert deck.friction.coefficient == math.inf
     assert (deck.grid.spacing, deck.grid.extent) == (3.5e-6, (2e-4, 2e-4))

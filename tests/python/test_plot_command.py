@@ -20,6 +20,7 @@ from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
 from hexcontact.plotting import registry
 from hexcontact.plotting.registry import entries
+from hexcontact.variables import MAPS
 
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 
@@ -265,3 +266,9 @@ def test_all_pictures_have_the_kind_asked_for(folder: Path) -> None:
 def test_name_and_kind_of_a_picture_are_not_both_given(folder: Path, tmp_path: Path) -> None:
     code, _, err = plot(folder / "pressed.nc", "-o", tmp_path / "a.png", "-f", "pdf")
     assert code == 2 and "--format pdf: the name of --output" in err and not list(tmp_path.iterdir())
+
+
+def test_every_field_of_the_table_with_a_title_has_a_map() -> None:
+    alone = {names[0] for names in MAPS.values() if len(names) == 1}
+    assert alone >= {"pressure", "accumulated_slip"}
+    assert alone <= set(plotting.FIGURES)

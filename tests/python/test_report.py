@@ -364,6 +364,20 @@ def test_curves_are_the_history(folder: Path) -> None:
     assert charts["Residuals"]["log"]
 
 
+def test_a_history_that_ends_unloaded_shows_its_contacts(tmp_path: Path) -> None:
+    loads = [{"normal_load": 100.0, "steps": 3}, {"normal_load": 0.0, "steps": 2}]
+    body = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+    ball = body | {"surface": {"shape": "sphere", "radius": 0.01}}
+    result = Case(body_1=ball, body_2=body, nodes_in_radius=8, loads=loads).run()
+    data = data_of(write_report(result, tmp_path / "page.html").read_text(encoding="utf-8"))
+    largest = 1e6 * float(result.contact_radius.max())
+    assert largest < data["fields"]["limits"][1] < 1.6 * largest
+    areas = next(chart for chart in data["charts"] if "area" in chart["title"])
+    factor = FACTOR[areas["unit"]]
+    shown = [factor * value for value in areas["curves"]["contact"]]
+    assert shown == pytest.approx(result.contact_area_fit.values, rel=1e-3)
+
+
 def test_long_histories_show_some_steps_as_maps(folder: Path) -> None:
     dataset = open_result(folder / "sheared.nc").dataset
     long = dataset.isel(step=np.arange(1000) % 6).assign_coords(step=np.arange(1, 1001))

@@ -23,6 +23,8 @@ import scipy  # its parts are loaded when they are first used: a fifth of a seco
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import number, reals
+from ..core.analytic import at_points
+from ..core.analytic import axisymmetric as flat
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array], Array]
@@ -34,6 +36,9 @@ class Given(TypedDict, total=False):
     normal_load: float
     approach: float
     contact_radius: float
+
+
+_GIVEN = ("normal_load", "approach", "contact_radius")  # in the order of the core
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,7 @@ def require_positive(**values: float) -> None:
 
 def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
     """Return name and value of the one quantity that was given."""
-    names = ("normal_load", "approach", "contact_radius")[: 3 if with_radius else 2]
+    names = _GIVEN[: 3 if with_radius else 2]
     if len(given) != 1 or not set(given) <= set(names):
         raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
     [(name, value)] = given.items()
@@ -119,28 +124,20 @@ def power_law(
     if not (np.isfinite(n) and n >= 1.0):
         raise ValueError(f"exponent is {exponent!r}; expected a number of at least 1")
     name, value = driven_by(given)
-    log_gamma = scipy.special.gammaln
-    c = np.sqrt(np.pi) * np.exp(log_gamma(n / 2 + 1) - log_gamma(n / 2 + 0.5)) * coefficient
-    load_factor = 2.0 * effective_modulus * n / (n + 1.0)  # P = load_factor * delta * a
-    if name == "normal_load":
-        a = (value / (load_factor * c)) ** (1.0 / (n + 1.0))
-    else:
-        a = value if name == "contact_radius" else (value / c) ** (1.0 / n)
-    delta = c * a**n
-    scale = effective_modulus * n * delta / (np.pi * a)
+    return _contact(flat.power_law, flat.power_law_pressure, (effective_modulus, coefficient, n), name, value)
 
-    def pressure(r: Array) -> Array:
-        z = np.maximum(1.0 - (r / a) ** 2, 0.0)
-        return np.asarray(scale * np.sqrt(z) * scipy.special.hyp2f1(1.0, 1.0 - n / 2, 1.5, z))
 
-    if n == 1.0:
-        peak = np.inf
-    elif n <= 2.0:  # the pressure falls from the center outwards
-        peak = scale / (n - 1.0)
-    else:
-        peak = _maximum(pressure, 0.0, a)
+def _contact(
+    solve: Callable[..., Array],
+    pressure: Callable[..., Array],
+    body: tuple[float, ...],
+    name: str,
+    value: float,
+) -> AxisymmetricContact:
+    """Solve the contact with a body of the Fortran library."""
+    radius, approach, load, peak = solve(body, _GIVEN.index(name), value).tolist()
     return AxisymmetricContact(
-        effective_modulus, float(a), float(delta), float(load_factor * delta * a), float(peak), pressure
+        body[0], radius, approach, load, peak, lambda r: at_points(pressure, body, [r], radius)
     )
 
 
@@ -204,14 +201,12 @@ def flat_punch(effective_modulus: float, radius: float, **given: Unpack[Given]) 
     """
     require_positive(effective_modulus=effective_modulus, radius=radius)
     name, value = driven_by(given, with_radius=False)
-    stiffness = 2.0 * effective_modulus * radius
+    body = effective_modulus, radius
+    stiffness = float(flat.flat_punch_stiffness(body))
     load = value if name == "normal_load" else stiffness * value
-
-    def pressure(r: Array) -> Array:
-        with np.errstate(divide="ignore"):
-            return np.asarray(load / (2 * np.pi * radius * np.sqrt(np.maximum(radius**2 - r**2, 0.0))))
-
-    return AxisymmetricContact(effective_modulus, radius, load / stiffness, load, np.inf, pressure)
+    return AxisymmetricContact(
+        *body, load / stiffness, load, np.inf, lambda r: at_points(flat.flat_punch_pressure, body, [r], load)
+    )
 
 
 def rounded_punch(
@@ -237,20 +232,11 @@ def rounded_punch(
     AxisymmetricContact
     """
     require_positive(effective_modulus=effective_modulus, flat_radius=flat_radius, edge_radius=edge_radius)
-    b, radius = flat_radius, edge_radius
-
-    def leg(t: Array) -> Array:
-        return np.sqrt(np.maximum((t - b) * (t + b), 0.0))
-
-    def delta(t: Array) -> Array:
-        t = np.maximum(t, b)
-        return np.asarray(t / radius * (leg(t) - b * np.arctan2(leg(t), b)))
-
-    def rate(t: Array) -> Array:
-        t = np.maximum(t, b)
-        return np.asarray((2.0 * leg(t) - b * np.arctan2(leg(t), b)) / radius)
-
-    return _solve_profile(effective_modulus, delta, rate, driven_by(given), smallest=b)
+    name, value = driven_by(given)
+    if name == "contact_radius" and value <= flat_radius:
+        raise ValueError(f"contact_radius is {value!r}; expected more than the flat radius {flat_radius!r}")
+    body = effective_modulus, flat_radius, edge_radius
+    return _contact(flat.rounded_punch, flat.rounded_punch_pressure, body, name, value)
 
 
 def axisymmetric(
@@ -279,80 +265,50 @@ def axisymmetric(
     AxisymmetricContact
     """
     require_positive(effective_modulus=effective_modulus, scale=scale)
-    node, weight = _gauss(64)
-    sine = np.sin(np.pi / 2 * node)  # r = t sin(theta), theta = pi/2 * node
+    name, value = driven_by(given)
+    theta, weight = _gauss(64)
+    sine, weight = np.sin(np.pi / 2 * theta), np.pi / 2 * weight  # r = t sin(theta)
+    node, share = _gauss(200)
 
-    def delta(t: Array) -> Array:
-        t = np.asarray(t, dtype=float)[..., None]
-        return np.asarray(np.pi / 2 * np.sum(weight * t * slope(t * sine), axis=-1))
+    def delta(t: float) -> float:
+        return float(np.sum(weight * t * slope(t * sine)))
 
     def rate(t: Array) -> Array:
-        r = np.asarray(t, dtype=float)[..., None] * sine
-        return np.asarray(np.pi / 2 * np.sum(weight * (slope(r) + r * curvature(r)), axis=-1))
+        r = t[..., None] * sine
+        return np.asarray(np.sum(weight * (slope(r) + r * curvature(r)), axis=-1))
 
-    return _solve_profile(effective_modulus, delta, rate, driven_by(given), start=scale)
+    def load(a: float) -> float:  # by parts: P = 2 E* int t delta'(t) dt
+        return float(2.0 * effective_modulus * a**2 * np.sum(share * node * rate(a * node)))
+
+    def pressure(r: Array) -> Array:
+        s = np.sqrt(np.maximum(a**2 - r**2, 0.0))[..., None]  # t^2 = r^2 + s^2
+        t = np.hypot(r[..., None], s * node)
+        integrand = np.divide(rate(t), t, out=np.zeros_like(t), where=t > 0.0)
+        return np.asarray(effective_modulus / np.pi * np.sum(s * share * integrand, axis=-1))
+
+    a = value
+    if name != "contact_radius":
+        target = load if name == "normal_load" else delta
+        upper = scale
+        while target(upper) < value:
+            upper *= 2.0
+        a = scipy.optimize.brentq(lambda t: target(t) - value, 0.0, upper, xtol=1e-15 * upper, rtol=1e-15)
+    r = np.linspace(0.0, a, 401)
+    found = pressure(r)
+    at = int(np.argmax(found))
+    peak = float(found[at])
+    if at > 0:
+        bounds = r[at - 1], r[min(at + 1, 400)]
+        peak = -scipy.optimize.minimize_scalar(
+            lambda s: -float(pressure(np.array(s))),
+            bounds=bounds,
+            method="bounded",
+            options={"xatol": 1e-8 * a},
+        ).fun
+    return AxisymmetricContact(effective_modulus, a, delta(a), load(a), peak, pressure)
 
 
 def _gauss(n: int) -> tuple[Array, Array]:
     """Nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
     node, weight = scipy.special.roots_legendre(n)
     return 0.5 * (node + 1.0), 0.5 * weight
-
-
-def _solve_profile(
-    effective_modulus: float,
-    delta: Profile,
-    rate: Profile,
-    given: tuple[str, float],
-    *,
-    smallest: float = 0.0,
-    start: float | None = None,
-) -> AxisymmetricContact:
-    """Contact whose approach grows as ``delta(t)`` with ``rate`` = delta'; both vanish for t <= smallest."""
-    node, weight = _gauss(200)
-    node, weight = node**2, 2.0 * node * weight  # the square takes the root-like start out of the integrand
-
-    def load(a: float) -> float:
-        t = smallest + (a - smallest) * node  # by parts: P = 2 E* int t delta'(t) dt
-        return float(2.0 * effective_modulus * (a - smallest) * np.sum(weight * t * rate(t)))
-
-    name, value = given
-    if name == "contact_radius":
-        if value <= smallest:
-            raise ValueError(f"contact_radius is {value!r}; expected more than the flat radius {smallest!r}")
-        a = value
-    else:
-        target = load if name == "normal_load" else lambda t: float(delta(np.array(t)))
-        upper = start if start is not None else 2.0 * smallest
-        while target(upper) < value:
-            upper *= 2.0
-        a = scipy.optimize.brentq(
-            lambda t: target(t) - value, smallest, upper, xtol=1e-15 * upper, rtol=1e-15
-        )
-
-    def pressure(r: Array) -> Array:
-        r = np.asarray(r, dtype=float)[..., None]
-        first = np.sqrt(np.maximum(smallest**2 - r**2, 0.0))  # t^2 = r^2 + s^2
-        last = np.sqrt(np.maximum(a**2 - r**2, 0.0))
-        t = np.sqrt(r**2 + (first + (last - first) * node) ** 2)
-        with np.errstate(invalid="ignore"):
-            integrand = np.where(t > 0.0, rate(t) / t, 0.0)
-        return np.asarray(effective_modulus / np.pi * np.sum((last - first) * weight * integrand, axis=-1))
-
-    r = np.linspace(0.0, a, 401)
-    at = int(np.argmax(pressure(r)))
-    peak = float(pressure(r[at]))
-    if at > 0:
-        peak = _maximum(pressure, r[at - 1], r[min(at + 1, 400)])
-    return AxisymmetricContact(effective_modulus, a, float(delta(np.array(a))), load(a), peak, pressure)
-
-
-def _maximum(pressure: Profile, first: float, last: float) -> float:
-    """Largest value between two radii; there is one maximum between them."""
-    found: scipy.optimize.OptimizeResult = scipy.optimize.minimize_scalar(
-        lambda s: -float(pressure(np.array(s))),
-        bounds=(first, last),
-        method="bounded",
-        options={"xatol": 1e-8 * last},
-    )
-    return -float(found.fun)

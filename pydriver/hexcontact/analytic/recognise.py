@@ -170,7 +170,7 @@ def _only_surface(dataset: xarray.Dataset) -> Surface | None:
         bodies = Deck.checked(deck)[0]["body"]
     except (ValueError, KeyError):  # no deck, or parts that were made in Python
         return None
-    curved = [s for s in (bodies.body_1.surface, bodies.body_2.surface) if s.shape != "flat"]
+    curved = [s for s in (bodies.body_1.surface, bodies.body_2.surface) if s is not None]
     return curved[0] if len(curved) == 1 else None
 
 

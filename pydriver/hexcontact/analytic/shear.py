@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.analytic import flat
 from .friction import LubkinTorsion, MindlinContact
 from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of
 
@@ -49,17 +50,11 @@ def turning_points(loads: Iterable[float]) -> list[float]:
     loads : iterable of float
         Loads in order, monotone in between; the history begins at 0.
     """
-    path = [0.0]
-    for load in loads:
-        if len(path) > 1 and (load - path[-1]) * (path[-1] - path[-2]) >= 0.0:
-            path[-1] = load
-        else:
-            path.append(load)
-        while len(path) > 3 and abs(path[-1] - path[-2]) >= abs(path[-2] - path[-3]):
-            del path[-3:-1]
-        if len(path) == 3 and abs(path[2]) >= abs(path[1]):  # back on the first loading, or its mirror image
-            del path[1]
-    return path[1:]
+    history = [*loads]
+    if not history:
+        return []
+    turns, count = flat.masing_turns(history)
+    return [float(load) for load in turns[:count]]
 
 
 def superposed(first: Callable[[float], Array], turns: Sequence[float]) -> Array:

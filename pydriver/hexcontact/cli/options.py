@@ -87,7 +87,7 @@ def case_of(deck: Path, settings: list[str] | None) -> Case:
 
 def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:
     """Return the file that a run writes: from the option, else from the deck, else from the deck's name."""
-    target = output or Path(case.output.file or f"{deck.stem}.nc")
+    target = output or case.output.file or Path(f"{deck.stem}.nc")
     if target.suffix in _PICTURES:
         raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
     if not target.parent.is_dir():

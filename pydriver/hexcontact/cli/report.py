@@ -10,6 +10,7 @@ import datetime
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 History = Mapping[str, Any]
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]  # headers and rows
+
+_DATA = resources.files("hexcontact").joinpath("data")
 
 
 def write_report(result: Result, target: Path) -> Path:
@@ -74,7 +77,8 @@ def report(result: Result) -> str:
     data = drawn_data(result, histories, numbers)
     title = result.case_title or Path(result.path).stem or "hexcontact result"
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("hexcontact", "data"),
+        # PackageLoader does not find the folder of an editable installation
+        loader=jinja2.FunctionLoader(lambda name: _DATA.joinpath(name).read_text(encoding="utf-8")),
         undefined=jinja2.StrictUndefined,
         autoescape=True,
         finalize=lambda value: visible(value) if type(value) is str else value,  # not of macros

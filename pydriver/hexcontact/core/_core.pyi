@@ -6,3 +6,5 @@ hc_f2py_influence: Any
 hc_f2py_cache: Any
 hc_f2py_measures: Any
 hc_f2py_steps: Any
+hc_f2py_analytic: Any
+hc_f2py_axisymmetric: Any

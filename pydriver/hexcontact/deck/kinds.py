@@ -7,6 +7,7 @@ import operator
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NoReturn, TypeGuard
 
 from pydantic_core import PydanticCustomError, core_schema
@@ -189,6 +190,19 @@ class Text(Kind):
 
     def _schema(self) -> Schema:
         return {"type": "string"}
+
+
+@dataclass(frozen=True)
+class FileName(Text):
+    """The name of a file."""
+
+    def written(self, value: Path) -> str:
+        """Return the name as text."""
+        return str(value)
+
+    def _parse(self, value: object) -> Any:
+        text = super()._parse(value)
+        return Path(text) if text else None
 
 
 @dataclass(frozen=True)

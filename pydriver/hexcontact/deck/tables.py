@@ -9,16 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, cast
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
 from ..variables import FIELDS, LOADS
 from .faults import Mistake
-from .kinds import Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
+from .kinds import FileName, Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
 from .model import Table, extended, meaning, problems_of
 from .series import DRIVEN, MOST_STEPS, Series
-from .surfaces import Flat, Point, PositiveLength, Surface, SurfaceKind
+from .surfaces import Flat, Point, PositiveLength, Separation, Surface, SurfaceKind
 from .units import LENGTH, NUMBER, PRESSURE
 
 ALGORITHMS = ("frictionless", "static", "incremental")
@@ -41,9 +42,15 @@ class Body(Table):
     young_modulus: YoungModulus | None = meaning(None, "Young's modulus E; required unless rigid")
     poisson_ratio: PoissonRatio | None = meaning(None, "Poisson's ratio ν; required unless rigid")
     rigid: Annotated[bool, Flag()] = meaning(False, "a body that does not deform")
-    surface: Annotated[Surface, SurfaceKind()] = Field(
-        default_factory=Flat, description="the shape of its surface; flat if absent"
+    surface: Annotated[Surface, SurfaceKind()] | None = meaning(
+        None, "the shape of its surface; flat if absent"
     )
+
+    @field_validator("surface")
+    @classmethod
+    def _curved(cls, surface: Surface | None) -> Surface | None:
+        """Return no surface for a flat one, whether the deck names it or not."""
+        return None if isinstance(surface, Flat) else surface
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -64,6 +71,11 @@ class Bodies(Table):
 
     body_1: Body = Field(alias="1")
     body_2: Body = Field(alias="2")
+
+    @property
+    def separation(self) -> Separation:
+        """Initial gap between the two surfaces."""
+        return Separation(self.body_1.surface or Flat(), self.body_2.surface or Flat())
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -291,7 +303,7 @@ class Accuracy(Table):
 class Output(Table):
     """What is written, and where."""
 
-    file: Annotated[str, Text()] | None = meaning(None, "netCDF file of the result", '"fretting.nc"')
+    file: Annotated[Path, FileName()] | None = meaning(None, "netCDF file of the result", '"fretting.nc"')
     fields: Annotated[
         tuple[str, ...], Several(Word(FIELDS), "field names", '["pressure", "gap", "zone"]')
     ] = meaning((), "fields to keep; all but the displacements of the bodies if absent")

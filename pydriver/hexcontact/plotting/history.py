@@ -66,7 +66,8 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
     noise = LOADS_AND_MOTIONS.keys() - worth_showing(histories)
     panels: dict[str, dict[str, str]] = {}
     for title, names in PANELS.items():
-        shown = [name for name in fitted(histories[0], names) if name in histories[0] and name not in noise]
+        known = tuple(name for name in names if name in histories[0])
+        shown = [name for name in fitted(histories[0], known) if name not in noise]
         several = len(names) > 1
         curves = {
             name: (VARIABLES[name].symbol or _apart(name.removesuffix("_fit"), names)) if several else ""

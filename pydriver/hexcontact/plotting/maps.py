@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..result.mesh import triangles
 from ..result.view import StepView, scaled
+from ..variables import MAPS, VARIABLES
 from .plane import ARROWS, FEWER_ARROWS, Part, map_panels, views_of
 from .registry import figure, styled
 from .style import legend_above, set_title
@@ -91,8 +92,11 @@ _FIELDS = {
         "map of the slip of body 1 in the step, with arrows",
         ("slip_increment_x", "slip_increment_y"),
     ),
-    "accumulated_slip": _Field("accumulated slip", "m", "map of the length of the slip path so far"),
 }
+for _title, (_name, *_others) in MAPS.items():
+    if not _others and _name not in _FIELDS:
+        _row = VARIABLES[_name]
+        _FIELDS[_name] = _Field(_title[0].lower() + _title[1:], _row.units, f"map of the {_row.long_name}")
 
 
 def draw_field(

@@ -48,8 +48,13 @@ class Part:
 
     @classmethod
     def around(cls, views: Iterable[StepView], margin: float = 1.25, least_aspect: float = 0.0) -> Part:
-        """Return the part with the contact of some steps, at least so wide for its height, and so high."""
-        windows, spacings = zip(*((view.window(margin), view.spacing) for view in views), strict=True)
+        """Return the part with the contact of some steps, at least so wide for its height, and so high.
+
+        Steps without contact have no say, unless there are no others: then it is the whole window.
+        """
+        known = [(view.contact.any(), view.window(margin), view.spacing) for view in views]
+        touching = [entry for entry in known if entry[0]]
+        _, windows, spacings = zip(*(touching or known), strict=True)
         limits = np.array(windows)
         x_min, _, y_min, _ = limits.min(axis=0)
         _, x_max, _, y_max = limits.max(axis=0)

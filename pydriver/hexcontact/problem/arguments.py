@@ -8,14 +8,39 @@ from ..core.lattice import Lattice
 from ..deck import tables
 from ..deck.model import Argument
 from ..deck.series import DRIVEN
+from ..deck.surfaces import Surface
 from ..deck.write import plain
 
 
 class Body(Argument, tables.Body):
-    """One of the two bodies: `young_modulus` (Pa), `poisson_ratio`, `rigid` and `surface`, flat if absent."""
+    """One of the two bodies.
 
-    def __init__(self, *values: Any, **keys: Any) -> None:
-        super().__init__(**dict(zip(tables.Body.model_fields, values, strict=False)), **plain(keys))
+    Attributes
+    ----------
+    young_modulus : float or None
+        Young's modulus (Pa); None for a rigid body.
+    poisson_ratio : float or None
+        Poisson's ratio; None for a rigid body.
+    rigid : bool
+        Whether the body is rigid.
+    surface : Surface or None
+        Shape of its surface; None for a flat one, or if the gap of the case is given as a whole.
+    """
+
+    def __init__(
+        self,
+        young_modulus: float | str | None = None,
+        poisson_ratio: float | None = None,
+        rigid: bool = False,
+        surface: Surface | None = None,
+    ) -> None:
+        keys = {
+            "young_modulus": young_modulus,
+            "poisson_ratio": poisson_ratio,
+            "rigid": rigid,
+            "surface": surface,
+        }
+        super().__init__(**plain(keys))
 
 
 def with_radians(value: Any, key: str = "") -> Any:

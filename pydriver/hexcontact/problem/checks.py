@@ -57,10 +57,10 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, tuple[Load
         if "output" in tables:
             found += _field_problems(tables["output"], algorithm)
     if "body" in tables:
-        one, two = (body.surface for body in (tables["body"].body_1, tables["body"].body_2))
+        bodies = tables["body"]
         if not gap_given:
-            found += _touching_problems(Separation(one, two))
-        elif one.shape != "flat" or two.shape != "flat":
+            found += _touching_problems(bodies.separation)
+        elif bodies.body_1.surface or bodies.body_2.surface:
             sentence = "expected either a gap or surfaces of the bodies, not both"
             found.append(Mistake(("gap",), MISSING, sentence))
     if found:

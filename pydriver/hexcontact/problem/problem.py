@@ -19,12 +19,12 @@ from ..deck import toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
-from ..deck.surfaces import Separation
 from ..deck.tables import Accuracy, Grid
 from ..deck.write import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
 from . import window
+from .arguments import Body
 from .checks import checked
 from .gap import Gap, GivenGap
 from .window import Estimate, NoContactFound
@@ -118,9 +118,10 @@ class Problem:
         self.deck, self.solver, self.load_steps = checked(given, gap is not None)
         deck = self.deck
         self.title, self.accuracy, self.output = deck.title, deck.accuracy, deck.output
-        self.body_1, self.body_2 = one, two = deck.body.body_1, deck.body.body_2
+        one, two = (Body.model_construct(**dict(body)) for body in (deck.body.body_1, deck.body.body_2))
+        self.body_1, self.body_2 = one, two
         self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
-        self._gap = Gap(Separation(one.surface, two.surface) if gap is None else gap)
+        self._gap = Gap(deck.body.separation if gap is None else gap)
         self.pair = ElasticPair.from_materials(
             one.young_modulus, one.poisson_ratio, two.young_modulus, two.poisson_ratio
         )

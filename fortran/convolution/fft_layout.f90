@@ -1,0 +1,71 @@
+!> How the transforms of a convolution are laid out in memory, and how much of it they take.
+module hc_fft_layout
+  use hc_precision, only: wp
+  implicit none
+  private
+
+  public :: convolution_memory, transform_memory, block_width, even
+
+  !> Bytes that one component of a column block should take, so that blocks stay in cache.
+  integer, parameter :: block_bytes = 32768
+
+contains
+
+  !> Bytes that a convolution takes: spectra, row transforms, buffers.
+  pure integer(selected_int_kind(18)) function convolution_memory(extent, padded, n_kernel, n_component, threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+    !> Number of kernels, of components of the fields, of threads
+    integer, intent(in) :: n_kernel, n_component, threads
+    integer, parameter :: long = selected_int_kind(18)
+    integer(long) :: leading, n_row, length, width
+
+    width = block_width(padded(2))
+    leading = leading_size(padded)
+    n_row = even(extent(2))
+    length = padded(2)
+    convolution_memory = n_kernel*leading*length + 2*n_component*leading*n_row &
+                         + threads*(4*padded(1) + 4*n_component*width*length)
+    convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
+  end function convolution_memory
+
+  !> Bytes that are needed besides while the kernels of a padded convolution are transformed: their rows.
+  pure integer(selected_int_kind(18)) function transform_memory(extent, padded, n_kernel)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+    !> Number of kernels
+    integer, intent(in) :: n_kernel
+    integer, parameter :: long = selected_int_kind(18)
+
+    transform_memory = storage_size((1.0_wp, 0.0_wp))/8*n_kernel*leading_size(padded)*int(even(extent(2)), long)
+  end function transform_memory
+
+  !> Leading dimension that holds the frequencies along the first direction, in whole blocks.
+  pure integer function leading_size(padded)
+    !> Transform lengths
+    integer, intent(in) :: padded(2)
+
+    associate (width => block_width(padded(2)))
+      leading_size = (padded(1)/2 + width)/width*width
+    end associate
+  end function leading_size
+
+  !> Rows are transformed in pairs.
+  elemental integer function even(n)
+    integer, intent(in) :: n
+    even = n + modulo(n, 2)
+  end function even
+
+  !> Columns that are transformed together: 4, 8, 12 or 16, so that all transforms begin at addresses
+  !> alike modulo 16 bytes, as their common plan expects.
+  elemental integer function block_width(length)
+    !> Length of a column
+    integer, intent(in) :: length
+    block_width = 4*min(4, max(1, block_bytes/(64*length)))
+  end function block_width
+
+end module hc_fft_layout

@@ -1,0 +1,182 @@
+!> Conjugate gradients on a set of active nodes, with linear constraints (hc_linear_system).
+!>
+!> The constraints B^T x are held exactly by projecting the preconditioned residual,
+!>
+!>     z <- M r - M B (B^T M B)^-1 B^T M r.
+!>
+!> Equations: docs/theory/friction.md, (F11).
+module hc_projected_cg
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_active_set, only: active_set_t, new_active_set
+  use hc_conjugate_gradient, only: conjugate_gradient_t
+  use hc_field_space, only: field_space_t, sum_block
+  use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
+  implicit none
+  private
+
+  public :: projected_cg
+
+contains
+
+  !> Preconditioned conjugate gradients with projection on the constraints.
+  subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, &
+                          multiplier, residual, iterations, outcome, error, drift)
+    !> Operator and preconditioner
+    class(linear_system_t), intent(inout) :: system
+    !> Nodes that carry unknowns (n)
+    logical, intent(in) :: active(:)
+    !> Constraint vectors B (n, number of constraints, may be 0), zero off the active nodes, and M B
+    real(wp), intent(in), contiguous :: constraint(:, :), mb(:, :)
+    !> Right-hand side (n)
+    real(wp), intent(in) :: rhs(:)
+    !> Unknowns (n), on entry a start that fulfils the constraints
+    real(wp), intent(inout), contiguous :: x(:)
+    !> Product A x (n), everywhere, kept up to date
+    real(wp), intent(inout), contiguous :: ax(:)
+    !> The largest residual that is allowed on an active node
+    real(wp), intent(in) :: tolerance
+    !> Iterations allowed
+    integer, intent(in) :: max_iterations
+    !> Multipliers of the constraints
+    real(wp), intent(out) :: multiplier(:)
+    !> The largest residual on an active node
+    real(wp), intent(out) :: residual
+    !> Iterations taken; why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer, intent(out) :: iterations, outcome
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    !> What rounding errors of the largest residual on the way may have left in A x
+    !> (Greenbaum, SIAM J. Matrix Anal. Appl. 18, 1997, 535-551)
+    real(wp), intent(out), optional :: drift
+
+    type(active_set_t) :: nodes
+    !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
+    real(wp), allocatable :: from(:), onto(:)
+    !> On the active nodes
+    real(wp), allocatable :: r(:), z(:), d(:), ad(:), x_active(:), ax_active(:), rhs_active(:), b(:, :), m_b(:, :)
+    type(conjugate_gradient_t) :: recurrence
+    real(wp) :: step, largest
+    real(wp) :: inverse(size(constraint, 2), size(constraint, 2))
+    integer :: i, m
+    type(field_space_t) :: space
+    logical :: independent, anew
+
+    space = system%space
+    call new_active_set(nodes, active, space)
+    associate (n => nodes%n_active)
+      allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
+    end associate
+    allocate (onto(size(x)), from(size(x)))
+    call space%fill(from, 0.0_wp)
+    call nodes%pack_columns(constraint, b)
+    call nodes%pack_columns(mb, m_b)
+    call nodes%pack(x, x_active)
+    call nodes%pack(ax, ax_active)
+    call nodes%pack(rhs, rhs_active)
+    call invert_gram(b, m_b, inverse, independent, space)
+    iterations = 0
+    largest = 0.0_wp
+    outcome = iterations_used_up
+    multiplier = 0.0_wp
+    if (size(multiplier) > 0) then
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
+      do m = 1, size(multiplier)
+        multiplier(m) = -space%dot(b(:, m), r)/space%dot(b(:, m), b(:, m))
+      end do
+    end if
+    do
+      ! The share of the constraints is taken out of the residual before it is
+      ! preconditioned: it is the larger part by far, and its rounding errors would stay.
+      ! What is left is normal to M B, which keeps the projected preconditioner
+      ! symmetric even if the given M B is not quite what its name says.
+      call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
+      if (size(multiplier) > 0) then
+        multiplier = multiplier - matmul(space%dots(m_b, r), inverse)
+        call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
+      end if
+      largest = max(largest, residual)
+      if (residual <= tolerance .or. iterations >= max_iterations) exit
+      call nodes%unpack(r, from)
+      call system%precondition(from, onto, error)
+      if (allocated(error)) return
+      call nodes%pack(onto, z)
+      call space%add_columns(m_b, -matmul(inverse, space%dots(b, z)), z)
+
+      call recurrence%last_share(space%dot(r, z), step, anew)
+      !$omp parallel do schedule(static) num_threads(space%threads)
+      do i = 1, size(d)
+        if (anew) then
+          d(i) = z(i)
+        else
+          d(i) = z(i) + step*d(i)
+        end if
+      end do
+      !$omp end parallel do
+      call nodes%unpack(d, from)
+      call system%product(from, onto, error)
+      if (allocated(error)) return
+      call nodes%pack(onto, ad)
+      step = recurrence%step_length(space%dot(d, ad))
+      if (.not. step > 0.0_wp) then
+        outcome = solution_broke_off
+        exit
+      end if
+      !$omp parallel num_threads(space%threads)
+      !$omp do schedule(static)
+      do i = 1, size(d)
+        x_active(i) = x_active(i) + step*d(i)
+        ax_active(i) = ax_active(i) + step*ad(i)
+      end do
+      !$omp end do nowait
+      !$omp do schedule(static)
+      do i = 1, size(ax)
+        ax(i) = ax(i) + step*onto(i)
+      end do
+      !$omp end do
+      !$omp end parallel
+      iterations = iterations + 1
+    end do
+    if (residual <= tolerance) outcome = solution_accurate
+    ! the largest of several numbers hides one that is not a number
+    if (.not. ieee_is_finite(space%dot(r, r))) outcome = solution_broke_off
+    call nodes%unpack(x_active, x)
+    if (present(drift)) drift = epsilon(1.0_wp)*largest
+  end subroutine projected_cg
+
+  !> r = rhs - A x + B m and its largest element.
+  subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, space)
+    !> Constraint vectors and multipliers
+    real(wp), intent(in), contiguous :: b(:, :)
+    real(wp), intent(in) :: multiplier(:)
+    !> Right-hand side and product A x
+    real(wp), intent(in), contiguous :: rhs(:), ax(:)
+    !> Residual
+    real(wp), intent(inout), contiguous :: r(:)
+    !> Its largest element
+    real(wp), intent(out) :: largest
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: i, m, from, to
+
+    largest = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, to) reduction(max: largest)
+    do from = 1, size(r), sum_block
+      to = min(from + sum_block - 1, size(r))
+      do i = from, to
+        r(i) = rhs(i) - ax(i)
+      end do
+      do m = 1, size(multiplier)
+        do i = from, to
+          r(i) = r(i) + multiplier(m)*b(i, m)
+        end do
+      end do
+      do i = from, to
+        largest = max(largest, abs(r(i)))
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine constrained_residual
+
+end module hc_projected_cg

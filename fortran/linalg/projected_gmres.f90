@@ -1,0 +1,164 @@
+!> GMRES on a set of active nodes, with linear constraints (hc_linear_system), for a matrix that is not symmetric.
+!>
+!> The constraints C^T x, whose multipliers act along other vectors B, are held exactly by projecting the
+!> preconditioned residual,
+!>
+!>     z <- M r - M B (C^T M B)^-1 C^T M r.
+!>
+!> Equations: docs/theory/friction.md, (F11).
+module hc_projected_gmres
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_active_set, only: active_set_t, new_active_set
+  use hc_field_space, only: field_space_t
+  use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
+  implicit none
+  private
+
+  public :: projected_gmres
+
+contains
+
+  !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
+  subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
+                             multiplier, independent, residual, iterations, outcome, error, drift)
+    !> Operator and preconditioner
+    class(linear_system_t), intent(inout) :: system
+    !> Nodes that carry unknowns (n)
+    logical, intent(in) :: active(:)
+    !> B, along which the multipliers act, M B, and C of the constraints (n, number of constraints), zero off the active nodes
+    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
+    !> Weight of each residual (n)
+    real(wp), intent(in) :: weight(:)
+    !> Right-hand side (n)
+    real(wp), intent(in) :: rhs(:)
+    !> Unknowns (n), on entry a start that fulfils the constraints
+    real(wp), intent(inout), contiguous :: x(:)
+    !> Product A x (n), everywhere
+    real(wp), intent(inout), contiguous :: ax(:)
+    !> Euclidean norm of the weighted residuals on the active nodes that is allowed
+    real(wp), intent(in) :: tolerance
+    !> Iterations allowed
+    integer, intent(in) :: max_iterations
+    !> Multipliers of the constraints, on entry a start
+    real(wp), intent(inout) :: multiplier(:)
+    !> False where the constraints depend on each other: nothing was done
+    logical, intent(out) :: independent
+    !> Euclidean norm of the weighted residuals that is left, but for rounding errors
+    real(wp), intent(out) :: residual
+    !> Iterations taken; why it stopped: solution_accurate, iterations_used_up or solution_broke_off
+    integer, intent(out) :: iterations, outcome
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    !> What rounding errors of the first residual may have left in A x, in that norm
+    real(wp), intent(out), optional :: drift
+
+    type :: direction_t
+      !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
+      !> nodes; the product A z over all nodes
+      real(wp), allocatable :: v(:), z(:), image(:)
+    end type direction_t
+    !> Directions take their memory one by one: mostly a few are enough
+    type(direction_t) :: basis(max_iterations + 1)
+    type(active_set_t) :: nodes
+    !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
+    real(wp), allocatable :: from(:), onto(:)
+    !> On the active nodes
+    real(wp), allocatable :: w(:), packed(:), b(:, :), m_b(:, :), c_rows(:, :)
+    real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
+    real(wp) :: y(max_iterations), share(size(multiplier), max_iterations), length, rotated
+    real(wp) :: inverse(size(multiplier), size(multiplier))
+    integer :: i, k, stat
+    type(field_space_t) :: space
+
+    iterations = 0
+    residual = huge(1.0_wp)
+    if (present(drift)) drift = 0.0_wp
+    outcome = solution_broke_off
+    space = system%space
+    call new_active_set(nodes, active, space)
+    call nodes%pack_columns(columns, b)
+    call nodes%pack_columns(mb, m_b)
+    call nodes%pack_columns(rows, c_rows)
+    call invert_gram(c_rows, m_b, inverse, independent, space)
+    if (.not. independent) return
+    associate (n => nodes%n_active)
+      allocate (basis(1)%v(n), w(n), packed(n))
+    end associate
+    allocate (onto(size(x)), from(size(x)), source=0.0_wp)
+    call nodes%pack(weight, w)
+    call nodes%pack(rhs, basis(1)%v)
+    call nodes%pack(ax, packed)
+    basis(1)%v = basis(1)%v - packed
+    call space%add_columns(b, multiplier, basis(1)%v)
+    basis(1)%v = w*basis(1)%v
+    length = sqrt(space%dot(basis(1)%v, basis(1)%v))
+    residual = length
+    if (present(drift)) drift = epsilon(1.0_wp)*length
+    if (length <= 0.0_wp) outcome = solution_accurate
+    if (.not. length > 0.0_wp) return
+    outcome = iterations_used_up
+    basis(1)%v = basis(1)%v/length
+    g = 0.0_wp
+    g(1) = length
+    h = 0.0_wp
+
+    do k = 1, max_iterations
+      allocate (basis(k)%z(nodes%n_active), basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
+      if (stat /= 0) then
+        call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
+        return
+      end if
+      packed = basis(k)%v/w
+      call nodes%unpack(packed, from)
+      call system%precondition(from, onto, error)
+      if (allocated(error)) return
+      call nodes%pack(onto, basis(k)%z)
+      share(:, k) = -matmul(inverse, space%dots(c_rows, basis(k)%z))
+      call space%add_columns(m_b, share(:, k), basis(k)%z)
+      call nodes%unpack(basis(k)%z, from)
+      call system%product(from, basis(k)%image, error)
+      if (allocated(error)) return
+      call nodes%pack(basis(k)%image, basis(k + 1)%v)
+      call space%add_columns(b, -share(:, k), basis(k + 1)%v)
+      basis(k + 1)%v = w*basis(k + 1)%v
+      do i = 1, k
+        h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
+        basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
+      end do
+      h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
+      if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
+      do i = 1, k - 1
+        rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
+        h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
+        h(i, k) = rotated
+      end do
+      length = hypot(h(k, k), h(k + 1, k))
+      if (.not. length > 0.0_wp) outcome = solution_broke_off
+      if (outcome == solution_broke_off) exit
+      iterations = k
+      c(k) = h(k, k)/length
+      s(k) = h(k + 1, k)/length
+      h(k, k) = length
+      g(k + 1) = -s(k)*g(k)
+      g(k) = c(k)*g(k)
+      residual = abs(g(k + 1))
+      if (residual <= tolerance) exit
+    end do
+    if (residual <= tolerance) outcome = solution_accurate
+
+    do i = iterations, 1, -1
+      y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
+    end do
+    ! solution and product from the same directions: the preconditioner is of single precision, and where a node
+    ! slips far the matrix would make displacements of its rounding errors
+    call nodes%pack(x, packed)
+    do i = 1, iterations
+      packed = packed + y(i)*basis(i)%z
+      ax = ax + y(i)*basis(i)%image
+    end do
+    multiplier = multiplier + matmul(share(:, :iterations), y(:iterations))
+    call nodes%unpack(packed, x)
+  end subroutine projected_gmres
+
+end module hc_projected_gmres

@@ -429,6 +429,11 @@ def test_contact_at_the_end_of_a_height_map_is_an_error(side: str, keys: dict[st
     assert len(done) == 3
 
 
+def test_nothing_can_touch_beyond_a_height_map() -> None:
+    with pytest.raises(DeckError, match="no window can be found: nothing can touch at the center"):
+        sphere_on_flat(body_1=STEEL, gap=measured(), spacing=1e-5, center=(1.0, 1.0))
+
+
 def test_the_window_of_a_height_map_is_about_its_lowest_point() -> None:
     moved = measured().assign_coords(x=HALF_MM + 3e-3, y=HALF_MM - 2e-3)
     case = sphere_on_flat(body_1=STEEL, gap=moved, nodes_in_radius=8, origin=(3e-3, -2e-3))

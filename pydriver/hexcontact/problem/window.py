@@ -228,6 +228,8 @@ def _starting_half_size(
             inside = profile < approach
     if inside[-1]:
         raise NoContactFound("the contact has no end")
+    if not (inside.any() or np.isfinite(height[0]).any()):
+        raise NoContactFound("nothing can touch at the center")
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 

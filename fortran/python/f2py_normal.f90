@@ -9,7 +9,7 @@ module hc_f2py_normal
   use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, kernel_cache
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
-  use hc_flexibility, only: along_x, along_y
+  use hc_flexibility, only: check_operator, along_x, along_y
   use hc_field_space, only: space_over
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
@@ -120,6 +120,7 @@ contains
       if (method /= direct) bytes = fft_memory(extent, .false., slot%space%threads) + fft_setup_memory(extent)
       call secure(slot, bytes, n_threads, error)
     end if
+    if (.not. allocated(error)) call check_operator(slot%lattice, pair_of(lambda), error, n_threads)
     if (.not. allocated(error)) then
       if (method == direct) then
         allocate (dense)

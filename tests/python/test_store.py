@@ -255,6 +255,21 @@ def test_a_folder_that_no_run_has_written_to_is_refused(out: Path, name: str, ov
     assert content(out.parent) == before
 
 
+@pytest.mark.parametrize("name", ["lattices", "lattices/1_0.nc.d"])
+def test_lattices_behind_a_link_are_refused(out: Path, name: str) -> None:
+    """What looks like those of a run, too."""
+    elsewhere = out.parent / "elsewhere"
+    (elsewhere / "1_0.nc.d").mkdir(parents=True)
+    (elsewhere / "trials.json").write_text('{"trials_version": 1}')
+    link = journal_of(out) / name
+    link.parent.mkdir(parents=True)
+    link.symlink_to(elsewhere, target_is_directory=True)
+    before = content(out.parent)
+    with pytest.raises(DeckError, match=rf"{re.escape(str(link))} may not be of hexcontact.*move "):
+        Store(out, Metadata(), True)
+    assert content(out.parent) == before
+
+
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_other_files_in_the_folder_stay(out: Path, overwrite: bool) -> None:
     """Names of their own do no harm, in the folder of an unfinished run too."""

@@ -31,7 +31,7 @@ from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, write
 from .result import Result
 from .step import Step
-from .trials import TrialFolder, foreign_file, remove_all
+from .trials import TrialFolder, foreign_file, linked_folder, remove_all
 
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _LACKING = {*LACKING, None}
@@ -242,7 +242,7 @@ class Store:
             self.folder.mkdir(exist_ok=True)
             flush(self.path.parent)
             left = names_a_run(self.folder / "lock")
-            if not left and (foreign := foreign_file(self.folder)):
+            if foreign := linked_folder(self.folder) or (None if left else foreign_file(self.folder)):
                 raise DeckError(
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"

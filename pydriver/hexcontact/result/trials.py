@@ -217,5 +217,12 @@ def foreign_file(folder: Path) -> Path | None:
     return next(iter([*journal.files, *trials.foreign()]), None)
 
 
+def linked_folder(folder: Path) -> Path | None:
+    """Return a folder of lattices that is a link to somewhere else; None if there is none."""
+    trials = TrialFolder(folder)
+    folders = [trials.folder, *(journal.folder for journal in trials._journals())]
+    return next((path for path in folders if path.is_symlink()), None)
+
+
 def _digest(about: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(about).encode()).hexdigest()

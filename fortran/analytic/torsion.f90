@@ -25,7 +25,7 @@ module hc_torsion
     procedure :: sliding_torque, twist, torque, stick_radius
   end type lubkin_t
 
-  !> Slip's share of the torque: 2 u^5 [K - E](k), k^2 = 1 - u^4, by u^2 = r/a, which takes the logarithm at r = 0 out.
+  !> Slip's share of the torque: 2 u^5 (K(k) - E(k)), k^2 = 1 - u^4, by u^2 = r/a, which takes the logarithm at r = 0 out.
   type, extends(scalar_function_t) :: slip_torque_t
   contains
     procedure :: at => slip_torque

@@ -68,7 +68,7 @@ contains
     twist_factor = (1.0_wp - ratio**2)*carlson_rd(0.0_wp, ratio**2, 1.0_wp)/3.0_wp
   end function twist_factor
 
-  !> Twist at which the stick radius is c: (S_t mu p0/2) [K - E](k), k^2 = 1 - c^2/a^2 [rad].
+  !> Twist at which the stick radius is c: (S_t mu p0/2) (K(k) - E(k)), k^2 = 1 - c^2/a^2 [rad].
   elemental function twist(self, stick_radius)
     !> Contact
     class(lubkin_t), intent(in) :: self

@@ -80,7 +80,9 @@ def wheel_from(archive: Path) -> Path:
     tracked = run("git", "ls-tree", "-r", "--name-only", "HEAD", "pydriver/hexcontact").splitlines()
     with zipfile.ZipFile(path) as wheel:
         names = [name for name in wheel.namelist() if ".dist-info/" not in name and not name.endswith("/")]
-    extensions = {name for name in names if name.startswith("hexcontact/core/_core.") and name.endswith(".so")}
+    extensions = {
+        name for name in names if name.startswith("hexcontact/core/_core.") and name.endswith(".so")
+    }
     if len(extensions) != 1:
         sys.exit(f"{path.name}: one compiled module was expected, found {sorted(extensions)}")
     compare(path.name, set(names) - extensions, {name.removeprefix("pydriver/") for name in tracked})

@@ -10,13 +10,16 @@ import pytest
 import xarray
 from fuzz.file_made import WINDOW, made_step, written
 
+from hexcontact import Case
 from hexcontact.errors import DeckError
+from hexcontact.result import check
 from hexcontact.result.journal import read_record, write_record
 from hexcontact.result.result import Metadata, assemble
 from hexcontact.result.store import Store, journal_of, open_result
 from hexcontact.result.trials import TrialFolder
 from hexcontact.solve.accuracy import Solution
 from hexcontact.study.collect import histories
+from hexcontact.variables import VARIABLES
 
 MATERIALS = {
     **{"effective_modulus": 2e11, "dundurs_beta": 0.0, "tangential_compliance_ratio": 1.0},
@@ -157,6 +160,18 @@ OTHER_RUNS: dict[str, tuple[dict[str, object], str]] = {
     "fields": ({"fields": ("pressure",)}, "fields"),
     "earlier": ({"resumed": ()}, "written before"),
 }
+
+
+def test_every_step_has_the_numbers_that_are_required() -> None:
+    cases = Path(__file__).parents[2] / "cases"
+    dataset = Case.from_toml(cases / "torsion.toml", overrides={"grid.nodes_in_radius": 8}).run().dataset
+    known = {name: v for name, v in VARIABLES.items() if v.dtype == "f8" and v.dims == ("step",)}
+    required = [name for name, v in known.items() if v.required and not name.startswith("stick_center")]
+    assert len(required) > 20
+    assert check._fault_of_histories(dataset) == ""
+    for name in required:
+        damaged = dataset.assign({name: dataset[name].where(dataset["step"] != 2)})
+        assert name in check._fault_of_histories(damaged), name
 
 
 @pytest.mark.parametrize(("changes", "named"), OTHER_RUNS.values(), ids=OTHER_RUNS)

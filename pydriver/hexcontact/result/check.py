@@ -144,7 +144,9 @@ def _fault_of_histories(dataset: xarray.Dataset) -> str:
     known = [name for name in history_of(dataset) if name in VARIABLES and VARIABLES[name].dtype != "str"]
     history = {name: dataset[name].values for name in known}
     for name in known:
-        if name in _ALWAYS and np.isnan(history[name]).any():
+        # without stick there is no center of it
+        always = VARIABLES[name].required and not name.startswith("stick_center")
+        if always and np.isnan(history[name]).any():
             return _NO_STEP.format(name)
     return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]))
 

@@ -16,6 +16,11 @@ module hexcontact
                                    load_displacement, linear_load_displacement, &
                                    evaluate_integral, evaluate_displacement, evaluate_linear_displacement
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy, k_x, k_y
+  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
+  use hc_interior_triangle, only: triangle_fields, mesh_fields
+  use hc_interior_points, only: fields_at_points
+  use hc_interior_planes, only: interior_planes_t, new_interior_planes, planes_memory
+  use hc_stress_invariants, only: stress_invariants, von_mises, principal_stresses
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: flexibility_t, normal, along_x, along_y
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility, dense_memory
@@ -27,7 +32,10 @@ module hexcontact
                               out_of_range
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_power_interface, only: power_interface_t
   use hc_coulomb, only: coulomb_t
+  use hc_nodal_coulomb, only: nodal_coulomb_t
+  use hc_orthotropic_coulomb, only: orthotropic_coulomb_t
   use hc_contact_residuals, only: normal_residual, tangential_residual, force_residual
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_solver, only: contact_solver_t, friction_solver_t
@@ -40,17 +48,30 @@ module hexcontact
   use hc_adaptive_path, only: adaptive_path_t
   use hc_step_control, only: step_control_t, step_attempt_t, rejected, accepted, limited, failed
   use hc_step_error, only: step_change_t, compare_halves
-  use hc_discretization_error, only: limits_of_error
+  use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
+  use hc_expected_error, only: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, &
+                               entry_steps, oblique_error, oblique_steps
   use hc_zone_estimators, only: boundary, boundary_circle, circle_fit_t, area_radius, edge_radius, pressure_center, &
                                 moment_ellipse, edge_ellipse, ellipse_t
-  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
-  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_zone_edge, only: zone_edge_t, zone_mesh_t
+  use hc_edge_tractions, only: correct_at_edges
+  use hc_load_cycles, only: find_cycles, loop_area
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent, &
+                               measure_state, state_measures_t, zone_measures_t
+  use hc_zone_outline, only: zone_outline
+  use hc_section_line, only: section_line_t, section_through, line_crossings
   use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   use hc_elliptic_contact, only: elliptic_contact_t, hertz_ellipse, crossed_cylinders_hessian
   use hc_partial_slip, only: mindlin_t, plane_cattaneo_t, turning_points
   use hc_torsion, only: lubkin_t
   use hc_self_similar, only: no_slip_constants, goodman_stick_ratio, goodman_stick_ratio_plane
   use hc_axisymmetric, only: axisymmetric_t, power_law_t, rounded_punch_t, flat_punch_t
+  use hc_stress_path, only: crossland, dang_van, deviator_amplitude
+  use hc_plane_criteria, only: plane_criterion_t, smith_watson_topper_t, findley_t, fatemi_socie_t
+  use hc_critical_plane, only: plane_set_t, new_plane_set, find_critical_plane
+  use hc_fatigue_fields, only: find_critical_planes, find_invariants, find_ruiz_parameters
+  use hc_strain_life, only: strain_life_t, new_strain_life
   implicit none
   public
 end module hexcontact

@@ -5,6 +5,8 @@
 !> radius t,
 !>
 !>     P = 2 E* integral_0^a (delta(a) - delta(t)) dt,     p(r) = E*/pi integral_r^a delta'(t)/sqrt(t^2-r^2) dt.
+!>
+!> Equations: docs/theory/closed_solutions.md.
 module hc_axisymmetric
   use, intrinsic :: ieee_arithmetic, only: ieee_positive_inf, ieee_value
   use hc_precision, only: wp, pi
@@ -25,11 +27,13 @@ module hc_axisymmetric
     procedure(quantity_interface), deferred :: load
     !> Pressure at a distance from the axis, for a contact radius [Pa]
     procedure(pressure_interface), deferred :: pressure
+    !> Contact radius under a load or an approach [m]
+    procedure(radius_interface), deferred :: contact_radius
     procedure :: max_pressure
   end type axisymmetric_t
 
   abstract interface
-    !> A quantity by the contact radius.
+    !> Compute a quantity by the contact radius.
     elemental function quantity_interface(self, radius) result(value)
       import :: axisymmetric_t, wp
       implicit none
@@ -40,7 +44,7 @@ module hc_axisymmetric
       real(wp) :: value
     end function quantity_interface
 
-    !> Pressure by the contact radius; 0 outside the contact.
+    !> Compute the pressure by the contact radius; 0 outside the contact.
     elemental function pressure_interface(self, radius, r) result(value)
       import :: axisymmetric_t, wp
       implicit none
@@ -50,6 +54,17 @@ module hc_axisymmetric
       real(wp), intent(in) :: radius, r
       real(wp) :: value
     end function pressure_interface
+
+    !> Find the contact radius under a load or an approach.
+    pure function radius_interface(self, normal_load, approach) result(radius)
+      import :: axisymmetric_t, wp
+      implicit none
+      !> Body
+      class(axisymmetric_t), intent(in) :: self
+      !> Load [N] or approach [m]: one of them, above 0
+      real(wp), intent(in), optional :: normal_load, approach
+      real(wp) :: radius
+    end function radius_interface
   end interface
 
   !> h = C r^n.
@@ -124,7 +139,7 @@ module hc_axisymmetric
 
 contains
 
-  !> Largest pressure by the contact radius [Pa]; there is one maximum between the axis and the edge.
+  !> Compute the largest pressure by the contact radius [Pa]; there is one maximum between the axis and the edge.
   pure function max_pressure(self, radius) result(peak)
     !> Body
     class(axisymmetric_t), intent(in) :: self
@@ -168,7 +183,7 @@ contains
 
   ! ------------------------------------------------------------------------------- power laws
 
-  !> delta = c C a^n, c = sqrt(pi) Gamma(n/2+1)/Gamma(n/2+1/2) [m].
+  !> Compute delta = c C a^n, c = sqrt(pi) Gamma(n/2+1)/Gamma(n/2+1/2) [m].
   elemental function power_law_approach(self, radius) result(value)
     !> Body
     class(power_law_t), intent(in) :: self
@@ -179,7 +194,7 @@ contains
     value = power_law_factor(self)*radius**self%exponent
   end function power_law_approach
 
-  !> c C of the approach [m^(1-n)].
+  !> Compute c C of the approach [m^(1-n)].
   elemental function power_law_factor(self) result(factor)
     !> Body
     class(power_law_t), intent(in) :: self
@@ -190,7 +205,7 @@ contains
     end associate
   end function power_law_factor
 
-  !> P = 2 E* n/(n+1) delta a [N].
+  !> Compute P = 2 E* n/(n+1) delta a [N].
   elemental function power_law_load(self, radius) result(value)
     !> Body
     class(power_law_t), intent(in) :: self
@@ -201,7 +216,7 @@ contains
     value = 2.0_wp*self%effective_modulus*self%exponent/(self%exponent + 1.0_wp)*self%approach(radius)*radius
   end function power_law_load
 
-  !> Contact radius under a load or an approach [m].
+  !> Find the contact radius under a load or an approach [m].
   pure function power_law_contact_radius(self, normal_load, approach) result(radius)
     !> Body
     class(power_law_t), intent(in) :: self
@@ -214,7 +229,7 @@ contains
     if (present(normal_load)) radius = (normal_load/self%load(1.0_wp))**(1.0_wp/(self%exponent + 1.0_wp))
   end function power_law_contact_radius
 
-  !> p(r) = (E*/pi) n c C a^(n-1) I_n, I_n = integral_0^s (r^2+x^2)^(n/2-1) dx, s^2 = a^2-r^2, lengths as shares of a.
+  !> Compute p(r) = (E*/pi) n c C a^(n-1) I_n, I_n = integral_0^s (r^2+x^2)^(n/2-1) dx, s^2 = a^2-r^2, lengths as shares of a.
   !>
   !> Integration by parts leads from I_(n-2) to I_n = (s + (n-2) r^2 I_(n-2))/(n-1), and x = r sinh u to a smooth
   !> integrand, I_n = integral_0^(arsinh s/r) (r cosh u)^(n-1) du.
@@ -253,7 +268,7 @@ contains
     value = self%effective_modulus/pi*self%exponent*self%approach(radius)/radius*value
   end function power_law_pressure
 
-  !> Largest pressure [Pa]: infinite for a cone, in the middle for n <= 2, where the pressure falls outwards.
+  !> Compute the largest pressure [Pa]: infinite for a cone, in the middle for n <= 2, where the pressure falls outwards.
   pure function power_law_max_pressure(self, radius) result(peak)
     !> Body
     class(power_law_t), intent(in) :: self
@@ -268,7 +283,7 @@ contains
     end if
   end function power_law_max_pressure
 
-  !> (r cosh u)^(n-1).
+  !> Compute (r cosh u)^(n-1).
   pure function cosh_power(self, x) result(value)
     !> Function
     class(cosh_power_t), intent(in) :: self
@@ -281,7 +296,7 @@ contains
 
   ! ------------------------------------------------------------------------------- punches
 
-  !> delta = (a/R) [sqrt(a^2-b^2) - b arccos(b/a)] [m].
+  !> Compute delta = (a/R) [sqrt(a^2-b^2) - b arccos(b/a)] [m].
   elemental function rounded_approach(self, radius) result(value)
     !> Body
     class(rounded_punch_t), intent(in) :: self
@@ -297,7 +312,7 @@ contains
     end associate
   end function rounded_approach
 
-  !> P = 2 E* integral_b^a t delta'(t) dt, delta'(t) = [2 sqrt(t^2-b^2) - b arccos(b/t)]/R [N].
+  !> Compute P = 2 E* integral_b^a t delta'(t) dt, delta'(t) = [2 sqrt(t^2-b^2) - b arccos(b/t)]/R [N].
   elemental function rounded_load(self, radius) result(value)
     !> Body
     class(rounded_punch_t), intent(in) :: self
@@ -312,7 +327,7 @@ contains
     end associate
   end function rounded_load
 
-  !> Integrand of the load, lengths as shares of b.
+  !> Evaluate the integrand of the load, lengths as shares of b.
   pure function rounded_load_integrand(self, x) result(value)
     !> Function
     class(rounded_load_t), intent(in) :: self
@@ -325,7 +340,7 @@ contains
     value = (2.0_wp*sinh(x) - atan(sinh(x)))*sinh(x)*cosh(x)
   end function rounded_load_integrand
 
-  !> Contact radius under a load or an approach [m].
+  !> Find the contact radius under a load or an approach [m].
   pure function rounded_contact_radius(self, normal_load, approach) result(radius)
     !> Body
     class(rounded_punch_t), intent(in) :: self
@@ -346,7 +361,7 @@ contains
     radius = zero_between(error, self%flat_radius, radius, 0.0_wp)
   end function rounded_contact_radius
 
-  !> Approach or load less the given one.
+  !> Compute the approach or load less the given one.
   pure function radius_error(self, x) result(value)
     !> Function
     class(radius_error_t), intent(in) :: self
@@ -361,7 +376,7 @@ contains
     end if
   end function radius_error
 
-  !> p(r) = E*/pi integral delta'(t)/t ds, s = sqrt(t^2-r^2), from t = max(r, b) to a [Pa].
+  !> Compute p(r) = E*/pi integral delta'(t)/t ds, s = sqrt(t^2-r^2), from t = max(r, b) to a [Pa].
   elemental function rounded_pressure(self, radius, r) result(value)
     !> Body
     class(rounded_punch_t), intent(in) :: self
@@ -388,7 +403,7 @@ contains
     end associate
   end function rounded_pressure
 
-  !> Integrand of the pressure, lengths as shares of b.
+  !> Evaluate the integrand of the pressure, lengths as shares of b.
   pure function rounded_pressure_integrand(self, x) result(value)
     !> Function
     class(rounded_pressure_t), intent(in) :: self
@@ -403,7 +418,7 @@ contains
     value = value*(2.0_wp*leg - atan(leg))/sqrt(1.0_wp + leg**2)
   end function rounded_pressure_integrand
 
-  !> P/delta = 2 E* a of a flat punch [N/m].
+  !> Compute P/delta = 2 E* a of a flat punch [N/m].
   elemental function flat_stiffness(self) result(stiffness)
     !> Body
     class(flat_punch_t), intent(in) :: self
@@ -412,7 +427,7 @@ contains
     stiffness = 2.0_wp*self%effective_modulus*self%radius
   end function flat_stiffness
 
-  !> p = P/(2 pi a sqrt(a^2-r^2)) of a flat punch; infinite at its edge, 0 outside [Pa].
+  !> Compute p = P/(2 pi a sqrt(a^2-r^2)) of a flat punch; infinite at its edge, 0 outside [Pa].
   elemental function flat_pressure(self, load, r) result(value)
     !> Body
     class(flat_punch_t), intent(in) :: self

@@ -15,7 +15,7 @@ module hc_carlson
 
 contains
 
-  !> R_F(x, y, z) = 1/2 integral_0^inf dt/sqrt((t+x)(t+y)(t+z)); x, y, z >= 0; infinite if two of them are 0.
+  !> Compute R_F(x, y, z) = 1/2 integral_0^inf dt/sqrt((t+x)(t+y)(t+z)); x, y, z >= 0; infinite if two of them are 0.
   elemental function carlson_rf(x, y, z) result(rf)
     !> Arguments
     real(wp), intent(in) :: x, y, z
@@ -44,7 +44,7 @@ contains
     rf = (1.0_wp - e2/10.0_wp + e3/14.0_wp + e2**2/24.0_wp - 3.0_wp*e2*e3/44.0_wp)/sqrt(mean)
   end function carlson_rf
 
-  !> R_D(x, y, z) = 3/2 integral_0^inf dt/(sqrt((t+x)(t+y)) (t+z)^(3/2)); x, y, z >= 0;
+  !> Compute R_D(x, y, z) = 3/2 integral_0^inf dt/(sqrt((t+x)(t+y)) (t+z)^(3/2)); x, y, z >= 0;
   !> infinite if z or both x and y are 0.
   elemental function carlson_rd(x, y, z) result(rd)
     !> Arguments
@@ -81,7 +81,7 @@ contains
                                                  - 3.0_wp*e4/22.0_wp - 9.0_wp*e2*e3/52.0_wp + 3.0_wp*e5/26.0_wp)
   end function carlson_rd
 
-  !> Complete elliptic integral K by the complementary parameter 1 - k^2 > 0.
+  !> Compute the complete elliptic integral K by the complementary parameter 1 - k^2 > 0.
   elemental function complete_k(complement) result(k)
     !> 1 - k^2
     real(wp), intent(in) :: complement

@@ -1,4 +1,6 @@
 !> Frictionless contacts over an ellipse: Hertz's solution for surfaces that are quadratic forms.
+!>
+!> H. Hertz, J. reine angew. Math. 92 (1882) 156-171; docs/theory/closed_solutions.md.
 module hc_elliptic_contact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
@@ -35,7 +37,7 @@ contains
   !> Solve Hertz's contact with the separation h = (x, y) H (x, y)^T / 2 under a load or an approach.
   !>
   !> The complete elliptic integrals (parameter m = e^2 = 1 - b^2/a^2) enter in Carlson's symmetric form,
-  !> K = R_F(0, 1-m, 1), (K-E)/m = R_D(0, 1-m, 1)/3, (E-(1-m)K)/m = (1-m) R_D(0, 1, 1-m)/3, which keeps all
+  !> K = R_F(0, 1-m, 1), (K-E)/m = R_D(0, 1-m, 1)/3, (E-(1-m)K)/m = (1-m) R_D(0, 1, 1-m)/3, which loses no
   !> digits for nearly circular and for very slender ellipses. K. L. Johnson, Contact Mechanics (1985), section 4.2.
   pure subroutine hertz_ellipse(contact, effective_modulus, hessian, error, normal_load, approach)
     !> Contact
@@ -86,7 +88,7 @@ contains
     contact%angle = 0.5_wp*pi - modulo(0.5_wp*pi - contact%angle, pi)
   end subroutine hertz_ellipse
 
-  !> log(A/B) of an ellipse less that of the gap, A = (1-m) R_D(0, 1, 1-m) and B = R_D(0, 1-m, 1) but for a factor.
+  !> Compute log(A/B) of an ellipse less that of the gap, A = (1-m) R_D(0, 1, 1-m) and B = R_D(0, 1-m, 1) but for a factor.
   pure function curvature_error(self, x) result(value)
     !> Function
     class(curvature_error_t), intent(in) :: self
@@ -98,7 +100,7 @@ contains
     value = log(carlson_rd(0.0_wp, value, 1.0_wp)/carlson_rd(0.0_wp, 1.0_wp, value)) - self%log_ratio
   end function curvature_error
 
-  !> Tensor H of two cylinders, the first with its axis along x.
+  !> Compute the tensor H of two cylinders, the first with its axis along x.
   pure function crossed_cylinders_hessian(radius_1, radius_2, angle) result(hessian)
     !> Radii [m]
     real(wp), intent(in) :: radius_1, radius_2
@@ -110,7 +112,7 @@ contains
     hessian(:, 2) = cos(angle)*[-sin(angle), cos(angle)]/radius_2 + [0.0_wp, 1.0_wp/radius_1]
   end function crossed_cylinders_hessian
 
-  !> Point relative to the ellipse: coordinates along its axes, as shares of them.
+  !> Return a point relative to the ellipse: coordinates along its axes, as shares of them.
   elemental subroutine local(self, x, y, along, across)
     !> Contact
     class(elliptic_contact_t), intent(in) :: self
@@ -123,7 +125,7 @@ contains
     across = (y*cos(self%angle) - x*sin(self%angle))/self%semi_minor
   end subroutine local
 
-  !> Contact pressure [Pa] at a point; 0 outside the contact.
+  !> Compute the contact pressure [Pa] at a point; 0 outside the contact.
   elemental function pressure(self, x, y)
     !> Contact
     class(elliptic_contact_t), intent(in) :: self

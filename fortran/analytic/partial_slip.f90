@@ -3,6 +3,8 @@
 !> C. Cattaneo, Rend. Accad. Naz. Lincei 27 (1938); R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268;
 !> R. D. Mindlin and H. Deresiewicz, J. Appl. Mech. 20 (1953) 327-344.
 !> A load beyond the sliding load has no solution: the results are not numbers.
+!>
+!> Equations: docs/theory/closed_solutions.md.
 module hc_partial_slip
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi
@@ -41,7 +43,7 @@ module hc_partial_slip
 
 contains
 
-  !> Tangential load mu P at which the spheres slide [N].
+  !> Compute the tangential load mu P at which the spheres slide [N].
   elemental function sliding_load(self)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -50,7 +52,7 @@ contains
     sliding_load = self%friction_coefficient*self%normal_load
   end function sliding_load
 
-  !> Rigid shift at which the spheres start to slide, Delta_s = 3 mu P S/(16 a) [m].
+  !> Compute the rigid shift at which the spheres start to slide, Delta_s = 3 mu P S/(16 a) [m].
   elemental function sliding_shift(self)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -59,7 +61,7 @@ contains
     sliding_shift = 3.0_wp*self%sliding_load()*self%compliance/(16.0_wp*self%contact_radius)
   end function sliding_shift
 
-  !> Radius of the stick circle under the first loading to Q: c = a (1 - Q/mu P)^(1/3) [m].
+  !> Compute the radius of the stick circle under the first loading to Q: c = a (1 - Q/mu P)^(1/3) [m].
   elemental function stick_radius(self, load)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -70,7 +72,7 @@ contains
     stick_radius = self%contact_radius*reserve(load, self%sliding_load())**(1.0_wp/3.0_wp)
   end function stick_radius
 
-  !> Rigid shift under the first loading to Q: Delta_s [1 - (1 - Q/mu P)^(2/3)] [m].
+  !> Compute the rigid shift under the first loading to Q: Delta_s [1 - (1 - Q/mu P)^(2/3)] [m].
   elemental function shift(self, load)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -81,7 +83,7 @@ contains
     shift = sign(self%sliding_shift(), load)*(1.0_wp - reserve(load, self%sliding_load())**(2.0_wp/3.0_wp))
   end function shift
 
-  !> Tangential load under a first prescribed shift: mu P [1 - (1 - Delta/Delta_s)^(3/2)] [N].
+  !> Compute the tangential load under a first prescribed shift: mu P [1 - (1 - Delta/Delta_s)^(3/2)] [N].
   elemental function load(self, shift)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -92,7 +94,7 @@ contains
     load = sign(self%sliding_load(), shift)*(1.0_wp - max(1.0_wp - abs(shift)/self%sliding_shift(), 0.0_wp)**1.5_wp)
   end function load
 
-  !> Shear traction under the first loading to Q [Pa]: semi-ellipsoids of the curvature of mu p over the contact
+  !> Compute the shear traction under the first loading to Q [Pa]: semi-ellipsoids of the curvature of mu p over the contact
   !> and, with the opposite sign, over the stick circle.
   elemental function traction(self, r, load)
     !> Contact
@@ -107,7 +109,7 @@ contains
     traction = sign(1.5_wp*self%sliding_load()/(pi*self%contact_radius**3), load)*traction
   end function traction
 
-  !> Rigid shift at Q on the way back from the load Q* > 0 towards -Q*, P constant [m].
+  !> Compute the rigid shift at Q on the way back from the load Q* > 0 towards -Q*, P constant [m].
   elemental function shift_unloading(self, load, peak) result(shift)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -118,7 +120,7 @@ contains
     shift = self%shift(peak) - 2.0_wp*self%shift(0.5_wp*(peak - load))
   end function shift_unloading
 
-  !> Shear traction at Q on the way back from Q* > 0: slip reversed at the rim [Pa].
+  !> Compute the shear traction at Q on the way back from Q* > 0: slip reversed at the rim [Pa].
   elemental function traction_unloading(self, r, load, peak) result(traction)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -131,7 +133,7 @@ contains
     traction = self%traction(r, peak) - 2.0_wp*self%traction(r, 0.5_wp*(peak - load))
   end function traction_unloading
 
-  !> Energy dissipated in one cycle between +Q* and -Q* at constant P [J].
+  !> Compute the energy dissipated in one cycle between +Q* and -Q* at constant P [J].
   elemental function energy_per_cycle(self, peak) result(energy)
     !> Contact
     class(mindlin_t), intent(in) :: self
@@ -146,7 +148,7 @@ contains
              *(1.0_wp - (1.0_wp - f)**(5.0_wp/3.0_wp) - 5.0_wp/6.0_wp*f*(1.0_wp + (1.0_wp - f)**(2.0_wp/3.0_wp)))
   end function energy_per_cycle
 
-  !> Half the width of the stick strip under Q': c = b sqrt(1 - Q'/mu P') [m].
+  !> Compute half the width of the stick strip under Q': c = b sqrt(1 - Q'/mu P') [m].
   elemental function stick_half_width(self, load)
     !> Contact
     class(plane_cattaneo_t), intent(in) :: self
@@ -157,7 +159,7 @@ contains
     stick_half_width = self%half_width*sqrt(reserve(load, self%friction_coefficient*self%normal_load))
   end function stick_half_width
 
-  !> Shear traction under a first loading to Q' [Pa].
+  !> Compute the shear traction under a first loading to Q' [Pa].
   elemental function plane_traction(self, x, load) result(traction)
     !> Contact
     class(plane_cattaneo_t), intent(in) :: self
@@ -171,7 +173,7 @@ contains
     traction = sign(2.0_wp*self%friction_coefficient*self%normal_load/(pi*self%half_width**2), load)*traction
   end function plane_traction
 
-  !> 1 - |Q|/(mu P); not a number beyond sliding.
+  !> Compute 1 - |Q|/(mu P); not a number beyond sliding.
   elemental function reserve(load, sliding)
     !> Q and mu P [N or N/m]
     real(wp), intent(in) :: load, sliding
@@ -181,7 +183,7 @@ contains
     if (reserve < 0.0_wp) reserve = ieee_value(reserve, ieee_quiet_nan)
   end function reserve
 
-  !> sqrt(a^2 - x^2) - sqrt(c^2 - x^2), each 0 outside.
+  !> Compute sqrt(a^2 - x^2) - sqrt(c^2 - x^2), each 0 outside.
   elemental function semicircles(a, c, x)
     !> Half the width of the contact and of the stick zone, distance from the middle [m]
     real(wp), intent(in) :: a, c, x
@@ -190,7 +192,7 @@ contains
     semicircles = sqrt(max(a**2 - x**2, 0.0_wp)) - sqrt(max(c**2 - x**2, 0.0_wp))
   end function semicircles
 
-  !> Turning points of a load history that a contact of constant size remembers; the last is the load now.
+  !> Find the turning points of a load history that a contact of constant size remembers; the last is the load now.
   !>
   !> A contact in partial slip follows Masing's rules: a new slip zone that has grown as large as an older one
   !> wipes out the memory of it.

@@ -17,7 +17,7 @@ module hc_scalar_function
   end type scalar_function_t
 
   abstract interface
-    !> Value of a function.
+    !> Return the value of a function.
     pure function value_interface(self, x) result(value)
       import :: scalar_function_t, wp
       implicit none
@@ -34,7 +34,7 @@ module hc_scalar_function
 
 contains
 
-  !> Zero of a function between two points where its signs differ; not a number if they do not.
+  !> Find the zero of a function between two points where its signs differ; not a number if they do not.
   !>
   !> Bisection, secant and inverse quadratic interpolation: R. P. Brent, Algorithms for Minimization Without
   !> Derivatives (1973), chapter 4.
@@ -113,7 +113,7 @@ contains
     end do
   end function zero_between
 
-  !> Integral of a function that is smooth on each of equal panels, by Gauss's rule.
+  !> Integrate a function that is smooth on each of equal panels, by Gauss's rule.
   pure function integral(f, first, last, n_panel)
     !> Function
     class(scalar_function_t), intent(in) :: f
@@ -136,7 +136,7 @@ contains
     end do
   end function integral
 
-  !> Nodes and weights of the Gauss-Legendre rule on [0, 1].
+  !> Compute the nodes and weights of the Gauss-Legendre rule on [0, 1].
   !>
   !> Newton's method on the Legendre polynomial from Tricomi's estimates of its zeros.
   pure subroutine gauss_legendre(node, weight)

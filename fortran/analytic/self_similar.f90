@@ -2,6 +2,8 @@
 !>
 !> V. I. Mossakovskii, J. Appl. Math. Mech. 27 (1963) 418-427; D. A. Spence, Proc. R. Soc. A 305 (1968) 55-80 and
 !> J. Elasticity 5 (1975) 297-319; L. E. Goodman, J. Appl. Mech. 29 (1962) 515-522. beta is Dundurs' constant.
+!>
+!> Equations: docs/theory/closed_solutions.md.
 module hc_self_similar
   use hc_precision, only: wp, pi
   use hc_carlson, only: complete_k
@@ -37,7 +39,7 @@ module hc_self_similar
 
 contains
 
-  !> Constants of indentation without slip (Mossakovskii, Spence).
+  !> Compute the constants of indentation without slip (Mossakovskii, Spence).
   !>
   !> kappa = artanh(beta)/beta and chi = 1/2 / integral_0^1 t cos[(artanh(beta)/pi) ln((1-t)/(1+t))] dt.
   !> A flat punch has P = 2 kappa E* a delta; a sphere, pressed incrementally, delta = chi a^2/R and
@@ -54,7 +56,7 @@ contains
     chi = 0.5_wp/integral(no_slip_integrand_t(atanh(beta)/pi), 0.0_wp, 80.0_wp, 40)
   end subroutine no_slip_constants
 
-  !> Integrand of 1/(2 chi).
+  !> Evaluate the integrand of 1/(2 chi).
   pure function no_slip_integrand(self, x) result(value)
     !> Function
     class(no_slip_integrand_t), intent(in) :: self
@@ -65,7 +67,7 @@ contains
     value = tanh(0.5_wp*x)*cos(self%frequency*x)/(2.0_wp*cosh(0.5_wp*x)**2)
   end function no_slip_integrand
 
-  !> Stick ratio c/a of monotone indentation where shear does not move the pressure (Goodman, Spence).
+  !> Compute the stick ratio c/a of monotone indentation where shear does not move the pressure (Goodman, Spence).
   !>
   !> Solves (a/2c) ln[(a+c)/(a-c)] = (mu/|beta|) K'(c/a) with K'(k) = K(sqrt(1-k^2)); not a number where c/a is not
   !> distinct from 0 and 1.
@@ -79,7 +81,7 @@ contains
     stick_ratio = tanh(zero_between(goodman_error_t(friction_coefficient/abs(beta)), 1.0e-150_wp, 40.0_wp, 0.0_wp))
   end function goodman_stick_ratio
 
-  !> Left side of Goodman's condition less the right one.
+  !> Compute the left side of Goodman's condition less the right one.
   pure function goodman_error(self, x) result(value)
     !> Function
     class(goodman_error_t), intent(in) :: self
@@ -90,7 +92,7 @@ contains
     value = x/tanh(x) - self%ratio*complete_k(tanh(x)**2)
   end function goodman_error
 
-  !> Stick ratio c/b of cylinders pressed monotonically where shear does not move the pressure.
+  !> Compute the stick ratio c/b of cylinders pressed monotonically where shear does not move the pressure.
   !>
   !> Solves |beta| K(k) = mu K'(k), k = c/b (Spence). It follows from a flat punch, p = P'/(pi sqrt(b^2-x^2)), of which
   !> all self-similar contacts are made: a bounded traction in the stick strip needs
@@ -109,7 +111,7 @@ contains
     stick_ratio = sqrt(logistic(z))
   end function goodman_stick_ratio_plane
 
-  !> K(k) less mu/|beta| K'(k).
+  !> Compute K(k) less mu/|beta| K'(k).
   pure function plane_error(self, x) result(value)
     !> Function
     class(plane_error_t), intent(in) :: self
@@ -120,7 +122,7 @@ contains
     value = complete_k(logistic(-x)) - self%ratio*complete_k(logistic(x))
   end function plane_error
 
-  !> 1/(1 + exp(-z)).
+  !> Compute 1/(1 + exp(-z)).
   elemental function logistic(z)
     !> Where
     real(wp), intent(in) :: z

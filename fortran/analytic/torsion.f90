@@ -1,6 +1,6 @@
 !> Spheres pressed by a constant load and twisted about their common normal.
 !>
-!> J. L. Lubkin, The torsion of elastic spheres in contact, J. Appl. Mech. 18 (1951) 183-187.
+!> J. L. Lubkin, The torsion of elastic spheres in contact, J. Appl. Mech. 18 (1951) 183-187; docs/theory/closed_solutions.md.
 module hc_torsion
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi
@@ -41,7 +41,7 @@ module hc_torsion
 
 contains
 
-  !> Largest shear traction mu p0 [Pa].
+  !> Compute the largest shear traction mu p0 [Pa].
   elemental function peak(self)
     !> Contact
     class(lubkin_t), intent(in) :: self
@@ -50,7 +50,7 @@ contains
     peak = 1.5_wp*self%friction_coefficient*self%normal_load/(pi*self%contact_radius**2)
   end function peak
 
-  !> Torque of full slip, 3 pi mu P a/16 [N m].
+  !> Compute the torque of full slip, 3 pi mu P a/16 [N m].
   elemental function sliding_torque(self)
     !> Contact
     class(lubkin_t), intent(in) :: self
@@ -59,7 +59,7 @@ contains
     sliding_torque = 3.0_wp*pi/16.0_wp*self%friction_coefficient*self%normal_load*self%contact_radius
   end function sliding_torque
 
-  !> K(k) - E(k), k^2 = 1 - r^2/a^2, in Carlson's form (no cancellation, no overflow).
+  !> Compute K(k) - E(k), k^2 = 1 - r^2/a^2, in Carlson's form (no cancellation, no overflow).
   elemental function twist_factor(ratio)
     !> r/a
     real(wp), intent(in) :: ratio
@@ -68,7 +68,7 @@ contains
     twist_factor = (1.0_wp - ratio**2)*carlson_rd(0.0_wp, ratio**2, 1.0_wp)/3.0_wp
   end function twist_factor
 
-  !> Twist at which the stick radius is c: (S_t mu p0/2) (K(k) - E(k)), k^2 = 1 - c^2/a^2 [rad].
+  !> Compute the twist at which the stick radius is c: (S_t mu p0/2) (K(k) - E(k)), k^2 = 1 - c^2/a^2 [rad].
   elemental function twist(self, stick_radius)
     !> Contact
     class(lubkin_t), intent(in) :: self
@@ -79,7 +79,7 @@ contains
     twist = 0.5_wp*self%compliance*peak(self)*twist_factor(stick_radius/self%contact_radius)
   end function twist
 
-  !> Torque at which the stick radius is c [N m].
+  !> Compute the torque at which the stick radius is c [N m].
   elemental function torque(self, stick_radius)
     !> Contact
     class(lubkin_t), intent(in) :: self
@@ -94,7 +94,7 @@ contains
     torque = 8.0_wp*peak(self)*self%contact_radius**3*(c**3*twist_factor(c)/3.0_wp + slip)
   end function torque
 
-  !> Stick radius under a first torque below the sliding torque, to 1e-14 a; else not a number [m].
+  !> Compute the stick radius under a first torque below the sliding torque, to 1e-14 a; else not a number [m].
   elemental function stick_radius(self, torque)
     !> Contact
     class(lubkin_t), intent(in) :: self
@@ -111,7 +111,7 @@ contains
     end if
   end function stick_radius
 
-  !> Integrand of slip's share of the torque.
+  !> Evaluate the integrand of slip's share of the torque.
   pure function slip_torque(self, x) result(value)
     !> Function
     class(slip_torque_t), intent(in) :: self
@@ -124,7 +124,7 @@ contains
     value = 2.0_wp*x**5*twist_factor(x**2)
   end function slip_torque
 
-  !> Torque less the given one.
+  !> Compute the torque less the given one.
   pure function torque_error(self, x) result(value)
     !> Function
     class(torque_error_t), intent(in) :: self

@@ -1,4 +1,4 @@
-!> Locks of what threads share.
+!> Locks of objects that threads share.
 !>
 !> They are the system's own, since Python's threads are no threads of OpenMP, and a build may be without it.
 module hc_lock
@@ -9,8 +9,8 @@ module hc_lock
   public :: lock, unlock
   public :: fftw_planner, kernel_table, spectrum_users, handle_table
 
-  !> FFTW's planner; the table of a kernel cache; counts of who uses a spectrum; the table of handles.
-  !> Whoever has the kernel table may lock the users, too; no other two are locked at once.
+  !> FFTW's planner; the table of a kernel cache; counts of the users of spectra; the table of handles.
+  !> A thread with the kernel table may lock the users, too; no other two are locked at once.
   integer(c_int), parameter :: fftw_planner = 0, kernel_table = 1, spectrum_users = 2, handle_table = 3
 
   interface
@@ -20,7 +20,7 @@ module hc_lock
       integer(c_int), value :: which
     end subroutine lock
 
-    !> Give a lock back
+    !> Release a lock
     subroutine unlock(which) bind(c, name='hexcontact_unlock')
       import :: c_int
       integer(c_int), value :: which

@@ -1,8 +1,8 @@
-!> Memory that is asked for before work begins.
+!> Check of the memory before work begins.
 !>
 !> An array of the compiler's own making, a thread, or a plan of FFTW for which there is no memory ends the whole
-!> program. So whoever begins to work looks first whether all that it may take can be had; a limit on the address
-!> space (`ulimit -v`) or a machine that promises no more than it has then leads to an error.
+!> program. So the library checks first whether the system grants all that the work may take; a limit on the address
+!> space (`ulimit -v`), or a machine without overcommitment, then leads to an error.
 module hc_memory
   use, intrinsic :: iso_c_binding, only: c_size_t, c_int
   use, intrinsic :: iso_fortran_env, only: int64
@@ -16,11 +16,13 @@ module hc_memory
   integer(int64), parameter :: margin = 8000000
 
   interface
+    !> Return 1 if the system grants as many bytes, else 0
     integer(c_int) function can_map(bytes) bind(c, name='hexcontact_can_map')
       import :: c_size_t, c_int
       integer(c_size_t), value :: bytes
     end function can_map
 
+    !> Return the bytes of the stack of a thread
     integer(c_size_t) function stack_size() bind(c, name='hexcontact_stack_size')
       import :: c_size_t
     end function stack_size
@@ -32,7 +34,7 @@ contains
   subroutine require_memory(bytes, error, threads)
     !> Bytes that the work takes at most
     integer(int64), intent(in) :: bytes
-    !> Allocated if they cannot be had
+    !> Allocated if the system does not grant them
     type(error_t), allocatable, intent(out) :: error
     !> Threads that may have to be started
     integer, intent(in), optional :: threads

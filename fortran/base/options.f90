@@ -1,32 +1,38 @@
 !> Tolerances, caps and tuning numbers of the solvers, each with its reason.
 !>
-!> Problems and solvers hold a copy; whoever changes one before solving changes the work, seldom the result. None of them is
-!> part of what is solved: a state counts as converged by the tolerance that the caller gives, whatever stands here. Numbers
-!> that only guard against overflow, and those that define a residual, stand beside their formulas.
+!> Problems and solvers have a copy; a change of it before a solution changes the work, seldom the result. None of them is
+!> part of the equations: a state is converged by the tolerance of the caller, whatever these numbers are.
+!>
+!> Beside their formulas stand numbers that only guard against overflow and dependent equations, those that define a residual,
+!> the ranges of series in elasticity/, on which the spectra in a cache depend to the bit, and sizes of blocks that fit a cache.
 module hc_options
   use hc_precision, only: wp
   implicit none
   private
 
   public :: options_t, contact_options_t, normal_options_t, newton_options_t, multilevel_options_t, &
-            direct_options_t, entry_options_t
+            preconditioner_options_t, direct_options_t, entry_options_t, step_options_t, edge_options_t, &
+            cycle_options_t, accuracy_options_t
 
   !> What all methods share (docs/theory/friction.md, "The classification parameter", "Globalisation", "Gross sliding").
   type :: contact_options_t
     !> Scale kappa of the classification parameters, (F8): r times the operator has to be of order one, so that (F5) is a
     !> step of a contracting projection
     real(wp) :: classification_scale = 10.0_wp
-    !> |beta| min(mu, 1) from which pressure and shear traction are better found together: staggered sweeps would keep
-    !> exchanging nodes at the edge
+    !> |beta| min(mu, 1) from which pressure and shear traction are better found together: staggered sweeps would
+    !> exchange nodes at the edge again and again
     real(wp) :: strong_coupling = 0.03_wp
-    !> Share of the slipping nodes that are held in stick where nothing else resists a load: enough of them to carry it, and
+    !> Share of the slipping nodes that are fixed in stick where nothing else resists a load: enough of them to carry it, and
     !> those that slip least, which are the likeliest to stick
-    real(wp) :: held_share = 0.25_wp
+    real(wp) :: fixed_share = 0.25_wp
+    !> Compliance of a layer, over that of a node and of the layer under the largest pressure, without effect: the
+    !> pressure there is negligible, and larger numbers would only leave the range of single precision
+    real(wp) :: softest_layer = 1.0e10_wp
     !> Share of a load that rounding errors may add before it counts as more than full sliding carries
     real(wp) :: load_rounding = 1.0e-6_wp
-    !> Residual R_n above which a pressure says nothing about the load that it can carry
+    !> Residual R_n above which the load that a pressure can carry is unknown
     real(wp) :: trusted_residual = 0.1_wp
-    !> Motions that are tried for the least load factor of (F12), and the relative gain below which no more are
+    !> Motions that are tried for the least load factor of (F13), and the relative gain below which no more are
     integer :: max_limit_motions = 100
     real(wp) :: least_limit_gain = 1.0e-9_wp
   end type contact_options_t
@@ -35,23 +41,25 @@ module hc_options
   type :: normal_options_t
     !> Length of a projected step, (N3): M is a little more than the inverse of the operator
     real(wp) :: step_length = 0.85_wp
-    !> Factor by which projected steps have to bring the residual down every other time, or sets are held: on rough
-    !> surfaces they would change on and on
+    !> Factor by which projected steps have to bring the residual down every other time, or sets are fixed: on rough
+    !> surfaces they would change without end
     real(wp) :: progress = 0.5_wp
     !> Steps that are not judged by it: the first ones cut off most of a wrong start
     integer :: first_steps = 3
-    !> A set that is held is given up when its residual has come down by this factor: then the next one can be trusted
-    real(wp) :: held_accuracy = 0.1_wp
+    !> A fixed set is changed when its residual has come down by this factor: then the next one can be trusted
+    real(wp) :: fixed_accuracy = 0.1_wp
     !> Share of a residual, and of the tolerance, that errors of single precision may make up
     real(wp) :: residual_share = 0.01_wp, tolerance_share = 0.1_wp
     !> Times that the pressure of a solution is fitted to the load: a tolerance below rounding errors is not reached by more
     integer :: max_fits = 3
     !> Tolerance on coarser lattices, which only have to give a start
     real(wp) :: coarse_tolerance = 3.0e-2_wp
-    !> Tolerance on a part of the window: the product over the window sees what single precision left
+    !> Tolerance on a part of the window: the product over the window contains the errors of single precision
     real(wp) :: part_tolerance = 0.8_wp
-    !> Lattices with fewer nodes are left to one thread: waking the others for each of the short passes takes longer
+    !> Lattices with fewer nodes are left to one thread: the start of the others takes longer than each of the short passes
     integer :: worth_sharing = 150000
+    !> A compliant interface is linearised anew where the linear problem is solved to this share of the whole residual
+    real(wp) :: linear_share = 0.3_wp
   end type normal_options_t
 
   !> Newton's method on FFTs (docs/theory/friction.md, "Staggered sweep", "Coupled sweep", "Globalisation").
@@ -71,25 +79,25 @@ module hc_options
     !> left, they are computed afresh
     real(wp) :: displacement_rounding = 1.0e-10_wp
     !> Component of the traction across the direction of slip, relative to the largest that friction allows, that is no step
-    !> towards a solution: nodes are held instead
+    !> towards a solution: nodes are fixed in stick instead
     real(wp) :: most_across = 5.0_wp
-    !> Factor of the classification parameter at the first shear traction, where nodes are held, and under strong coupling:
-    !> there the tractions say little about the zones yet
+    !> Factor of the classification parameter at the first shear traction, where nodes are fixed, and under strong coupling:
+    !> there the zones are far from those of the solution
     real(wp) :: cautious_share = 0.2_wp
     !> Sweeps after which the classification parameter is halved and a whole step taken again; how small its factor gets
     integer :: sweeps_per_cut = 10
     real(wp) :: least_share_of_r = 1.0e-3_wp
     !> Sweeps that are never damped: active sets need some to settle
     integer :: undamped_sweeps = 6
-    !> A residual R_t that does not fall below this share of the best one goes in circles, unless it is settled
+    !> A residual R_t that does not fall below this share of the best one oscillates, unless it is below `settled_residual`
     real(wp) :: stalled_share = 0.7_wp, settled_residual = 1.0e-2_wp
     !> The share of a damped step, its factor from one to the next, and the least
     real(wp) :: first_damping = 0.5_wp, damping_factor = 0.9_wp, least_damping = 0.1_wp
-    !> Sweeps with held nodes after which the loads are given up
-    integer :: max_held_sweeps = 12
+    !> Sweeps with fixed nodes after which the loads count as not carried
+    integer :: max_fixed_sweeps = 12
     !> Staggered sweeps before coupled ones: with weak coupling, and with strong coupling
     integer :: staggered_sweeps = 12, staggered_sweeps_strong = 1
-    !> Coupled sweeps begin when residuals are below this, or so many sweeps later all the same: (F7) linearises far from
+    !> Coupled sweeps begin when residuals are below this, or this many sweeps later all the same: (F7) linearises far from
     !> the solution worse than two blocks do
     real(wp) :: coupled_residual = 0.6_wp
     integer :: coupled_delay = 4
@@ -104,25 +112,52 @@ module hc_options
     !> The same of a later step, whose start is the change that they find, and sweeps there
     real(wp) :: change_tolerance = 1.0e-2_wp
     integer :: change_sweeps = 20
-    !> Nodes that a coarse contact has at least: fewer say nothing about zones
+    !> Nodes that a coarse contact has at least: fewer do not resolve zones
     integer :: least_contact = 100
-    !> Tolerance on a part of the window: the product over the window sees other rounding errors
+    !> Tolerance on a part of the window: the product over the window has other rounding errors
     real(wp) :: part_tolerance = 0.9_wp
-    !> Parts of the window that are tried: each sees where the bodies overlap outside of the last
+    !> Parts of the window that are tried: each contains the nodes where the bodies overlap outside of the last
     integer :: max_parts = 3
+    !> Nodes in contact up to which a step that failed is handed to LAPACK, and sides of the part of the window for that
+    integer :: few_nodes = 16, largest_direct_side = 64
+    !> Share of the nodes of the window below which a part pays for operators of its own
+    real(wp) :: largest_part = 0.6_wp
+    !> Margin of a part about the contact, in nodes: at least, and as a fraction 1/n of the width; the contact may grow in a
+    !> step
+    integer :: least_margin = 6, margin_divisor = 16
+    !> Its ends lie on multiples of a power of two of the margin, at least a fraction 1/n of its width: loads that are alike
+    !> share a part and its operators
+    integer :: step_divisor = 16
   end type multilevel_options_t
+
+  !> Inverse symbols (docs/theory/preconditioner.md, "Continuation beyond the edge", "Springs of slipping nodes").
+  type :: preconditioner_options_t
+    !> Rings of the continuation beyond the edge, (P3): a factor times a power of the number of active nodes over that of the
+    !> nodes at the edge (the width of the contact), and the most rings
+    real(wp) :: ring_factor = 0.7_wp, ring_power = 0.8_wp
+    integer :: max_rings = 16
+    !> Times that a ring is smoothed: waves along the edge fall off the faster the shorter they are
+    integer :: smoothings = 2
+    !> Compliances of springs, over that of a node, (P5): up to the first one only the inverse symbol counts, from the last one on
+    !> only the spring; the one between is that of the body on springs whose symbol is inverted
+    real(wp) :: stiff_spring = 0.5_wp, soft_spring = 8.0_wp, loose_spring = 64.0_wp
+  end type preconditioner_options_t
 
   !> Explicit matrices (docs/theory/friction.md, "Direct method").
   type :: direct_options_t
     !> Exchanges of whole sets that may fail to lower the number of wrong nodes, before Murty's rule exchanges one by one
     integer :: stalled_exchanges = 10
+    !> Accuracy at which a compliant interface is not linearised any more, relative to the tolerance
+    real(wp) :: final_accuracy = 0.2_wp
     !> Contact areas that are tried before there is any shear traction
     integer :: first_areas = 30
     !> Tension and penetration, relative to the largest pressure, that are rounding errors
     real(wp) :: pressure_rounding = 1.0e-12_wp
+    !> Violation of a compliant law, relative to the largest pressure, below which its springs stay
+    real(wp) :: settled_spring = 1.0e-12_wp
     !> Slip that gives a node without traction no direction yet, relative to that of the largest pressure
     real(wp) :: negligible_slip = 1.0e-6_wp
-    !> Factor of the classification parameter at the beginning of a step and where nodes are held, and the sweeps after which
+    !> Factor of the classification parameter at the beginning of a step and where nodes are fixed, and the sweeps after which
     !> it is halved, again and again
     real(wp) :: cautious_share = 0.2_wp
     integer :: sweeps_per_cut = 10
@@ -134,6 +169,16 @@ module hc_options
     real(wp) :: undetermined_motion = 1.0e-12_wp
     !> Part of a load, relative to the sum of all tractions, that counts as rounding error
     real(wp) :: load_rounding = 1.0e-8_wp
+    !> Block factors in single precision: share of the error that a correction may leave (more of them take longer than LU),
+    !> and corrections
+    real(wp) :: largest_share = 0.3_wp
+    integer :: max_corrections = 40
+    !> Nodes in contact up to which the whole matrix is factorized for every area: kept factors save nothing there
+    integer :: most_explicit = 60
+    !> Solutions with kept factors: accuracy relative to the last residuals, and to the tolerance; the accuracy of the first one;
+    !> directions of GMRES after which the whole matrix is factorized
+    real(wp) :: inner_accuracy = 1.0e-3_wp, last_accuracy = 0.05_wp, first_accuracy = 1.0e-4_wp
+    integer :: max_directions = 40
   end type direct_options_t
 
   !> Interpolated entry of nodes (docs/theory/load_path.md, "Interpolated entry").
@@ -153,14 +198,125 @@ module hc_options
     real(wp) :: first_tolerance = 1.0e-3_wp, relative_tolerance = 0.05_wp, last_tolerance = 0.5_wp
   end type entry_options_t
 
+  !> Size of load steps that are chosen on the way (docs/theory/step_control.md).
+  type :: step_options_t
+    !> Smallest load step, as a part of the segment, and attempts at one: a step that is not good enough then is marked
+    real(wp) :: least_step = 1.0e-3_wp
+    integer :: max_attempts = 6
+    !> Largest and smallest growth from one load step to the next
+    real(wp) :: most_growth = 2.0_wp, least_growth = 0.3_wp
+    !> Smallest and largest size of an attempt over that of the rejected one; the same if that one did not converge: its
+    !> changes say nothing about the size
+    real(wp) :: smallest_retry = 0.1_wp, largest_retry = 0.6_wp, unsolved_retry = 0.25_wp
+    !> Share of what is allowed that a step is meant to change: less than 1, since the change is estimated
+    real(wp) :: aim = 0.8_wp
+    !> Share of the tolerance by which one step may add to the change of the tractions, (S2)
+    real(wp) :: added_share = 0.5_wp
+    !> Share of a change of the stick area from which on it is that of the step itself, not of those before
+    real(wp) :: own_share = 0.25_wp
+    !> An attempt that leaves more than this share of the excess of the one before was of no use
+    real(wp) :: useful_share = 0.8_wp
+    !> Least excess that a factor is found from, and rounding errors of sizes
+    real(wp) :: least_excess = 1.0e-9_wp, size_rounding = 1.0e-9_wp
+    !> Factors from changes to the bound (S3): of the stick area; of the tractions, times their gain
+    real(wp) :: stick_safety = 2.0_wp, traction_safety = 2.0_wp
+    !> Shares of changes that are still there after the next load step, (S3): where a change passes through zero the error does not
+    real(wp) :: stick_memory = 0.9_wp, traction_memory = 0.8_wp
+    !> Factor from changes of the tractions to the bound on their error, besides the tolerance, (S4): below that steps are too
+    !> large for errors to fall in proportion to the size. Measured on nine histories
+    real(wp) :: own_safety = 3.0_wp
+    !> Error b of the lattice: spacings by which single rings of nodes that enter move the edge of the stick area; multiple of
+    !> the share of the edge at which nodes entered along which it may have moved; spacings in the radius of a contact
+    !> below which the lattice alone says where it sticks
+    real(wp) :: ring_shift = 0.7_wp, entering_factor = 5.0_wp, small_radius = 3.0_wp
+    !> Largest gain G of (S3): where nothing but rounding errors is added to tractions it would be any number
+    real(wp) :: most_gain = 10.0_wp
+    !> Shear tractions, over the largest pressure, that are rounding errors
+    real(wp) :: shear_rounding = 1.0e-12_wp
+  end type step_options_t
+
+  !> Edges of zones and radii (docs/theory/edges.md, "The edge between the nodes", "Estimators").
+  type :: edge_options_t
+    !> Steps over which nodes next to an edge get a slope from nodes that have one, those with all six neighbors on its side
+    integer :: reach = 3
+    !> Distance of a node where there is no slope, in spacings: the zone is too small, or not sharply bounded. Least distance of
+    !> a node inside
+    real(wp) :: unknown_distance = 0.5_wp, least_distance = 1.0e-9_wp
+    !> Distance at which fields of distances are cut off, in spacings: pictures need it at the edge alone
+    real(wp) :: largest_distance = 9.0_wp
+    !> Slopes per spacing below this share of a value, and sums of directions below it, are none: a value that vanishes at the edge
+    !> has a slope of more than a tenth of it on the few nodes inside that are looked at. What is far below is an error of the
+    !> solution, as in the middle of a symmetric contact of a few nodes, whatever the tolerance
+    real(wp) :: least_relative_slope = 1.0e-3_wp
+    !> Least square of the slope at the edge over that further inside, (B4): for squares that grow like a power m of the distance
+    !> it is 1/m - 1
+    real(wp) :: least_slope = 0.5_wp
+    !> Spacings by which pressure and gap see the edge too far inside in the mean, where the layer is not taken off
+    real(wp) :: inward = 0.04_wp
+    !> Layer of the lattice at an edge, (B3): nodes at these distances have squares (of the pressure, of the reserve of friction)
+    !> as if they were at `layer_square`. Measured on the contacts of Hertz and of Cattaneo and Mindlin with 14 to 60 spacings
+    !> in the radius at random places on the lattice: it is the same for both and for all directions of the edge, up to a
+    !> scatter of 0.03. There is no layer beyond the last one.
+    real(wp) :: layer_distance(14) = &
+      [-0.05_wp, 0.0_wp, 0.05_wp, 0.1_wp, 0.15_wp, 0.2_wp, 0.3_wp, 0.5_wp, 0.7_wp, 0.9_wp, 1.1_wp, 1.3_wp, 1.5_wp, 2.0_wp]
+    real(wp) :: layer_square(14) = [0.0_wp, 0.006_wp, 0.021_wp, 0.046_wp, 0.076_wp, 0.118_wp, 0.216_wp, &
+                                    0.464_wp, 0.740_wp, 0.985_wp, 1.164_wp, 1.334_wp, 1.513_wp, 2.0_wp]
+    !> Distances from the edge, in spacings, between which circles and ellipses are fitted to the pressure: the outermost nodes
+    !> carry most of the error of the lattice, and far inside a polynomial is no good approximation of other contacts
+    real(wp) :: outer_ring = 1.0_wp, inner_ring = 6.0_wp
+    !> Tractions corrected at an edge, (I16) to (I18): points along a spacing at which the shape is sampled, and how often the
+    !> tractions are solved for
+    integer :: samples = 6, passes = 2
+    !> Paraboloids through the squares of nodes inside, from one solution to the next: nodes that count are at least `fit_from`
+    !> from the edge and at most `fit_reach` away, and at least so many; squares of nodes up to `fit_depth` inside and `fit_beyond`
+    !> outside are replaced, those that the triangles at the edge need.
+    !> The error of the edge changes its sign from one solution to the next, with about half its size, so that `fit_share` of
+    !> the change is right
+    real(wp) :: fit_from = 0.5_wp, fit_reach = 4.0_wp, fit_depth = 3.0_wp, fit_beyond = 1.0_wp
+    real(wp) :: fit_share = 2.0_wp/3.0_wp
+    integer :: fit_nodes = 12
+  end type edge_options_t
+
+  !> Cycles of a load history (docs/theory/load_path.md, "Cycles").
+  type :: cycle_options_t
+    !> Share of the range of all values below which a way back is no turning point: solutions scatter by less
+    real(wp) :: noise = 0.01_wp
+    !> Share of the range of a cycle within which its motion or its load has to come back
+    real(wp) :: closure = 0.05_wp
+  end type cycle_options_t
+
+  !> Error bars (docs/theory/error_bars.md). With these factors errors known from closed solutions stay within the estimate.
+  type :: accuracy_options_t
+    !> Orders of the trend that are tried, (A1): areas of whole cells have the first, approach and energies the second
+    real(wp) :: orders(3) = [1.0_wp, 1.5_wp, 2.0_wp]
+    !> Order of the trend of a quantity that a few nodes at an edge decide, or a slip zone that is not resolved, tried besides
+    real(wp) :: rough_order = 0.5_wp
+    !> The same where a slip zone is narrower than the lattice resolves: at mu = 1 an order of 0.5 has 75 % of
+    !> the largest shear tractions within, 0.2 has 96 %, this one 98 %
+    real(wp) :: unresolved_order = 0.15_wp
+    !> Spacings below which a slip zone is not resolved, and the shear traction over the pressure that is none
+    real(wp) :: resolved_width = 1.0_wp, least_shear = 1.0e-6_wp
+    !> Orders whose residual is at most this multiple of the least one are all possible
+    real(wp) :: possible_residual = 1.5_wp
+    !> Factor on the trend, and standard errors of the limit that the fit finds, (A2)
+    real(wp) :: trend_safety = 1.25_wp, standard_errors = 2.0_wp
+    !> Lattices, at least: the fit has two unknowns
+    integer :: least_lattices = 4
+  end type accuracy_options_t
+
   !> All of them.
   type :: options_t
     type(contact_options_t) :: contact
     type(normal_options_t) :: normal
     type(newton_options_t) :: newton
     type(multilevel_options_t) :: multilevel
+    type(preconditioner_options_t) :: preconditioner
     type(direct_options_t) :: direct
     type(entry_options_t) :: entry
+    type(step_options_t) :: steps
+    type(edge_options_t) :: edges
+    type(cycle_options_t) :: cycles
+    type(accuracy_options_t) :: accuracy
   end type options_t
 
 end module hc_options

@@ -1,4 +1,4 @@
-!> A contact problem with friction: what is given, and how well a state solves it.
+!> A contact problem with friction: its data, and the residuals of a state.
 !>
 !> One load step leads from the relative displacement s^n (zero for a body that
 !> was never loaded) to tractions p, q and rigid motions with
@@ -14,26 +14,23 @@ module hc_contact_problem
   use hc_error, only: error_t
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
-  use hc_field_space, only: field_space_t
+  use hc_hierarchy, only: level_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: flexibility_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
-    normal, along_x, along_y, about_z, n_motion, force_control, within_tolerance, sweeps_used_up, &
+    normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, sweeps_used_up, &
     loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
     tangential_residual, force_residual, least_traction
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t, unilateral_t
-  use hc_transfer, only: coarsen_bodies
   implicit none
   private
 
   public :: friction_problem_t, new_friction_problem
 
-  !> What is given.
-  type :: friction_problem_t
-    !> Lattice and window
-    type(lattice_t) :: lattice
+  !> Data of a contact problem.
+  type, extends(level_t) :: friction_problem_t
     !> Elastic constants of the two bodies
     type(elastic_pair_t) :: pair
     !> Law of friction
@@ -42,26 +39,18 @@ module hc_contact_problem
     class(normal_law_t), allocatable :: normal_law
     !> Goodman's approximation: shear tractions do not move the pressure
     logical :: goodman = .false.
-    !> Initial gap (n_col, n_row) [m]
-    real(wp), allocatable :: initial_gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row)
-    logical, allocatable :: candidate(:, :)
     !> Coordinates of the nodes (n_col, n_row) [m]
     real(wp), allocatable :: x(:, :), y(:, :)
     !> Self-compliances d_n and d_t of a node [m/Pa]
     real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
-    !> Tolerances, caps and tuning numbers of whoever solves it
+    !> Tolerances, caps and tuning numbers of the solver
     type(options_t) :: options
-    !> Threads that share the passes over its nodes
-    type(field_space_t) :: space
   contains
-    !> The same problem on the lattice of every second node
-    procedure :: coarsen
-    !> The same problem on a part of its window
-    procedure :: take_part
-    !> Will the bodies touch?
+    !> Bodies, laws and tuning numbers from another lattice
+    procedure :: inherit
+    !> Return whether the bodies will touch
     procedure :: is_pressed
-    !> Do pressure and shear traction act strongly on each other?
+    !> Return whether pressure and shear traction act strongly on each other
     procedure :: couples_strongly
     !> State of bodies that do not touch
     procedure :: separate
@@ -71,17 +60,19 @@ module hc_contact_problem
     procedure :: rigid_displacement
     !> Resultants of given tractions
     procedure :: resultants
+    !> Compliance beyond which a spring of a compliant law has no effect; that of a node with the stiffest of them
+    procedure :: softest_spring, sprung_compliance
     !> Classification parameters r of the tangential conditions and r' of those along the normal
     procedure :: classification_parameter, normal_classification_parameter
     !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known
-    procedure :: conclude
+    procedure :: complete_state
     !> Residuals of its loads alone
-    procedure :: judge_loads
+    procedure :: find_load_residuals
   end type friction_problem_t
 
 contains
 
-  !> A problem from what is given.
+  !> Set up a problem from what is given.
   subroutine new_friction_problem(problem, lattice, pair, initial_gap, candidate, friction, goodman, error, normal_law)
     !> Problem to be set up
     type(friction_problem_t), intent(out) :: problem
@@ -106,6 +97,8 @@ contains
     if (allocated(error)) return
     call friction%check(lattice, error)
     if (allocated(error)) return
+    if (present(normal_law)) call normal_law%check(error)
+    if (allocated(error)) return
     problem%lattice = lattice
     problem%pair = pair
     allocate (problem%friction, source=friction)
@@ -117,56 +110,39 @@ contains
     problem%goodman = goodman
     problem%initial_gap = initial_gap
     problem%candidate = candidate
-    allocate (problem%x, problem%y, mold=initial_gap)
-    call lattice%coordinates(problem%x, problem%y)
-    problem%normal_compliance = normal_self_compliance(lattice, pair)
-    problem%tangential_compliance = tangential_self_compliance(lattice, pair)
+    call set_geometry(problem)
   end subroutine new_friction_problem
 
-  !> The same problem on the lattice of every second node.
-  subroutine coarsen(self, coarse)
-    class(friction_problem_t), intent(in) :: self
-    !> The problem there
-    type(friction_problem_t), intent(out) :: coarse
+  !> Take bodies, laws and tuning numbers of the same problem from another lattice.
+  subroutine inherit(self, from)
+    class(friction_problem_t), intent(inout) :: self
+    class(level_t), intent(in) :: from
 
-    call coarsen_bodies(self%lattice, self%initial_gap, self%candidate, coarse%lattice, coarse%initial_gap, coarse%candidate)
-    coarse%pair = self%pair
-    call self%friction%on_lattice(self%lattice, coarse%lattice, coarse%friction)
-    allocate (coarse%normal_law, source=self%normal_law)
-    coarse%goodman = self%goodman
-    coarse%options = self%options
-    coarse%space = self%space
-    allocate (coarse%x, coarse%y, mold=coarse%initial_gap)
-    call coarse%lattice%coordinates(coarse%x, coarse%y)
-    coarse%normal_compliance = normal_self_compliance(coarse%lattice, coarse%pair)
-    coarse%tangential_compliance = tangential_self_compliance(coarse%lattice, coarse%pair)
-  end subroutine coarsen
+    select type (from)
+    type is (friction_problem_t)
+      self%pair = from%pair
+      call from%friction%on_lattice(from%lattice, self%lattice, self%friction)
+      if (allocated(self%normal_law)) deallocate (self%normal_law)
+      allocate (self%normal_law, source=from%normal_law)
+      self%goodman = from%goodman
+      self%options = from%options
+    end select
+    call set_geometry(self)
+  end subroutine inherit
 
-  !> The same problem on the part of its window between some columns and rows.
-  subroutine take_part(self, low, high, part)
-    class(friction_problem_t), intent(in) :: self
-    !> First and last column and row
-    integer, intent(in) :: low(2), high(2)
-    !> The problem there
-    type(friction_problem_t), intent(out) :: part
+  !> Set coordinates and self-compliances of the nodes of the lattice.
+  subroutine set_geometry(self)
+    type(friction_problem_t), intent(inout) :: self
 
-    part%lattice = self%lattice%subwindow(low, high)
-    part%pair = self%pair
-    call self%friction%on_lattice(self%lattice, part%lattice, part%friction)
-    allocate (part%normal_law, source=self%normal_law)
-    part%goodman = self%goodman
-    part%options = self%options
-    part%space = self%space
-    part%initial_gap = self%initial_gap(low(1):high(1), low(2):high(2))
-    part%candidate = self%candidate(low(1):high(1), low(2):high(2))
-    part%x = self%x(low(1):high(1), low(2):high(2))
-    part%y = self%y(low(1):high(1), low(2):high(2))
-    part%normal_compliance = self%normal_compliance
-    part%tangential_compliance = self%tangential_compliance
-  end subroutine take_part
+    self%x = self%initial_gap
+    self%y = self%initial_gap
+    call self%lattice%coordinates(self%x, self%y)
+    self%normal_compliance = normal_self_compliance(self%lattice, self%pair)
+    self%tangential_compliance = tangential_self_compliance(self%lattice, self%pair)
+  end subroutine set_geometry
 
-  !> Will the bodies touch? A load does, an approach only beyond the smallest gap.
-  pure logical function is_pressed(self, target)
+  !> Return whether the bodies will touch: under any load, by an approach beyond the smallest gap.
+  logical function is_pressed(self, target)
     class(friction_problem_t), intent(in) :: self
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
@@ -174,19 +150,19 @@ contains
     if (target%control(normal) == force_control) then
       is_pressed = target%value(normal) > 0.0_wp
     else
-      is_pressed = target%value(normal) > minval(self%initial_gap, mask=self%candidate)
+      is_pressed = target%value(normal) > self%space%min(self%initial_gap, self%candidate)
     end if
   end function is_pressed
 
-  !> Do pressure and shear traction act strongly on each other? |beta| min(mu, 1) tells.
+  !> Return whether pressure and shear traction act strongly on each other, by |beta| min(mu, 1).
   pure logical function couples_strongly(self)
     class(friction_problem_t), intent(in) :: self
 
-    couples_strongly = abs(self%pair%beta())*min(self%friction%strength(), 1.0_wp) > &
+    couples_strongly = abs(self%pair%beta())*min(self%friction%strength(0.0_wp), 1.0_wp) > &
                        self%options%contact%strong_coupling .and. .not. self%goodman
   end function couples_strongly
 
-  !> State of bodies that do not touch; motions that are driven by their load stay where they are.
+  !> Return the state of bodies that do not touch; motions that are driven by their load stay where they are.
   subroutine separate(self, start, reference, target, tolerance, state)
     class(friction_problem_t), intent(in) :: self
     !> State before
@@ -203,14 +179,14 @@ contains
 
     call new_friction_state(state, self%lattice, self%space)
     state%motion = merge(start%motion, target%value, target%control == force_control)
-    if (target%control(normal) == force_control) state%motion(normal) = minval(self%initial_gap, mask=self%candidate)
+    if (target%control(normal) == force_control) state%motion(normal) = self%space%min(self%initial_gap, self%candidate)
     allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 3), source=0.0_wp)
-    call self%conclude(target, tolerance, reference, displacement, state)
+    call self%complete_state(target, tolerance, reference, displacement, state)
     state%sliding = .not. state%converged
     if (state%sliding) state%stopped = loads_not_carried
   end subroutine separate
 
-  !> Relative displacements (w, u_x, u_y) of given tractions, by any operator.
+  !> Compute the relative displacements (w, u_x, u_y) of given tractions, by any operator.
   subroutine displacements(self, flexibility, pressure, traction, displacement, error)
     class(friction_problem_t), intent(in) :: self
     !> Flexibility operator over the window
@@ -236,24 +212,28 @@ contains
     if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
   end subroutine displacements
 
-  !> shift + twist x r at every node (n_col, n_row, 2) [m].
+  !> Compute the displacement by the motions of the remote parts at every node (n_col, n_row, 2) [m].
   pure function rigid_displacement(self, motion) result(displacement)
     class(friction_problem_t), intent(in) :: self
-    !> Approach, shifts and twist
+    !> Motions
     real(wp), intent(in) :: motion(n_motion)
     real(wp), allocatable :: displacement(:, :, :)
+    integer :: col, row
 
     allocate (displacement(size(self%x, 1), size(self%x, 2), 2))
-    displacement(:, :, 1) = motion(along_x) - motion(about_z)*self%y
-    displacement(:, :, 2) = motion(along_y) + motion(about_z)*self%x
+    do row = 1, size(self%x, 2)
+      do col = 1, size(self%x, 1)
+        displacement(col, row, :) = remote_displacement(motion, self%x(col, row), self%y(col, row))
+      end do
+    end do
   end function rigid_displacement
 
-  !> Normal load, tangential loads [N] and torque [N m] of given tractions.
+  !> Compute normal load, tangential loads [N] and torque [N m] of given tractions.
   function resultants(self, pressure, traction) result(load)
     class(friction_problem_t), intent(in) :: self
     !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
-    real(wp) :: load(n_motion), part(n_motion, size(pressure, 2))
+    real(wp) :: load(n_motion), part(n_load, size(pressure, 2))
     integer :: row
 
     !$omp parallel do schedule(static) num_threads(self%space%threads)
@@ -264,10 +244,11 @@ contains
       part(about_z, row) = dot_product(self%x(:, row), traction(:, row, 2)) - dot_product(self%y(:, row), traction(:, row, 1))
     end do
     !$omp end parallel do
-    load = self%lattice%cell_area()*sum(part, dim=2)
+    load = 0.0_wp
+    load(:n_load) = self%lattice%cell_area()*sum(part, dim=2)
   end function resultants
 
-  !> r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius, (F8) [Pa/m].
+  !> Compute r = kappa/(2 pi lambda_1 (1 + gamma) a) for a contact of n nodes, a its radius, (F8) [Pa/m].
   pure real(wp) function classification_parameter(self, n_contact) result(r)
     class(friction_problem_t), intent(in) :: self
     !> Nodes in contact
@@ -275,9 +256,10 @@ contains
 
     r = self%options%contact%classification_scale/(2.0_wp*pi*(self%pair%lambda_1 + self%pair%lambda_5) &
                                                    *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
+    r = r/(1.0_wp + r*self%pair%tangential_layer)
   end function classification_parameter
 
-  !> r' = kappa/(2 pi lambda_1 a) [Pa/m].
+  !> Compute r' = kappa/(2 pi lambda_1 a) [Pa/m].
   pure real(wp) function normal_classification_parameter(self, n_contact) result(r)
     class(friction_problem_t), intent(in) :: self
     !> Nodes in contact
@@ -287,8 +269,26 @@ contains
                                                    *sqrt(self%lattice%cell_area()*max(n_contact, 1)/pi))
   end function normal_classification_parameter
 
-  !> Gap, slip, zones, loads and residuals of a state whose tractions and motions are known.
-  subroutine conclude(self, target, tolerance, reference, displacement, state)
+  !> Compute the compliance beyond which a spring of a compliant law has no effect [m/Pa].
+  pure real(wp) function softest_spring(self, p_max)
+    class(friction_problem_t), intent(in) :: self
+    !> Largest pressure [Pa]
+    real(wp), intent(in) :: p_max
+
+    softest_spring = self%options%contact%softest_layer*self%sprung_compliance(p_max)
+  end function softest_spring
+
+  !> Compute the compliance of a node along the normal, with that of the layer under the largest pressure [m/Pa].
+  pure real(wp) function sprung_compliance(self, p_max)
+    class(friction_problem_t), intent(in) :: self
+    !> Largest pressure [Pa]
+    real(wp), intent(in) :: p_max
+
+    sprung_compliance = self%normal_compliance + self%normal_law%compliance_under(p_max)
+  end function sprung_compliance
+
+  !> Compute gap, slip, zones, loads and residuals of a state whose tractions and motions are known.
+  subroutine complete_state(self, target, tolerance, reference, displacement, state)
     class(friction_problem_t), intent(in) :: self
     !> Loads or motions that were prescribed
     type(load_target_t), intent(in) :: target
@@ -305,7 +305,7 @@ contains
     integer :: col, row, m, n_contact
     logical :: finite
 
-    n_contact = count(state%pressure > 0.0_wp)
+    n_contact = self%space%count_positive(state%pressure)
     r = self%classification_parameter(n_contact)
     unit = max(self%space%max(state%pressure), 0.0_wp)
     if (unit > 0.0_wp) unit = 1.0_wp/unit
@@ -314,10 +314,8 @@ contains
     do row = 1, size(state%pressure, 2)
       do col = 1, size(state%pressure, 1)
         state%gap(col, row) = self%initial_gap(col, row) + displacement(col, row, 1) - state%motion(normal)
-        state%relative_displacement(col, row, 1) = displacement(col, row, 2) &
-                                                   - (state%motion(along_x) - state%motion(about_z)*self%y(col, row))
-        state%relative_displacement(col, row, 2) = displacement(col, row, 3) &
-                                                   - (state%motion(along_y) + state%motion(about_z)*self%x(col, row))
+        state%relative_displacement(col, row, :) = displacement(col, row, 2:) &
+                                                   - remote_displacement(state%motion, self%x(col, row), self%y(col, row))
       end do
       do m = 1, 2
         state%slip_increment(:, row, m) = merge(state%relative_displacement(:, row, m) - reference(:, row, m), 0.0_wp, &
@@ -340,7 +338,7 @@ contains
                                             self%space, self%normal_law)
     state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, &
                                                     self%friction, self%tangential_compliance, self%space)
-    call self%judge_loads(target, state)
+    call self%find_load_residuals(target, state)
     ! one by one: the largest of several numbers hides one that is not a number
     finite = finite .and. all(ieee_is_finite(state%load)) .and. all(ieee_is_finite(state%motion))
     state%converged = all([state%residual_normal, state%residual_tangential, state%residual_force, &
@@ -348,10 +346,10 @@ contains
     state%clipped = touches_rim(state)
     state%stopped = merge(within_tolerance, sweeps_used_up, state%converged)
     if (.not. finite) state%stopped = out_of_range
-  end subroutine conclude
+  end subroutine complete_state
 
-  !> Residuals of the loads that were prescribed.
-  subroutine judge_loads(self, target, state)
+  !> Compute the residuals of the loads that were prescribed.
+  subroutine find_load_residuals(self, target, state)
     class(friction_problem_t), intent(in) :: self
     !> Loads or motions that were prescribed
     type(load_target_t), intent(in) :: target
@@ -364,17 +362,17 @@ contains
                                  target%control(normal) == force_control)
     ! mu P, or P times the ratio of the largest traction to the largest pressure where there is no slip
     if (self%friction%is_bounded()) then
-      scale = self%friction%strength()*state%load(normal)
+      scale = self%friction%strength(self%space%max(state%pressure))*state%load(normal)
     else
-      scale = sqrt(maxval(sum(state%traction**2, dim=3)))/max(maxval(state%pressure), tiny(1.0_wp))
+      scale = sqrt(self%space%max(sum(state%traction**2, dim=3)))/max(self%space%max(state%pressure), tiny(1.0_wp))
       scale = max(scale, least_traction)*state%load(normal)
     end if
     state%residual_shear_force = relative(norm2(missing(along_x:along_y)), scale)
     state%residual_torque = relative(missing(about_z), &
-                                     scale*sqrt(self%lattice%cell_area()*count(state%pressure > 0.0_wp)/pi))
-  end subroutine judge_loads
+                                     scale*sqrt(self%lattice%cell_area()*self%space%count_positive(state%pressure)/pi))
+  end subroutine find_load_residuals
 
-  !> A missing load relative to a scale; any at all is too much where the scale vanishes.
+  !> Return a missing load relative to a scale; any at all is too much where the scale vanishes.
   elemental real(wp) function relative(missing, scale)
     real(wp), intent(in) :: missing, scale
 

@@ -1,4 +1,4 @@
-!> How well a state fulfils the contact conditions; dimensionless.
+!> Residuals of the contact conditions; dimensionless.
 !>
 !> Equations: docs/theory/residuals.md, (R1) to (R4).
 module hc_contact_residuals
@@ -17,7 +17,7 @@ module hc_contact_residuals
   private
 
   public :: normal_self_compliance, tangential_self_compliance
-  public :: normal_residual, tangential_residual, tangential_scale, force_residual, conclude, &
+  public :: normal_residual, tangential_residual, tangential_scale, force_residual, complete_state, &
             least_traction
 
   !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
@@ -25,7 +25,7 @@ module hc_contact_residuals
 
 contains
 
-  !> Closing of the gap at a node under its own pyramid of unit pressure, lambda_1 K1(0) [m/Pa].
+  !> Compute the closing of the gap at a node under its own pyramid of unit pressure, lambda_1 K1(0) [m/Pa].
   pure real(wp) function normal_self_compliance(lattice, pair)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
@@ -39,7 +39,7 @@ contains
     normal_self_compliance = pair%lambda_1*k(k_1)
   end function normal_self_compliance
 
-  !> Tangential displacement of a node under its own pyramid of unit traction [m/Pa].
+  !> Compute the tangential displacement of a node under its own pyramid of unit traction, with its spring if there is one [m/Pa].
   !>
   !> (lambda_1 + lambda_5/2) K1(0) on the equilateral lattice, where K_xx(0) = K1(0)/2.
   pure real(wp) function tangential_self_compliance(lattice, pair)
@@ -52,10 +52,10 @@ contains
 
     call new_pyramid(pyramid, lattice%basis)
     k = pyramid%kernels(0.0_wp, 0.0_wp)
-    tangential_self_compliance = pair%lambda_1*k(k_1) + pair%lambda_5*k(k_xx)
+    tangential_self_compliance = pair%lambda_1*k(k_1) + pair%lambda_5*k(k_xx) + pair%tangential_layer
   end function tangential_self_compliance
 
-  !> R_n = max |p - max(0, p - g/d_n)|/p_max over all candidate nodes.
+  !> Compute R_n = max |p - max(0, p - g/d_n)|/p_max over all candidate nodes, or that of another law.
   !>
   !> Bounds tension, penetration and pressure across a gap at once. Without
   !> pressure anywhere the penetration is all there can be: it is 0 if the gap is nowhere
@@ -108,11 +108,11 @@ contains
     end if
   end function normal_residual
 
-  !> R_t = max |q - P(q - ds/d_t)|/tau over the nodes in contact, P the projection on the cone.
+  !> Compute R_t = max |q - P(q - ds/d_t)|/tau over the nodes in contact, P the projection on the cone.
   !>
   !> Bounds tractions outside of the cone, slip in stick and a wrong direction
   !> of slip at once. The scale tau is mu p_max; the largest traction, but
-  !> not less than a thousandth of p_max, without slip; without friction there is nothing to fulfil.
+  !> not less than a thousandth of p_max, without slip; 0 without friction.
   real(wp) function tangential_residual(traction, slip_increment, pressure, friction, compliance, space)
     !> Traction (n_col, n_row, 2) [Pa] and slip of the step (n_col, n_row, 2) [m]
     real(wp), intent(in), contiguous :: traction(:, :, :), slip_increment(:, :, :)
@@ -139,24 +139,26 @@ contains
                               largest, worst)
     end do
     !$omp end parallel do
-    tangential_residual = sqrt(worst)/tangential_scale(friction, largest)
+    tangential_residual = sqrt(worst)/tangential_scale(friction, p_max, largest)
   end function tangential_residual
 
-  !> The scale tau of R_t over p_max.
-  pure real(wp) function tangential_scale(friction, largest)
+  !> Compute the scale tau of R_t over p_max.
+  pure real(wp) function tangential_scale(friction, p_max, largest)
     !> Law of friction
     class(friction_law_t), intent(in) :: friction
+    !> Largest pressure [Pa]
+    real(wp), intent(in) :: p_max
     !> Square of the largest traction over p_max
     real(wp), intent(in) :: largest
 
     if (friction%is_bounded()) then
-      tangential_scale = friction%strength()
+      tangential_scale = friction%strength(p_max)
     else
       tangential_scale = max(sqrt(largest), least_traction)
     end if
   end function tangential_scale
 
-  !> R_P = |sum A_p p - P|/P; without a load any pressure at all is as wrong as a load that is not carried.
+  !> Compute R_P = |sum A_p p - P|/P; without a load any pressure at all is as wrong as a load that is not carried.
   elemental real(wp) function force_residual(carried, load)
     !> Load carried by the pressure, and prescribed load [N]
     real(wp), intent(in) :: carried, load
@@ -168,8 +170,8 @@ contains
     end if
   end function force_residual
 
-  !> Zones, load and residuals of a state whose pressure and gap are known.
-  subroutine conclude(state, lattice, candidate, compliance, control, target, tolerance, space, error)
+  !> Compute zones, load and residuals of a state whose pressure and gap are known.
+  subroutine complete_state(state, lattice, candidate, compliance, control, target, tolerance, space, error, law)
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
     !> Lattice and window
@@ -188,17 +190,17 @@ contains
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: a pressure or a gap that is not a finite number
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: row_sum(size(state%pressure, 2))
+    !> Law of contact; absent: unilateral contact
+    class(normal_law_t), intent(in), optional :: law
     integer :: row
 
     !$omp parallel do schedule(static) num_threads(space%threads)
-    do row = 1, size(row_sum)
+    do row = 1, size(state%zone, 2)
       state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
-      row_sum(row) = sum(state%pressure(:, row))
     end do
     !$omp end parallel do
-    state%load(normal) = lattice%cell_area()*sum(row_sum)
-    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, space)
+    state%load(normal) = lattice%cell_area()*space%sum(state%pressure)
+    state%residual_normal = normal_residual(state%pressure, state%gap, candidate, compliance, space, law)
     state%residual_force = 0.0_wp
     if (control == force_control) state%residual_force = force_residual(state%load(normal), target)
     ! one by one: the largest of several numbers hides one that is not a number
@@ -209,6 +211,6 @@ contains
     ! penetration without any pressure is infinite as well, but a state that can be shown
     if (all(ieee_is_finite(state%pressure)) .and. all(ieee_is_finite(state%gap) .or. .not. candidate)) return
     call raise(error, status%no_convergence, not_finite)
-  end subroutine conclude
+  end subroutine complete_state
 
 end module hc_contact_residuals

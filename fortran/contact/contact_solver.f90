@@ -1,4 +1,6 @@
-!> What all solvers look like from outside: frictionless and with friction, on LAPACK and on FFTs.
+!> Abstract solvers: frictionless and with friction, on LAPACK and on FFTs.
+!>
+!> Equations: docs/theory/conditions.md, (C1) to (C4).
 module hc_contact_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -19,16 +21,18 @@ module hc_contact_solver
   !> A method of solving one with friction.
   type, abstract, extends(contact_solver_t) :: friction_solver_t
     type(friction_problem_t) :: problem
+    !> Tractions and motions that a method may start from: those that the next step is likely to end with
+    type(contact_state_t), allocatable :: guess
   contains
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure(solver_displacements), deferred :: displacements
   end type friction_solver_t
 
   abstract interface
-    !> Tractions and motions at the end of a load step.
+    !> Solve for tractions and motions at the end of a load step.
     !>
-    !> `state%converged` tells whether all residuals are within the tolerance. The
-    !> accumulated quantities (slip path, dissipated energy) are left alone.
+    !> `state%converged`: all residuals are within the tolerance. The
+    !> accumulated quantities (slip path, dissipated energy) are not set.
     subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
       import :: contact_solver_t, contact_state_t, load_target_t, wp, error_t
       class(contact_solver_t), intent(inout), target :: self
@@ -48,7 +52,7 @@ module hc_contact_solver
       type(error_t), allocatable, intent(out) :: error
     end subroutine solve_step
 
-    !> Relative displacements (w, u_x, u_y) of given tractions.
+    !> Compute the relative displacements (w, u_x, u_y) of given tractions.
     subroutine solver_displacements(self, pressure, traction, displacement, error)
       import :: friction_solver_t, wp, error_t
       class(friction_solver_t), intent(inout) :: self

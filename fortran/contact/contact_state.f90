@@ -10,22 +10,24 @@ module hc_contact_state
   implicit none
   private
 
-  public :: contact_state_t, new_contact_state, new_friction_state, take_tractions, touches_rim
+  public :: contact_state_t, new_contact_state, new_friction_state, copy_tractions, touches_rim
   public :: check_problem, check_target, check_state
   public :: not_finite
   public :: not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, out_of_range
   public :: separated, stick, slip
   public :: load_target_t, force_control, displacement_control
-  public :: normal, along_x, along_y, about_z, n_motion
+  public :: normal, along_x, along_y, about_z, strain_xx, strain_yy, strain_xy, n_load, n_motion
+  public :: remote_displacement
 
   !> Zone of a node; without friction every node in contact slips.
   integer, parameter :: separated = 0, stick = 1, slip = 2
 
-  !> The rigid motions: approach, shift along x and along y, and twist about z.
+  !> The motions of the remote parts: approach, shift along x and along y, and twist about z, each with its load, and the bulk
+  !> strain of body 1 relative to body 2, which is always prescribed (docs/theory/conditions.md, bulk strain).
   !> `normal`, `along_x` and `along_y` are those of the tractions.
-  integer, parameter :: about_z = 4, n_motion = 4
+  integer, parameter :: about_z = 4, n_load = 4, strain_xx = 5, strain_yy = 6, strain_xy = 7, n_motion = 7
 
-  !> What is prescribed of a motion: its load, or itself.
+  !> Control of a motion: its load is prescribed, or its value.
   integer, parameter :: force_control = 1, displacement_control = 2
 
   !> Why a solver stopped: nothing was solved yet; all residuals are within the tolerance; all sweeps allowed were
@@ -37,15 +39,21 @@ module hc_contact_state
   character(len=*), parameter :: not_finite = 'pressure or gap are not finite numbers: expected a gap, loads and elastic '// &
                                               'constants whose products are neither zero nor infinite'
 
-  !> What the bodies are driven to, motion by motion.
+  !> Prescribed load or value of each motion.
   type :: load_target_t
     !> force_control or displacement_control
-    integer :: control(n_motion) = [force_control, force_control, force_control, displacement_control]
-    !> Load [N], torque [N m]; or approach, shift [m], twist [rad]
+    integer :: control(n_motion) = [force_control, force_control, force_control, displacement_control, displacement_control, &
+                                    displacement_control, displacement_control]
+    !> Load [N], torque [N m]; or approach, shift [m], twist [rad]; bulk strain
     real(wp) :: value(n_motion) = 0.0_wp
   end type load_target_t
 
-  !> A solution and how well it fulfils the contact conditions.
+  !> A target by the control and the value of the first motions; the others have their defaults.
+  interface load_target_t
+    module procedure target_of_values
+  end interface load_target_t
+
+  !> A solution and its residuals.
   type :: contact_state_t
     !> Pressure and gap (n_col, n_row) [Pa], [m]
     real(wp), allocatable :: pressure(:, :), gap(:, :)
@@ -53,15 +61,17 @@ module hc_contact_state
     integer, allocatable :: zone(:, :)
     !> With friction: shear traction on body 1 (n_col, n_row, 2) [Pa]
     real(wp), allocatable :: traction(:, :, :)
-    !> With friction: relative displacement s = (u1 - u2) - shift - twist x r (n_col, n_row, 2) [m]
+    !> With friction: relative displacement s = (u1 - u2) + strain r - shift - twist x r (n_col, n_row, 2) [m]
     real(wp), allocatable :: relative_displacement(:, :, :)
     !> With friction: change of s during the step, all its parts, on the nodes in contact (n_col, n_row, 2) [m]
     real(wp), allocatable :: slip_increment(:, :, :)
     !> With friction: length of the slip path so far (n_col, n_row) [m]
     real(wp), allocatable :: accumulated_slip(:, :)
-    !> Normal load, tangential loads on body 1 [N] and torque [N m]: resultants of the tractions
+    !> With friction: energy dissipated so far by area (n_col, n_row) [J/m^2]
+    real(wp), allocatable :: dissipation_density(:, :)
+    !> Normal load, tangential loads on body 1 [N] and torque [N m]: resultants of the tractions; nothing for the bulk strain
     real(wp) :: load(n_motion) = 0.0_wp
-    !> Approach, shifts [m] and twist [rad] of the remote parts
+    !> Approach, shifts [m] and twist [rad] of the remote parts; bulk strain of body 1 less that of body 2
     real(wp) :: motion(n_motion) = 0.0_wp
     !> Energy dissipated by friction so far [J]
     real(wp) :: dissipated_energy = 0.0_wp
@@ -94,7 +104,19 @@ module hc_contact_state
 
 contains
 
-  !> A state without contact.
+  !> Set a target by the control and the value of the first motions.
+  pure function target_of_values(control, value) result(target)
+    !> force_control or displacement_control
+    integer, intent(in), optional :: control(:)
+    !> Loads [N], [N m] or motions [m], [rad]; bulk strain
+    real(wp), intent(in), optional :: value(:)
+    type(load_target_t) :: target
+
+    if (present(control)) target%control(:size(control)) = control
+    if (present(value)) target%value(:size(value)) = value
+  end function target_of_values
+
+  !> Set up a state without contact.
   subroutine new_contact_state(state, lattice, space)
     !> State to be set up
     type(contact_state_t), intent(out) :: state
@@ -116,7 +138,7 @@ contains
     !$omp end parallel do
   end subroutine new_contact_state
 
-  !> A state with friction before the first load: no contact, nothing displaced.
+  !> Set up a state with friction before the first load: no contact, nothing displaced.
   subroutine new_friction_state(state, lattice, space)
     !> State to be set up
     type(contact_state_t), intent(out) :: state
@@ -131,7 +153,7 @@ contains
     call new_contact_state(state, lattice, own)
     associate (n => lattice%extent)
       allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2), &
-                state%accumulated_slip(n(1), n(2)))
+                state%accumulated_slip(n(1), n(2)), state%dissipation_density(n(1), n(2)))
     end associate
     !$omp parallel do schedule(static) num_threads(own%threads)
     do row = 1, lattice%extent(2)
@@ -139,12 +161,13 @@ contains
       state%relative_displacement(:, row, :) = 0.0_wp
       state%slip_increment(:, row, :) = 0.0_wp
       state%accumulated_slip(:, row) = 0.0_wp
+      state%dissipation_density(:, row) = 0.0_wp
     end do
     !$omp end parallel do
   end subroutine new_friction_state
 
-  !> Tractions and motions of a state, and nothing else: what an iteration starts from.
-  subroutine take_tractions(state, start, space)
+  !> Copy tractions, motions and loads of a state, from which an iteration starts.
+  subroutine copy_tractions(state, start, space)
     !> State they come from
     type(contact_state_t), intent(in) :: state
     !> State to be set up
@@ -163,9 +186,21 @@ contains
     !$omp end parallel do
     start%motion = state%motion
     start%load = state%load
-  end subroutine take_tractions
+  end subroutine copy_tractions
 
-  !> Is there contact at the rim of the window?
+  !> Compute the share of the remote motions in the relative displacement at a point: shift + twist x r - strain r [m].
+  pure function remote_displacement(motion, x, y) result(displacement)
+    !> Motions
+    real(wp), intent(in) :: motion(n_motion)
+    !> Point [m]
+    real(wp), intent(in) :: x, y
+    real(wp) :: displacement(2)
+
+    displacement(1) = motion(along_x) - motion(about_z)*y - (motion(strain_xx)*x + motion(strain_xy)*y)
+    displacement(2) = motion(along_y) + motion(about_z)*x - (motion(strain_xy)*x + motion(strain_yy)*y)
+  end function remote_displacement
+
+  !> Return whether there is contact at the rim of the window.
   pure logical function touches_rim(state)
     !> State
     type(contact_state_t), intent(in) :: state
@@ -176,7 +211,7 @@ contains
     end associate
   end function touches_rim
 
-  !> Does a problem make sense?
+  !> Refuse a gap that does not fit the window, is not finite or has no candidate node.
   pure subroutine check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -202,7 +237,7 @@ contains
     end if
   end subroutine check_problem
 
-  !> Can loads or motions be solved for, to this tolerance, in so many sweeps?
+  !> Refuse controls, loads, motions, tolerances and numbers of sweeps that no solver can work with.
   pure subroutine check_target(control, value, tolerance, max_sweeps, error)
     !> How motions are driven, the normal one first: force_control or displacement_control
     integer, intent(in) :: control(:)
@@ -217,6 +252,8 @@ contains
 
     if (any(control /= force_control .and. control /= displacement_control)) then
       call raise(error, status%invalid_input, 'the control of a motion: force_control or displacement_control expected')
+    else if (any(control(n_load + 1:) /= displacement_control)) then
+      call raise(error, status%invalid_input, 'the control of the bulk strain: displacement_control expected')
     else if (.not. all(ieee_is_finite(value))) then
       call raise(error, status%invalid_input, 'loads and motions: finite numbers expected')
     else if (control(normal) == force_control .and. value(normal) < 0.0_wp) then
@@ -230,7 +267,7 @@ contains
     end if
   end subroutine check_target
 
-  !> Can a load step with friction start from a state?
+  !> Refuse a state from which no load step with friction can start.
   pure subroutine check_state(state, lattice, error)
     !> State
     type(contact_state_t), intent(in) :: state
@@ -242,9 +279,11 @@ contains
     integer :: row
 
     fits = allocated(state%pressure) .and. allocated(state%gap) .and. allocated(state%traction) .and. &
-           allocated(state%relative_displacement) .and. allocated(state%accumulated_slip)
+           allocated(state%relative_displacement) .and. allocated(state%accumulated_slip) .and. &
+           allocated(state%dissipation_density)
     if (fits) fits = all([shape(state%pressure), shape(state%gap), shape(state%accumulated_slip)] == [lattice%extent, &
                                                                                     lattice%extent, lattice%extent])
+    if (fits) fits = all(shape(state%dissipation_density) == lattice%extent)
     if (fits) fits = all(shape(state%traction) == [lattice%extent, 2]) .and. &
                      all(shape(state%relative_displacement) == [lattice%extent, 2])
     if (.not. fits) then
@@ -255,7 +294,8 @@ contains
     do row = 1, lattice%extent(2)
       fits = fits .and. all(ieee_is_finite(state%pressure(:, row))) .and. all(ieee_is_finite(state%traction(:, row, :))) &
              .and. all(ieee_is_finite(state%relative_displacement(:, row, :))) &
-             .and. all(ieee_is_finite(state%accumulated_slip(:, row)))
+             .and. all(ieee_is_finite(state%accumulated_slip(:, row))) &
+             .and. all(ieee_is_finite(state%dissipation_density(:, row)))
     end do
     if (.not. fits) call raise(error, status%invalid_input, 'the state to go on from: finite numbers expected')
   end subroutine check_state

@@ -1,6 +1,6 @@
-!> The law of friction, as the solvers see it.
+!> Abstract law of friction.
 !>
-!> Over a load step every node in contact fulfils
+!> Over a load step every node in contact satisfies
 !>
 !>     q = P(q - r ds)     for any r > 0,
 !>
@@ -8,9 +8,13 @@
 !> & Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991). Where P cuts something off the node slips, and a step of Newton's
 !> method leaves one unknown, tau in q = bound(p) e + tau t with t a quarter turn ahead of e, and t.ds + D tau = 0.
 !>
-!> Laws are asked about rows of nodes, never about one alone, so that it costs nothing that they are abstract: p, q, ds are
-!> those of consecutive nodes, of which `first` is the number of the first, counted over the window row by row. A law that
-!> differs from node to node finds its numbers by it.
+!> The procedures of a law take rows of nodes, never a single one, so that the calls of abstract procedures cost nothing: p, q,
+!> ds are those of consecutive nodes, of which `first` is the number of the first, counted over the window row by row. A law
+!> that differs from node to node finds its numbers by it.
+!>
+!> The tractions that a law allows are a disc, |q| <= b(p), or after a stretch A of the plane, |A^-1 q| <= b(p), an ellipse:
+!> (F15) of docs/theory/friction.md. The direction of a slipping node is the outward normal n of its boundary then, and the
+!> traction is a b(p) n + c b(p) t + tau t with the point (a, c) of the boundary that has this normal.
 module hc_friction_law
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -23,34 +27,40 @@ module hc_friction_law
   !> A law of friction.
   type, abstract :: friction_law_t
   contains
-    !> Is there any friction? Is there a bound of the traction, or does no node in contact slip?
+    !> Return whether there is any friction, and whether the traction has a bound: without one no node slips
     procedure(law_is), deferred :: resists, is_bounded
-    !> Do its numbers make sense on a lattice?
+    !> Refuse numbers that make no sense on a lattice
     procedure(law_check), deferred :: check
-    !> Largest traction over the pressure, of all nodes; infinite without slip
+    !> Largest traction over the largest pressure, of all nodes; infinite without slip
     procedure(law_strength), deferred :: strength
     !> Largest traction of each node, and its derivative by the pressure
     procedure(law_bounds), deferred :: find_bounds, find_slopes
-    !> Zones of the nodes that q - r ds calls for
+    !> Classify the nodes by q - r ds
     procedure(law_zones), deferred :: find_zones
-    !> Tractions projected on what the law allows
+    !> Project tractions on the admissible set
     procedure(law_project), deferred :: project
-    !> What tractions lack of the law
+    !> Measure how far tractions are from the law
     procedure(law_violation), deferred :: violation
-    !> Zones, directions and compliances of the linearised law
+    !> Linearise the law: zones, directions and compliances
     procedure(law_linearize), deferred :: linearize
-    !> Largest traction at all under a largest pressure
+    !> Largest traction of all nodes under a largest pressure
     procedure :: largest_bound
+    !> Return whether the admissible set is a disc, and the stretch that makes it of one
+    procedure :: is_isotropic, stretch
+    !> Lengths of tractions that are at most b(p), and points of the boundary by its normals
+    procedure :: find_lengths, find_boundary
     !> The same law on another lattice: a coarser one, or a part
     procedure :: on_lattice
   end type friction_law_t
 
   abstract interface
+    !> Return a property of the law.
     pure logical function law_is(self)
       import :: friction_law_t
       class(friction_law_t), intent(in) :: self
     end function law_is
 
+    !> Refuse numbers that make no sense on a lattice.
     pure subroutine law_check(self, lattice, error)
       import :: friction_law_t, lattice_t, error_t
       class(friction_law_t), intent(in) :: self
@@ -60,11 +70,15 @@ module hc_friction_law
       type(error_t), allocatable, intent(out) :: error
     end subroutine law_check
 
-    pure real(wp) function law_strength(self)
+    !> Compute the largest traction over the largest pressure, of all nodes; infinite without slip.
+    pure real(wp) function law_strength(self, p_max)
       import :: friction_law_t, wp
       class(friction_law_t), intent(in) :: self
+      !> Largest pressure of all nodes [Pa]
+      real(wp), intent(in) :: p_max
     end function law_strength
 
+    !> Compute the largest traction of each node of a row, or its derivative by the pressure.
     pure subroutine law_bounds(self, first, p, bound)
       import :: friction_law_t, wp
       class(friction_law_t), intent(in) :: self
@@ -76,6 +90,7 @@ module hc_friction_law
       real(wp), intent(out), contiguous :: bound(:)
     end subroutine law_bounds
 
+    !> Classify the nodes of a row by q - r ds.
     pure subroutine law_zones(self, first, unit, r, p, qx, qy, dsx, dsy, zone)
       import :: friction_law_t, wp
       class(friction_law_t), intent(in) :: self
@@ -89,6 +104,7 @@ module hc_friction_law
       integer, intent(out), contiguous :: zone(:)
     end subroutine law_zones
 
+    !> Project the tractions of a row on the admissible set.
     pure subroutine law_project(self, first, unit, p, qx, qy, cut_x, cut_y)
       import :: friction_law_t, wp
       class(friction_law_t), intent(in) :: self
@@ -102,6 +118,7 @@ module hc_friction_law
       real(wp), intent(out), contiguous :: cut_x(:), cut_y(:)
     end subroutine law_project
 
+    !> Measure how far the tractions of a row are from the law.
     pure subroutine law_violation(self, first, unit, stiffness, p, qx, qy, dsx, dsy, largest, worst)
       import :: friction_law_t, wp
       class(friction_law_t), intent(in) :: self
@@ -116,6 +133,7 @@ module hc_friction_law
       real(wp), intent(inout) :: largest, worst
     end subroutine law_violation
 
+    !> Linearise the law at the nodes of a row: zones, directions and compliances.
     pure subroutine law_linearize(self, first, p_max, r, in_contact, p, qx, qy, dsx, dsy, zone, direction, compliance)
       import :: friction_law_t, wp
       class(friction_law_t), intent(in) :: self
@@ -129,7 +147,7 @@ module hc_friction_law
       real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
       !> separated, stick or slip
       integer, intent(out), contiguous :: zone(:)
-      !> Direction e of the traction in slip, (1, 0) elsewhere (2, n)
+      !> Direction of the traction in slip, or the normal of the boundary; (1, 0) elsewhere (2, n)
       real(wp), intent(out), contiguous :: direction(:, :)
       !> Compliance D across that direction, 0 elsewhere [m/Pa]
       real(wp), intent(out), contiguous :: compliance(:)
@@ -138,17 +156,72 @@ module hc_friction_law
 
 contains
 
-  !> Largest traction at all under a largest pressure [Pa]; huge without a bound.
+  !> Compute the largest traction of all nodes under a largest pressure [Pa]; huge without a bound.
   pure real(wp) function largest_bound(self, p_max)
     class(friction_law_t), intent(in) :: self
     !> Largest pressure [Pa]
     real(wp), intent(in) :: p_max
 
     largest_bound = huge(1.0_wp)
-    if (self%is_bounded()) largest_bound = self%strength()*max(p_max, 0.0_wp)
+    if (self%is_bounded()) largest_bound = self%strength(p_max)*max(p_max, 0.0_wp)
   end function largest_bound
 
-  !> The same law on another lattice; one whose numbers differ from node to node has to override this.
+  !> Return whether the admissible set is a disc; a law with another set overrides it.
+  pure logical function is_isotropic(self)
+    class(friction_law_t), intent(in) :: self
+
+    associate (any => self)
+      is_isotropic = .true.
+    end associate
+  end function is_isotropic
+
+  !> Return the symmetric matrix A with determinant 1 that makes the admissible set of a disc.
+  pure function stretch(self) result(matrix)
+    class(friction_law_t), intent(in) :: self
+    real(wp) :: matrix(2, 2)
+
+    associate (any => self)
+      matrix = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+    end associate
+  end function stretch
+
+  !> Compute |A^-1 q| of a row [Pa].
+  pure subroutine find_lengths(self, qx, qy, length)
+    class(friction_law_t), intent(in) :: self
+    !> Tractions [Pa]
+    real(wp), intent(in), contiguous :: qx(:), qy(:)
+    !> Their lengths [Pa]
+    real(wp), intent(out), contiguous :: length(:)
+    real(wp) :: a(2, 2)
+
+    a = self%stretch()
+    length = hypot(a(2, 2)*qx - a(1, 2)*qy, a(1, 1)*qy - a(1, 2)*qx)
+  end subroutine find_lengths
+
+  !> Compute the points A^2 n/|A n| of the boundary under b = 1, by their normals n.
+  pure subroutine find_boundary(self, direction, along, across)
+    class(friction_law_t), intent(in) :: self
+    !> Normals n (2, n)
+    real(wp), intent(in), contiguous :: direction(:, :)
+    !> Components along n and along t, a quarter turn ahead of it
+    real(wp), intent(out), contiguous :: along(:), across(:)
+    real(wp) :: a(2, 2), moved(2), point(2)
+    integer :: i
+
+    along = 1.0_wp
+    across = 0.0_wp
+    if (self%is_isotropic()) return
+    a = self%stretch()
+    do i = 1, size(along)
+      moved = matmul(a, direction(:, i))
+      along(i) = norm2(moved)
+      if (.not. along(i) > 0.0_wp) cycle
+      point = matmul(a, moved)/along(i)
+      across(i) = direction(1, i)*point(2) - direction(2, i)*point(1)
+    end do
+  end subroutine find_boundary
+
+  !> Copy the law to another lattice; a law whose numbers differ from node to node overrides this.
   subroutine on_lattice(self, from, onto, law)
     class(friction_law_t), intent(in) :: self
     !> Lattice of the law, and one with every second node of it or with a part of its nodes

@@ -3,18 +3,19 @@
 !> Each is an unknown, and its load a constraint on the shear traction: what
 !> the unit motion does along x and y, summed over the traction, is the load. A torque is
 !> taken about the middle of the contact, as far as the tangential loads are
-!> known too: a contact far from the origin would not tell a twist from a shift.
+!> known too: in a contact far from the origin a twist about the origin is nearly a shift.
 !>
-!> Equations: docs/theory/friction.md, (F4), (F12).
+!> Equations: docs/theory/friction.md, (F4), (F13).
 module hc_load_constraints
   use hc_precision, only: wp, pi
   use hc_lapack, only: eliminate
+  use hc_field_space, only: field_space_t
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_problem, only: friction_problem_t
   implicit none
   private
 
-  public :: driven_motions_t, new_driven_motions, overloads, hold_nodes
+  public :: driven_motions_t, new_driven_motions, overloads, fix_in_stick
 
   !> The driven motions of a contact.
   type :: driven_motions_t
@@ -35,7 +36,7 @@ module hc_load_constraints
 
 contains
 
-  !> The driven motions of a contact.
+  !> Find the driven motions of a contact.
   subroutine new_driven_motions(self, problem, target, contact)
     !> Motions to be set up
     type(driven_motions_t), intent(out) :: self
@@ -45,29 +46,20 @@ contains
     type(load_target_t), intent(in) :: target
     !> Nodes in contact (n_col, n_row)
     logical, intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
-    real(wp) :: part(2, problem%lattice%extent(2))
-    integer :: n_contact, row
+    integer :: n_contact
 
-    n_contact = 0
-    !$omp parallel do schedule(static) num_threads(problem%space%threads) reduction(+: n_contact)
-    do row = 1, size(contact, 2)
-      n_contact = n_contact + count(contact(:, row))
-      part(1, row) = sum(problem%x(:, row), mask=contact(:, row))
-      part(2, row) = sum(problem%y(:, row), mask=contact(:, row))
-    end do
-    !$omp end parallel do
-    n_contact = max(n_contact, 1)
-    associate (control => target%control)
+    associate (control => target%control, space => problem%space)
+      n_contact = max(space%count(contact), 1)
       ! nothing turns a single node
       self%motion = pack([along_x, along_y, about_z], control(along_x:) == force_control .and. &
                          [.true., .true., n_contact > 1])
-      if (control(along_y) == force_control) self%center(1) = sum(part(1, :))/n_contact
-      if (control(along_x) == force_control) self%center(2) = sum(part(2, :))/n_contact
+      if (control(along_y) == force_control) self%center(1) = space%sum(problem%x, contact)/n_contact
+      if (control(along_x) == force_control) self%center(2) = space%sum(problem%y, contact)/n_contact
     end associate
     self%arm = sqrt(problem%lattice%cell_area()*n_contact/pi)
   end subroutine new_driven_motions
 
-  !> Tangential displacement of a unit motion (n_col, n_row, 2).
+  !> Compute the tangential displacement of a unit motion (n_col, n_row, 2).
   function direction(self, k, problem)
     class(driven_motions_t), intent(in) :: self
     !> Which of the driven motions
@@ -85,7 +77,7 @@ contains
     !$omp end parallel do
   end function direction
 
-  !> The same along one row of nodes.
+  !> Compute the tangential displacement of a unit motion along one row of nodes.
   pure subroutine direction_row(self, k, problem, row, ux, uy)
     class(driven_motions_t), intent(in) :: self
     !> Which of the driven motions
@@ -109,7 +101,7 @@ contains
     end select
   end subroutine direction_row
 
-  !> Prescribed load of a motion over the cell area [Pa].
+  !> Compute the prescribed load of a motion over the cell area [Pa].
   pure real(wp) function load(self, k, problem, target)
     class(driven_motions_t), intent(in) :: self
     !> Which of the driven motions
@@ -126,7 +118,7 @@ contains
     load = load/problem%lattice%cell_area()
   end function load
 
-  !> Multipliers that stand for given motions: shifts are those of the center, if it turns.
+  !> Compute the multipliers of given motions: shifts are those of the center, if it turns.
   pure function multipliers(self, motion) result(multiplier)
     class(driven_motions_t), intent(in) :: self
     !> Approach, shifts and twist
@@ -141,7 +133,7 @@ contains
     end if
   end function multipliers
 
-  !> Motions from their multipliers; the others stay as they are.
+  !> Set the driven motions from their multipliers; the others stay as they are.
   pure subroutine set_motions(self, multiplier, motion)
     class(driven_motions_t), intent(in) :: self
     !> Multipliers of the driven motions
@@ -157,13 +149,13 @@ contains
     end if
   end subroutine set_motions
 
-  !> Is more prescribed than full sliding carries, whatever is still wrong with the pressure?
+  !> Return whether more is prescribed than full sliding carries, for a pressure with the residual R_n.
   !>
   !> Friction carries the prescribed loads times a factor, and no more than
   !>
   !>     factor <= sum of mu p |u| / (loads . motion)
   !>
-  !> with u the displacement of any motion that they drive (upper bound of limit analysis, (F12) of
+  !> with u the displacement of any motion that they drive (upper bound of limit analysis, (F13) of
   !> docs/theory/friction.md). For shifts alone the
   !> least is mu P/|Q|. With a torque, or without a prescribed P, it depends on the pressure: a gap that makes the
   !> residual R_n moves it by that share of its largest value where it acts on single nodes, by less where it is smooth.
@@ -177,18 +169,21 @@ contains
     type(driven_motions_t) :: driven
     real(wp), allocatable :: u(:, :, :), load(:), bound(:), length(:), field(:, :, :)
     real(wp) :: carried, error, factor, before, bounds(size(pressure))
-    integer :: k, try
+    logical, allocatable :: contact(:, :)
+    integer :: k, try, n_contact
 
     overloads = .false.
-    if (.not. problem%friction%is_bounded() .or. .not. any(pressure > 0.0_wp)) return
-    call new_driven_motions(driven, problem, target, pressure > 0.0_wp)
-    associate (n => size(driven%motion), n_contact => count(pressure > 0.0_wp), options => problem%options%contact)
+    n_contact = problem%space%count_positive(pressure)
+    if (.not. problem%friction%is_bounded() .or. n_contact == 0) return
+    contact = pressure > 0.0_wp
+    call new_driven_motions(driven, problem, target, contact)
+    associate (n => size(driven%motion), options => problem%options%contact)
       load = [(driven%load(k, problem, target), k=1, n)]
       overloads = any(abs(load) > 0.0_wp) .and. .not. problem%friction%resists()
       if (overloads .or. n == 0) return
       allocate (u(n_contact, 2, n))
       error = residual_normal
-      carried = problem%lattice%cell_area()*sum(pressure, mask=pressure > 0.0_wp)
+      carried = problem%lattice%cell_area()*problem%space%sum(pressure, contact)
       if (target%control(normal) == force_control) then
         ! under the prescribed load
         call problem%friction%find_bounds(1, target%value(normal)/carried*reshape(pressure, [size(pressure)]), bounds)
@@ -196,26 +191,28 @@ contains
       else
         call problem%friction%find_bounds(1, reshape(pressure, [size(pressure)]), bounds)
       end if
-      bound = pack(bounds, reshape(pressure > 0.0_wp, [size(pressure)]))
+      bound = pack(bounds, reshape(contact, [size(contact)]))
       if (error > options%trusted_residual) return
       do k = 1, n
         field = driven%direction(k, problem)
-        u(:, 1, k) = pack(field(:, :, 1), pressure > 0.0_wp)
-        u(:, 2, k) = pack(field(:, :, 2), pressure > 0.0_wp)
+        u(:, 1, k) = pack(field(:, :, 1), contact)
+        u(:, 2, k) = pack(field(:, :, 2), contact)
+        ! where it has a direction, friction takes b(p) |A u| of a slip u
+        if (.not. problem%friction%is_isotropic()) u(:, :, k) = matmul(u(:, :, k), problem%friction%stretch())
       end do
       allocate (length(n_contact), source=1.0_wp)
       factor = huge(1.0_wp)
       do try = 1, options%max_limit_motions
         before = factor
-        call lower(u, bound, load, options%least_limit_gain, length, factor)
+        call improve_motion(u, bound, load, options%least_limit_gain, length, factor)
         if (.not. factor < (1.0_wp - options%least_limit_gain)*before) exit
       end do
       overloads = factor*(1.0_wp + error) < 1.0_wp - options%load_rounding
     end associate
   end function overloads
 
-  !> Try the motion that nodes with springs of stiffness bound/length would make: what slips far resists the less.
-  pure subroutine lower(u, bound, load, least_length, length, factor)
+  !> Try the motion of nodes on springs of stiffness bound/length: large slip lowers the resistance.
+  pure subroutine improve_motion(u, bound, load, least_length, length, factor)
     !> Displacements of unit motions (n, 2, motion)
     real(wp), intent(in) :: u(:, :, :)
     !> Largest traction of each node, and load of each motion over the cell area [Pa]
@@ -248,35 +245,39 @@ contains
     length = norm2(moved, dim=2)
     factor = min(factor, dot_product(bound, length))
     length = max(length, least_length*maxval(length))
-  end subroutine lower
+  end subroutine improve_motion
 
-  !> Let the nodes stick that slip least: without any, nothing resists a prescribed load.
-  pure subroutine hold_nodes(share, compliance, zone)
-    !> Share of the slipping nodes to be held
+  !> Set the nodes that slip least to stick: without any, nothing resists a prescribed load.
+  subroutine fix_in_stick(space, share, compliance, zone)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> Share of the slipping nodes to be fixed
     real(wp), intent(in) :: share
-    !> Compliance of each node, the less the closer it is to sticking; 0 where it is held [m/Pa]
-    real(wp), intent(inout) :: compliance(:)
+    !> Compliance of each node, the less the closer it is to sticking; 0 where it is fixed [m/Pa]
+    real(wp), intent(inout), contiguous :: compliance(:)
     !> Zone of each node
     integer, intent(inout) :: zone(:)
+    logical :: slips(size(zone))
     real(wp) :: low, high, middle
     integer :: i, n_slip
 
-    n_slip = count(zone == slip)
+    slips = zone == slip
+    n_slip = space%count(slips)
     if (n_slip == 0) return
-    low = minval(compliance, mask=zone == slip)
-    high = maxval(compliance, mask=zone == slip)
+    low = space%min(compliance, slips)
+    high = space%max(compliance, slips)
     do i = 1, 60
       middle = sqrt(low)*sqrt(high)
-      if (count(zone == slip .and. compliance <= middle) < share*n_slip) then
+      if (space%count(slips .and. compliance <= middle) < share*n_slip) then
         low = middle
       else
         high = middle
       end if
     end do
-    where (zone == slip .and. compliance <= high)
+    where (slips .and. compliance <= high)
       zone = stick
       compliance = 0.0_wp
     end where
-  end subroutine hold_nodes
+  end subroutine fix_in_stick
 
 end module hc_load_constraints

@@ -1,13 +1,23 @@
-!> The law of contact along the normal, as the solvers see it, and unilateral contact.
+!> Abstract law of contact along the normal, and unilateral contact.
 !>
 !> A law relates pressure and gap of each node. Unilateral contact, p >= 0, g >= 0, p g = 0, is one equation,
 !>
 !>     p = max(0, p - r g)     for any r > 0
 !>
 !> ((F2) of docs/theory/friction.md): nodes with p - r g > 0 are in contact, and there g = 0 (Hintermueller, Ito & Kunisch,
-!> SIAM J. Optim. 13, 2003). As with friction (see hc_friction_law) laws are asked about rows of nodes.
+!> SIAM J. Optim. 13, 2003). As with friction (see hc_friction_law) the procedures take rows of nodes.
+!>
+!> Bodies with a compliant layer between them penetrate by sigma(p), sigma(0) = 0, sigma' > 0. They are in contact
+!> unilaterally with g + sigma(p) in place of g,
+!>
+!>     p >= 0,     g + sigma(p) >= 0,     p (g + sigma(p)) = 0
+!>
+!> ((C5) of docs/theory/conditions.md), and one equation again, p = P(p - r g) with P(t) the solution of P + r sigma(P) = t
+!> for t > 0, else 0. So the same nodes are in contact, those with p - r g > 0, and a step of Newton's method leaves
+!> g + C p = -s there, with C = sigma'(P) and s = sigma(P) - C P: every node carries a spring of compliance C.
 module hc_normal_law
   use hc_precision, only: wp
+  use hc_error, only: error_t
   implicit none
   private
 
@@ -16,48 +26,73 @@ module hc_normal_law
   !> A law of contact along the normal.
   type, abstract :: normal_law_t
   contains
-    !> Nodes that are in contact by p - r g
-    procedure(law_contact), deferred :: find_contact
-    !> Pressure projected on what the law allows
-    procedure(law_project), deferred :: project
-    !> What pressure and gap lack of the law
+    !> Return whether there is a compliant layer
+    procedure(law_is), deferred :: is_compliant
+    !> Refuse numbers that make no sense
+    procedure(law_check), deferred :: check
+    !> Compliance of the layer under a pressure
+    procedure(law_compliance), deferred :: compliance_under
+    !> Springs of the linearised law
+    procedure(law_linearize), deferred :: linearize
+    !> Find the nodes in contact by p - r g
+    procedure, nopass :: find_contact
+    !> Project the pressure on p >= 0
+    procedure, nopass :: project
+    !> Measure how far pressure and gap are from the law
     procedure(law_violation), deferred :: violation
   end type normal_law_t
 
-  !> Bodies that push and do not penetrate.
+  !> Unilateral contact: no tension, no penetration.
   type, extends(normal_law_t) :: unilateral_t
   contains
-    procedure :: find_contact => unilateral_contact
-    procedure :: project => unilateral_project
+    procedure :: is_compliant => unilateral_is_compliant
+    procedure :: check => unilateral_check
+    procedure :: compliance_under => unilateral_compliance
+    procedure :: linearize => unilateral_linearize
     procedure :: violation => unilateral_violation
   end type unilateral_t
 
   abstract interface
-    pure subroutine law_contact(self, first, r, p, gap, candidate, contact)
+    !> Return a property of the law.
+    pure logical function law_is(self)
+      import :: normal_law_t
+      class(normal_law_t), intent(in) :: self
+    end function law_is
+
+    !> Refuse numbers that make no sense.
+    pure subroutine law_check(self, error)
+      import :: normal_law_t, error_t
+      class(normal_law_t), intent(in) :: self
+      !> Allocated on failure
+      type(error_t), allocatable, intent(out) :: error
+    end subroutine law_check
+
+    !> Compute the compliance of the layer under a pressure [m/Pa].
+    pure real(wp) function law_compliance(self, pressure)
+      import :: normal_law_t, wp
+      class(normal_law_t), intent(in) :: self
+      !> Pressure [Pa]
+      real(wp), intent(in) :: pressure
+    end function law_compliance
+
+    !> Linearise the law at the nodes of a row: springs of compliance C and offset s.
+    pure subroutine law_linearize(self, first, r, softest, p, gap, contact, compliance, offset)
       import :: normal_law_t, wp
       class(normal_law_t), intent(in) :: self
       !> Number of the first node
       integer, intent(in) :: first
-      !> Classification parameter [Pa/m]
-      real(wp), intent(in) :: r
+      !> Classification parameter, 0 to linearise about the present pressure [Pa/m]; compliance beyond which a spring has no
+      !> effect [m/Pa]
+      real(wp), intent(in) :: r, softest
       !> Pressure [Pa] and gap [m]
       real(wp), intent(in), contiguous :: p(:), gap(:)
-      !> Nodes that may come into contact
-      logical, intent(in), contiguous :: candidate(:)
       !> Nodes in contact
-      logical, intent(out), contiguous :: contact(:)
-    end subroutine law_contact
+      logical, intent(in), contiguous :: contact(:)
+      !> Compliance C [m/Pa] and offset s [m] of each spring; 0 off the contact
+      real(wp), intent(out), contiguous :: compliance(:), offset(:)
+    end subroutine law_linearize
 
-    pure subroutine law_project(self, first, p, cut)
-      import :: normal_law_t, wp
-      class(normal_law_t), intent(in) :: self
-      !> Number of the first node
-      integer, intent(in) :: first
-      !> Pressure, and what is left of it [Pa]
-      real(wp), intent(in), contiguous :: p(:)
-      real(wp), intent(out), contiguous :: cut(:)
-    end subroutine law_project
-
+    !> Measure how far pressure and gap of a row are from the law.
     pure subroutine law_violation(self, first, compliance, p, gap, candidate, worst)
       import :: normal_law_t, wp
       class(normal_law_t), intent(in) :: self
@@ -76,34 +111,76 @@ module hc_normal_law
 
 contains
 
-  pure subroutine unilateral_contact(self, first, r, p, gap, candidate, contact)
+  !> Return false: there is no layer.
+  pure logical function unilateral_is_compliant(self) result(is_compliant)
+    class(unilateral_t), intent(in) :: self
+
+    associate (law => self)
+      is_compliant = .false.
+    end associate
+  end function unilateral_is_compliant
+
+  !> Accept: there are no numbers.
+  pure subroutine unilateral_check(self, error)
+    class(unilateral_t), intent(in) :: self
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (law => self)
+    end associate
+  end subroutine unilateral_check
+
+  !> Return 0: there is no layer.
+  pure real(wp) function unilateral_compliance(self, pressure) result(compliance)
+    class(unilateral_t), intent(in) :: self
+    real(wp), intent(in) :: pressure
+
+    associate (law => self, under_any => pressure)
+      compliance = 0.0_wp
+    end associate
+  end function unilateral_compliance
+
+  !> Return springs of no compliance.
+  pure subroutine unilateral_linearize(self, first, r, softest, p, gap, contact, compliance, offset)
     class(unilateral_t), intent(in) :: self
     integer, intent(in) :: first
-    real(wp), intent(in) :: r
+    real(wp), intent(in) :: r, softest
     real(wp), intent(in), contiguous :: p(:), gap(:)
+    logical, intent(in), contiguous :: contact(:)
+    real(wp), intent(out), contiguous :: compliance(:), offset(:)
+
+    associate (law => self, same_everywhere => first, scale => r, bound => softest, pressure => p, opening => gap, nodes => contact)
+      compliance = 0.0_wp
+      offset = 0.0_wp
+    end associate
+  end subroutine unilateral_linearize
+
+  !> Find the nodes in contact: those with p - r g > 0, whatever the law.
+  pure subroutine find_contact(r, p, gap, candidate, contact)
+    !> Classification parameter [Pa/m]
+    real(wp), intent(in) :: r
+    !> Pressure [Pa] and gap [m]
+    real(wp), intent(in), contiguous :: p(:), gap(:)
+    !> Nodes that may come into contact
     logical, intent(in), contiguous :: candidate(:)
+    !> Nodes in contact
     logical, intent(out), contiguous :: contact(:)
     integer :: i
 
-    associate (law => self, same_everywhere => first)
-      do i = 1, size(p)
-        contact(i) = candidate(i) .and. p(i) - r*gap(i) > 0.0_wp
-      end do
-    end associate
-  end subroutine unilateral_contact
+    do i = 1, size(p)
+      contact(i) = candidate(i) .and. p(i) - r*gap(i) > 0.0_wp
+    end do
+  end subroutine find_contact
 
-  pure subroutine unilateral_project(self, first, p, cut)
-    class(unilateral_t), intent(in) :: self
-    integer, intent(in) :: first
+  !> Project the pressure on p >= 0, which holds for every law.
+  pure subroutine project(p, cut)
+    !> Pressure, and its projection [Pa]
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(out), contiguous :: cut(:)
 
-    associate (law => self, same_everywhere => first)
-      cut = max(p, 0.0_wp)
-    end associate
-  end subroutine unilateral_project
+    cut = max(p, 0.0_wp)
+  end subroutine project
 
-  !> |p - max(0, p - g/d_n)| = |min(p, g/d_n)|.
+  !> Measure |p - max(0, p - g/d_n)| = |min(p, g/d_n)|.
   pure subroutine unilateral_violation(self, first, compliance, p, gap, candidate, worst)
     class(unilateral_t), intent(in) :: self
     integer, intent(in) :: first

@@ -6,17 +6,19 @@
 !> solution, where it is not worth it any more, or after some parts.
 module hc_subwindow
   use hc_precision, only: wp
+  use hc_error, only: error_t
   use hc_options, only: multilevel_options_t
   use hc_lattice, only: lattice_t
-  use hc_contact_state, only: contact_state_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
+  use hc_contact_solver, only: friction_solver_t
   implicit none
   private
 
-  public :: next_part
+  public :: next_part, solve_part
 
 contains
 
-  !> First and last column and row of the part to be tried next.
+  !> Choose the part of the window to be tried next.
   subroutine next_part(try, options, lattice, candidate, state, low, high, found)
     !> Number of the part, from 1 on
     integer, intent(in) :: try
@@ -37,11 +39,72 @@ contains
     high = lattice%extent
     if (.not. found) return
     if (try == 1) then
-      call lattice%enclose(state%pressure > 0.0_wp, low, high)
+      call lattice%enclose(state%pressure > 0.0_wp, options, low, high)
     else
-      call lattice%enclose(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. candidate), low, high)
+      call lattice%enclose(state%pressure > 0.0_wp .or. (state%gap < 0.0_wp .and. candidate), options, low, high)
     end if
-    found = lattice%is_worth_parting(low, high)
+    found = lattice%is_worth_parting(low, high, options)
   end subroutine next_part
+
+  !> Solve a step on the part, and judge it on the window.
+  subroutine solve_part(whole, part, low, high, start, reference, target, tolerance, max_sweeps, state, solved, error)
+    !> Solver on the window, and one on the part
+    class(friction_solver_t), intent(inout) :: whole, part
+    !> First and last column and row of the part
+    integer, intent(in) :: low(2), high(2)
+    !> State at the beginning of the step
+    type(contact_state_t), intent(in) :: start
+    !> Displacement that slip counts from (n_col, n_row, 2) [m]
+    real(wp), intent(in) :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Bound of all residuals
+    real(wp), intent(in) :: tolerance
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> State on the window
+    type(contact_state_t), intent(out) :: state
+    !> There is a solution on the part
+    logical, intent(out) :: solved
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: before, after
+    real(wp), allocatable :: displacement(:, :, :)
+
+    solved = .false.
+    call new_friction_state(state, whole%problem%lattice, whole%problem%space)
+    associate (lattice => part%problem%lattice, west => low(1), east => high(1), south => low(2), north => high(2))
+      call new_friction_state(before, lattice, whole%problem%space)
+      before%pressure = start%pressure(west:east, south:north)
+      before%gap = start%gap(west:east, south:north)
+      before%traction = start%traction(west:east, south:north, :)
+      before%relative_displacement = start%relative_displacement(west:east, south:north, :)
+      before%motion = start%motion
+      before%load = start%load
+      if (.not. part%problem%is_pressed(target)) return
+      if (allocated(whole%guess)) then
+        allocate (part%guess)
+        part%guess%pressure = whole%guess%pressure(west:east, south:north)
+        part%guess%traction = whole%guess%traction(west:east, south:north, :)
+        part%guess%motion = whole%guess%motion
+      end if
+      call part%solve_step(before, reference(west:east, south:north, :), target, &
+                           whole%problem%options%multilevel%part_tolerance*tolerance, max_sweeps, after, error)
+      if (allocated(part%guess)) deallocate (part%guess)
+      if (allocated(error)) return
+      state%operator_applications = after%operator_applications*lattice%size()/whole%problem%lattice%size()
+      state%sweeps = after%sweeps
+      solved = after%converged
+      if (.not. solved) return
+      state%pressure(west:east, south:north) = after%pressure
+      state%traction(west:east, south:north, :) = after%traction
+    end associate
+    state%motion = after%motion
+    allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
+    call whole%displacements(state%pressure, state%traction, displacement, error)
+    if (allocated(error)) return
+    call whole%problem%complete_state(target, tolerance, reference, displacement, state)
+    state%operator_applications = state%operator_applications + 1.0_wp
+  end subroutine solve_part
 
 end module hc_subwindow

@@ -30,7 +30,7 @@ module hc_convolution
   !> Plans, spectra and scratch space.
   type :: convolution_t
     !> Spectra (frequency, block, kernel), normalised; those of odd kernels are divided by i.
-    !> `frequencies` tells which frequency stands where. Other convolutions may share them.
+    !> `frequencies` returns their frequencies. Other convolutions may share them.
     real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
     !> What the results are multiplied with
     real(wp) :: factor = 1.0_wp
@@ -42,14 +42,14 @@ module hc_convolution
     integer :: width = 0, n_block = 0
     !> Number of columns and rows of the window
     integer, private :: extent(2) = 0
-    !> Number of frequencies along the first direction, and the leading dimension that holds them
+    !> Number of frequencies along the first direction, and the leading dimension for them
     integer, private :: n_frequency = 0, leading = 0
     !> Number of kernels, the first odd one
     integer, private :: n_kernel = 0, first_odd = 0
-    !> Where the spectra are
-    type(kernel_spectrum_t), pointer, private :: held => null()
+    !> The spectra with the count of their users
+    type(kernel_spectrum_t), pointer, private :: shared => null()
     type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
-    !> Address of the object that frees them: copies, which have its plans and spectra as long as it is there, do not
+    !> Address of the object that frees them: its copies, which use the same plans and spectra, do not
     integer(c_intptr_t), private :: owner = 0
     !> Row transforms (leading, n_row or one more, component)
     complex(wp), allocatable, private :: work(:, :, :)
@@ -60,8 +60,8 @@ module hc_convolution
   contains
     !> Sums of weighted convolutions
     procedure :: convolve
-    !> Spectra from a cache, or room for them, and to the cache
-    procedure :: take_spectra, share_spectra
+    !> Take spectra from a cache, and store them there
+    procedure :: find_spectra, store_spectra
     !> Spectra of kernels given at the lattice offsets
     procedure :: transform_kernels
     !> Frequencies of the entries of a block of the spectra
@@ -71,14 +71,14 @@ module hc_convolution
     final :: free
   end type convolution_t
 
-  !> Something that knows the kernels at lattice offsets.
+  !> Source of the kernels at lattice offsets.
   type, abstract :: kernel_source_t
   contains
     procedure(kernel_row), deferred :: row
   end type kernel_source_t
 
   abstract interface
-    !> All kernels at the offsets of j >= 0 rows and -n...n columns: k(kernel, n + 1 + column)
+    !> Evaluate all kernels at the offsets of j >= 0 rows and -n...n columns: k(kernel, n + 1 + column)
     pure subroutine kernel_row(self, j, k)
       import :: kernel_source_t, wp
       class(kernel_source_t), intent(in) :: self
@@ -89,7 +89,7 @@ module hc_convolution
 
 contains
 
-  !> Plans and scratch space for convolutions over a window; the spectra are still to be taken.
+  !> Make plans and scratch space for convolutions over a window; the spectra come next, by `find_spectra`.
   subroutine new_convolution(self, extent, padded, n_kernel, n_component, space, error, first_odd)
     !> Convolution to be set up
     type(convolution_t), intent(out) :: self
@@ -131,14 +131,14 @@ contains
     call make_plans(self, error)
   end subroutine new_convolution
 
-  !> Spectra that a cache has, or room for spectra that are still to be made, zero.
-  subroutine take_spectra(self, found, error, cache, key)
+  !> Take the spectra from a cache, or allocate zero ones that are to be computed.
+  subroutine find_spectra(self, found, error, cache, key)
     class(convolution_t), intent(inout) :: self
-    !> They were there, and must not be changed
+    !> The cache has them; they must not be changed
     logical, intent(out) :: found
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Where to look, if anywhere
+    !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> With a cache: what the kernels depend on
     type(kernel_key_t), intent(in), optional :: key
@@ -146,26 +146,27 @@ contains
 
     shape_wanted = [self%width*self%padded(2), self%n_block, self%n_kernel]
     found = .false.
+    call release(self%shared)
     if (present(cache)) then
-      if (associated(cache)) call cache%find(key, self%held)
+      if (associated(cache)) call cache%find(key, self%shared)
     end if
-    if (associated(self%held)) then
-      call self%held%point(shape_wanted, self%spectrum)
+    if (associated(self%shared)) then
+      call self%shared%point(shape_wanted, self%spectrum)
       found = associated(self%spectrum)
       if (found) return
-      call release(self%held)
+      call release(self%shared)
     end if
-    allocate (self%held)
-    call self%held%reserve(shape_wanted, self%spectrum, stat)
+    allocate (self%shared)
+    call self%shared%reserve(shape_wanted, self%spectrum, stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
       return
     end if
     self%spectrum = 0.0_wp
-  end subroutine take_spectra
+  end subroutine find_spectra
 
-  !> Let a cache have the spectra, once they are complete.
-  subroutine share_spectra(self, cache, key)
+  !> Store complete spectra in the cache.
+  subroutine store_spectra(self, cache, key)
     class(convolution_t), intent(in) :: self
     !> The cache, if there is one
     type(kernel_cache_t), pointer, intent(in), optional :: cache
@@ -173,9 +174,10 @@ contains
     type(kernel_key_t), intent(in), optional :: key
 
     if (.not. present(cache)) return
-    if (associated(cache)) call cache%keep(key, self%held)
-  end subroutine share_spectra
+    if (associated(cache)) call cache%store(key, self%shared)
+  end subroutine store_spectra
 
+  !> Make the plans of the transforms.
   subroutine make_plans(self, error)
     class(convolution_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -197,7 +199,7 @@ contains
     end if
   end subroutine make_plans
 
-  !> Spectra of kernels that are given at the lattice offsets, for a padded convolution.
+  !> Transform kernels that are given at the lattice offsets, for a padded convolution.
   !>
   !> A row of negative index is the reverse of its mirror image, up to the sign
   !> of an odd kernel, so that its transform is the conjugate: half of the
@@ -273,7 +275,7 @@ contains
     !$omp end parallel
   end subroutine transform_kernels
 
-  !> Indices of the frequencies of a block, f(1) = 0...padded(1)/2, f(2) = 0...padded(2)-1.
+  !> Return the indices of the frequencies of a block, f(1) = 0...padded(1)/2, f(2) = 0...padded(2)-1.
   pure function frequencies(self, b) result(f)
     class(convolution_t), intent(in) :: self
     !> Index of the block
@@ -290,7 +292,7 @@ contains
     end do
   end function frequencies
 
-  !> result(:, :, o) = sum over i of kernel(o, i) * field(:, :, i)
+  !> Compute result(:, :, o) = sum over i of kernel(o, i) * field(:, :, i)
   subroutine convolve(self, kernel, field, result)
     class(convolution_t), intent(inout) :: self
     !> Number of the kernel (onto, from), negative to reverse its sign
@@ -419,12 +421,13 @@ contains
     !$omp end parallel
   end subroutine time_transforms
 
-  !> Address of an object.
+  !> Compute the address of an object.
   integer(c_intptr_t) function address(self)
     type(convolution_t), intent(in), target :: self
     address = transfer(c_loc(self), address)
   end function address
 
+  !> Free plans and spectra.
   impure elemental subroutine free(self)
     type(convolution_t), intent(inout) :: self
 
@@ -436,7 +439,7 @@ contains
     self%row_plan = c_null_ptr
     self%column_plan = c_null_ptr
     self%spectrum => null()
-    call release(self%held)
+    call release(self%shared)
   end subroutine free
 
 end module hc_convolution

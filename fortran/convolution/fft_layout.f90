@@ -11,7 +11,7 @@ module hc_fft_layout
 
 contains
 
-  !> Bytes that a convolution takes: spectra, row transforms, buffers.
+  !> Count the bytes that a convolution takes: spectra, row transforms, buffers.
   pure integer(selected_int_kind(18)) function convolution_memory(extent, padded, n_kernel, n_component, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -31,7 +31,7 @@ contains
     convolution_memory = convolution_memory*(storage_size(1.0_wp)/8)
   end function convolution_memory
 
-  !> Bytes that are needed besides while the kernels of a padded convolution are transformed: their rows.
+  !> Count the additional bytes while the kernels of a padded convolution are transformed: their rows.
   pure integer(selected_int_kind(18)) function transform_memory(extent, padded, n_kernel)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -44,7 +44,7 @@ contains
     transform_memory = storage_size((1.0_wp, 0.0_wp))/8*n_kernel*leading_size(padded)*int(even(extent(2)), long)
   end function transform_memory
 
-  !> Leading dimension that holds the frequencies along the first direction, in whole blocks.
+  !> Compute the leading dimension for the frequencies along the first direction, in whole blocks.
   pure integer function leading_size(padded)
     !> Transform lengths
     integer, intent(in) :: padded(2)
@@ -54,13 +54,14 @@ contains
     end associate
   end function leading_size
 
-  !> Rows are transformed in pairs.
+  !> Round up to an even number: rows are transformed in pairs.
   elemental integer function even(n)
+    !> Number
     integer, intent(in) :: n
     even = n + modulo(n, 2)
   end function even
 
-  !> Columns that are transformed together: 4, 8, 12 or 16, so that all transforms begin at addresses
+  !> Choose the columns that are transformed together: 4, 8, 12 or 16, so that all transforms begin at addresses
   !> alike modulo 16 bytes, as their common plan expects.
   elemental integer function block_width(length)
     !> Length of a column

@@ -21,7 +21,7 @@ module hc_fft_passes
 
 contains
 
-  !> Transforms of the real and of the imaginary part, at the frequencies 0...n/2.
+  !> Split the transform of two real rows into those of each, at the frequencies 0...n/2.
   pure subroutine split_rows(both, first, second)
     !> Transform of the complex row (0:n-1), n even
     complex(wp), intent(in), contiguous :: both(0:)
@@ -43,7 +43,7 @@ contains
     end do
   end subroutine split_rows
 
-  !> The conjugate of X + i Y at all frequencies, from the conjugates of X and Y at 0...n/2.
+  !> Compute the conjugate of X + i Y at all frequencies, from the conjugates of X and Y at 0...n/2.
   pure subroutine join_rows(first, second, both)
     !> Conjugates of the transforms of two real rows (0:n/2)
     complex(wp), intent(in), contiguous :: first(0:), second(0:)
@@ -66,7 +66,7 @@ contains
     end do
   end subroutine join_rows
 
-  !> Columns one after the other, padded with zeros.
+  !> Copy columns one after the other, padded with zeros.
   pure subroutine gather_columns(width, n_row, leading, length, matrix, columns)
     !> Number of columns and rows, distance of two rows, length of a padded column
     integer, intent(in) :: width, n_row, leading, length
@@ -88,7 +88,7 @@ contains
     columns(n_row:, :) = 0.0_wp
   end subroutine gather_columns
 
-  !> The way back, without the padding.
+  !> Copy the columns back, without the padding.
   pure subroutine scatter_columns(width, n_row, length, leading, columns, matrix)
     !> Number of columns and rows, length of a padded column, distance of two rows
     integer, intent(in) :: width, n_row, length, leading
@@ -109,7 +109,7 @@ contains
     end do
   end subroutine scatter_columns
 
-  !> One field and one even kernel, the whole operator of frictionless contact: conjg(spectrum * field).
+  !> Multiply one field by one even kernel, the whole operator of frictionless contact: conjg(spectrum * field).
   pure subroutine multiply_one(n, spectrum, field, total)
     !> Number of frequencies
     integer, intent(in) :: n
@@ -125,7 +125,7 @@ contains
     end do
   end subroutine multiply_one
 
-  !> Up to three fields and any kernels: the conjugates of the sums over the fields.
+  !> Multiply up to three fields by any kernels: the conjugates of the sums over the fields. Kernels beyond the spectra are zero.
   subroutine multiply(spectrum, first_odd, kernel, field, total)
     !> Spectra (frequency, kernel); those of odd kernels are divided by i
     real(wp), intent(in) :: spectrum(:, :)
@@ -143,27 +143,33 @@ contains
     !> Fields times i (frequency, from)
     complex(wp), target :: rotated(chunk, 3)
     type(part_t) :: part(3)
-    integer :: i, o, start, last, m, n_from, k(3)
+    integer :: i, o, start, last, m, n_part, k(3)
     real(wp) :: sign(3)
 
-    n_from = size(kernel, 2)
     do start = 1, size(field, 1), chunk
       last = min(start + chunk - 1, size(field, 1))
       m = last - start + 1
-      do i = 1, n_from
-        if (any(abs(kernel(:, i)) >= first_odd)) call rotate(m, field(start:last, i), rotated(:, i))
+      do i = 1, size(kernel, 2)
+        if (any(abs(kernel(:, i)) >= first_odd .and. abs(kernel(:, i)) <= size(spectrum, 2))) then
+          call rotate(m, field(start:last, i), rotated(:, i))
+        end if
       end do
       do o = 1, size(kernel, 1)
-        k(:n_from) = abs(kernel(o, :))
-        sign(:n_from) = merge(1.0_wp, -1.0_wp, kernel(o, :) > 0)
-        do i = 1, n_from
-          if (k(i) >= first_odd) then
-            part(i)%value => rotated(:m, i)
+        n_part = 0
+        do i = 1, size(kernel, 2)
+          if (abs(kernel(o, i)) > size(spectrum, 2)) cycle
+          n_part = n_part + 1
+          k(n_part) = abs(kernel(o, i))
+          sign(n_part) = merge(1.0_wp, -1.0_wp, kernel(o, i) > 0)
+          if (k(n_part) >= first_odd) then
+            part(n_part)%value => rotated(:m, i)
           else
-            part(i)%value => field(start:last, i)
+            part(n_part)%value => field(start:last, i)
           end if
         end do
-        select case (n_from)
+        select case (n_part)
+        case (0)
+          total(start:last, o) = (0.0_wp, 0.0_wp)
         case (1)
           call add_1(m, sign, spectrum(start:last, k(1)), part(1)%value, total(start:last, o))
         case (2)
@@ -177,7 +183,7 @@ contains
     end do
   end subroutine multiply
 
-  !> A field times i.
+  !> Multiply a field by i.
   pure subroutine rotate(n, field, rotated)
     !> Number of frequencies
     integer, intent(in) :: n
@@ -190,7 +196,7 @@ contains
     end do
   end subroutine rotate
 
-  !> total = conjg(sign * spectrum * field)
+  !> Compute total = conjg(sign * spectrum * field)
   pure subroutine add_1(n, sign, s_1, f_1, total)
     !> Number of frequencies
     integer, intent(in) :: n
@@ -208,7 +214,7 @@ contains
     end do
   end subroutine add_1
 
-  !> total = conjg(sum over two fields of sign * spectrum * field)
+  !> Compute total = conjg(sum over two fields of sign * spectrum * field)
   pure subroutine add_2(n, sign, s_1, f_1, s_2, f_2, total)
     !> Number of frequencies
     integer, intent(in) :: n
@@ -227,7 +233,7 @@ contains
     end do
   end subroutine add_2
 
-  !> total = conjg(sum over three fields of sign * spectrum * field)
+  !> Compute total = conjg(sum over three fields of sign * spectrum * field)
   pure subroutine add_3(n, sign, s_1, f_1, s_2, f_2, s_3, f_3, total)
     !> Number of frequencies
     integer, intent(in) :: n

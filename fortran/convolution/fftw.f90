@@ -13,6 +13,7 @@ module hc_fftw
   integer(c_int), parameter :: fftw_forward = -1, fftw_estimate = 64
 
   interface
+    !> Plan many complex transforms (FFTW)
     type(c_ptr) function fftw_plan_many_dft(rank, n, howmany, input, inembed, istride, idist, &
                                             output, onembed, ostride, odist, direction, flags) bind(c, name='fftw_plan_many_dft')
       import :: c_ptr, c_int, ck
@@ -21,12 +22,14 @@ module hc_fftw
       complex(ck), intent(inout) :: input(*), output(*)
     end function fftw_plan_many_dft
 
+    !> Transform by a plan (FFTW)
     subroutine fftw_execute_dft(plan, input, output) bind(c, name='fftw_execute_dft')
       import :: c_ptr, ck
       type(c_ptr), value :: plan
       complex(ck), intent(inout) :: input(*), output(*)
     end subroutine fftw_execute_dft
 
+    !> Free a plan (FFTW)
     subroutine fftw_destroy_plan(plan) bind(c, name='fftw_destroy_plan')
       import :: c_ptr
       type(c_ptr), value :: plan
@@ -35,7 +38,7 @@ module hc_fftw
 
 contains
 
-  !> A multiple of four not below n that is transformed fast, of the form 2^a 3^b 5^c 7^d.
+  !> Return a multiple of four not below n that is transformed fast, of the form 2^a 3^b 5^c 7^d.
   !>
   !> The least of them is not the fastest: FFTW's plans for powers of two take half of the time a
   !> point of what others do, so that a longer transform can be the cheaper one.
@@ -60,7 +63,7 @@ contains
     end do
   end function good_size
 
-  !> Times per point of FFTW's estimated plans over those of powers of two, roughly (measured with AVX2
+  !> Estimate the time per point of FFTW's estimated plans over that of powers of two (measured with AVX2
   !> in both precisions); zero for lengths with larger prime factors, which are not to be taken.
   elemental real(wp) function time_per_point(length)
     integer, intent(in) :: length
@@ -87,7 +90,7 @@ contains
     end select
   end function time_per_point
 
-  !> What is left of a number without its factors of two.
+  !> Divide a number by all its factors of two.
   elemental integer function odd_part(n)
     integer, intent(in) :: n
     odd_part = shiftr(n, trailz(n))

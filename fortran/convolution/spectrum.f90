@@ -8,47 +8,50 @@ module hc_spectrum
   implicit none
   private
 
-  public :: kernel_spectrum_t, kernel_key_t, new_kernel_key, release
-  public :: of_pressure, of_all_tractions, of_pressure_rounded, inverse_of_pressure, inverse_of_shear, kind_name
+  public :: kernel_spectrum_t, kernel_key_t, new_kernel_key, new_depth_key, release
+  public :: of_pressure, of_all_tractions, of_pressure_rounded, inverse_of_pressure, inverse_of_shear, of_stress
+  public :: of_displacement, kind_name
 
   !> What was transformed: the kernel of the pressure, those of all blocks, that of the pressure in single
-  !> precision, and the inverses that precondition.
+  !> precision, the inverses that precondition, and those of stress and displacement at a
+  !> depth.
   integer, parameter :: of_pressure = 1, of_all_tractions = 2, of_pressure_rounded = 3, &
-    inverse_of_pressure = 4, inverse_of_shear = 5
-  character(len=*), parameter :: kind_name(5) = &
-    [character(len=16) :: 'pressure', 'tractions', 'pressure-single', 'inverse', 'shear-inverse']
+    inverse_of_pressure = 4, inverse_of_shear = 5, of_stress = 6, of_displacement = 7
+  character(len=*), parameter :: kind_name(7) = &
+    [character(len=16) :: 'pressure', 'tractions', 'pressure-single', 'inverse', 'shear-inverse', 'stress', 'displacement']
 
   !> Everything that the numbers of a spectrum depend on, to the bit.
   type :: kernel_key_t
-    !> Kind, columns and rows of the window, basis over its spacing, lambda_2 and lambda_5 over lambda_1
+    !> Kind, columns and rows of the window, basis over its spacing, lambda_2 and lambda_5 over lambda_1;
+    !> of stress and displacement, instead of these, depth over spacing and Poisson's ratio
     integer(int64) :: word(9) = 0
   contains
-    !> The same kernels?
+    !> Return whether two keys are equal
     procedure :: is_same
   end type kernel_key_t
 
-  !> Spectra that are freed when nobody uses them any more; nothing changes them once they are shared.
+  !> Spectra with a count of their users, of whom the last one frees them; constant once they are shared.
   type :: kernel_spectrum_t
     !> Spectra (frequency, block, kernel), in one of the precisions
     real(wp), allocatable :: double(:, :, :)
     real(sp), allocatable :: single(:, :, :)
     integer, private :: users = 1
   contains
-    !> One more user
-    procedure :: hold
+    !> Count one user more
+    procedure :: retain
     !> Bytes of the values
     procedure :: bytes
-    !> Let a pointer point to the values, if they have its precision and the given shape
+    !> Point to the values, if they have the precision and the shape
     generic :: point => point_double, point_single
     procedure, private :: point_double, point_single
-    !> Make room for values and let a pointer point to them
+    !> Allocate values and point to them
     generic :: reserve => reserve_double, reserve_single
     procedure, private :: reserve_double, reserve_single
   end type kernel_spectrum_t
 
 contains
 
-  !> Key of the spectra of a kind, on a window.
+  !> Compute the key of the spectra of a kind, on a window.
   pure type(kernel_key_t) function new_kernel_key(kind, lattice, pair) result(key)
     !> One of the kinds above
     integer, intent(in) :: kind
@@ -64,24 +67,42 @@ contains
     key%word(4:7) = transfer(lattice%unit_basis(), key%word, 4)
     if (kind == of_all_tractions) key%word(8) = transfer(ratios%lambda_2, key%word(8))
     if (kind == of_all_tractions .or. kind == inverse_of_shear) key%word(9) = transfer(ratios%lambda_5, key%word(9))
+    if (kind == inverse_of_shear) key%word(8) = transfer(pair%tangential_layer/(pair%lambda_1*lattice%spacing()), key%word(8))
   end function new_kernel_key
 
+  !> Compute the key of the spectra of stress or displacement at a depth.
+  pure type(kernel_key_t) function new_depth_key(kind, lattice, depth, poisson_ratio) result(key)
+    !> of_stress or of_displacement
+    integer, intent(in) :: kind
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Depth over the longest edge, Poisson's ratio of the body
+    real(wp), intent(in) :: depth, poisson_ratio
+
+    key%word(1) = kind
+    key%word(2:3) = lattice%extent
+    key%word(4:7) = transfer(lattice%unit_basis(), key%word, 4)
+    key%word(8:9) = transfer([depth, poisson_ratio], key%word, 2)
+  end function new_depth_key
+
+  !> Return whether two keys are equal.
   pure logical function is_same(self, other)
     class(kernel_key_t), intent(in) :: self, other
     is_same = all(self%word == other%word)
   end function is_same
 
-  subroutine hold(self)
+  !> Count one user more.
+  subroutine retain(self)
     class(kernel_spectrum_t), intent(inout) :: self
 
     call lock(spectrum_users)
     self%users = self%users + 1
     call unlock(spectrum_users)
-  end subroutine hold
+  end subroutine retain
 
-  !> One user less; the last one frees the memory.
+  !> Count one user less; the last one frees the memory.
   subroutine release(spectrum)
-    !> Spectra that were held; not associated afterwards
+    !> Spectra of the caller; not associated afterwards
     type(kernel_spectrum_t), pointer, intent(inout) :: spectrum
     integer :: left
 
@@ -94,6 +115,7 @@ contains
     spectrum => null()
   end subroutine release
 
+  !> Count the bytes of the values.
   pure integer(int64) function bytes(self)
     class(kernel_spectrum_t), intent(in) :: self
 
@@ -102,6 +124,7 @@ contains
     if (allocated(self%single)) bytes = bytes + size(self%single, kind=int64)*(storage_size(self%single)/8)
   end function bytes
 
+  !> Point to the values in double precision.
   subroutine point_double(self, n, values)
     class(kernel_spectrum_t), intent(in), target :: self
     integer, intent(in) :: n(3)
@@ -112,6 +135,7 @@ contains
     if (all(shape(self%double) == n)) values => self%double
   end subroutine point_double
 
+  !> Point to the values in single precision.
   subroutine point_single(self, n, values)
     class(kernel_spectrum_t), intent(in), target :: self
     integer, intent(in) :: n(3)
@@ -122,6 +146,7 @@ contains
     if (all(shape(self%single) == n)) values => self%single
   end subroutine point_single
 
+  !> Allocate values in double precision, zero.
   subroutine reserve_double(self, n, values, stat)
     class(kernel_spectrum_t), intent(inout), target :: self
     integer, intent(in) :: n(3)
@@ -134,6 +159,7 @@ contains
     if (stat == 0) values => self%double
   end subroutine reserve_double
 
+  !> Allocate values in single precision, zero.
   subroutine reserve_single(self, n, values, stat)
     class(kernel_spectrum_t), intent(inout), target :: self
     integer, intent(in) :: n(3)

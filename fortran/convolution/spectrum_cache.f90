@@ -1,7 +1,7 @@
-!> Spectra of kernels that are kept for problems to come, in memory and, if wanted, in a folder.
+!> Cache of the spectra of kernels, in memory and, on request, in a folder.
 !>
-!> They are found by everything that they depend on, so that a problem gets the same bits with them as without.
-!> Problems share what they find: a spectrum is in memory once. The least recently used ones go first.
+!> The key of a spectrum is everything that it depends on, so that a problem gets the same bits with the cache as without.
+!> Problems share spectra: each is in memory once. The least recently used ones are dropped first.
 !> Several threads may use one cache.
 module hc_spectrum_cache
   use, intrinsic :: iso_fortran_env, only: int64
@@ -13,45 +13,45 @@ module hc_spectrum_cache
 
   public :: kernel_cache_t
 
-  !> Spectra that may be kept at a time.
+  !> Largest number of spectra.
   integer, parameter :: n_entry = 512
 
-  !> Spectra that are kept.
+  !> Spectrum with its key.
   type :: entry_t
     type(kernel_key_t) :: key
     type(kernel_spectrum_t), pointer :: spectrum => null()
-    !> When it was last asked for
+    !> When it was last used
     integer(int64) :: used = 0
   end type entry_t
 
-  !> The cache; without a bound above zero and without a folder nothing is kept.
+  !> The cache; empty without a bound above zero and without a folder.
   type :: kernel_cache_t
-    !> Bytes that are kept in memory at most, and those that are
-    integer(int64) :: bound = 0, held = 0
+    !> Largest number of bytes in memory, and that in use
+    integer(int64) :: bound = 0, stored = 0
     !> Spectra that were found in memory, found in the folder, and not found
     integer(int64) :: found = 0, read = 0, missed = 0
     !> Bytes that may still be written to the folder
     integer(int64) :: room = 0
     integer(int64), private :: clock = 0, written = 0
     type(entry_t), private :: entry(n_entry)
-    !> The folder; what made the spectra; a word for names that nobody else gives
+    !> The folder; program and machine; a word for unique names of files
     character(len=:), allocatable, private :: folder, maker, word
     !> Files of other users are taken, too
     logical, private :: shared = .false.
-    !> What is wrong with the folder, since it was last asked for
+    !> Fault of the folder since it was last returned
     character(len=:), allocatable, private :: complaint
   contains
     !> Bound the memory
     procedure :: limit
     !> Use a folder, or none
     procedure :: use_folder
-    !> Spectra of kernels, held for the caller, or none
+    !> Look up spectra; the caller releases them
     procedure :: find
-    !> Keep spectra
-    procedure :: keep
-    !> What was wrong with the folder
-    procedure :: take_complaint
-    !> A copy has the bound and begins empty: what two caches had would be freed twice
+    !> Store spectra
+    procedure :: store
+    !> Return the fault of the folder
+    procedure :: fetch_message
+    !> Copy the bound alone: spectra of two caches would be freed twice
     generic :: assignment(=) => copy
     procedure, private :: copy
     final :: free
@@ -59,10 +59,10 @@ module hc_spectrum_cache
 
 contains
 
-  !> Keep so many bytes in memory at most; what is too much goes.
+  !> Limit the memory of the cache; spectra beyond it are dropped.
   subroutine limit(self, bound)
     class(kernel_cache_t), intent(inout) :: self
-    !> Bytes; 0: nothing is kept
+    !> Bytes; 0: no cache in memory
     integer(int64), intent(in) :: bound
 
     call lock(kernel_table)
@@ -71,14 +71,14 @@ contains
     call unlock(kernel_table)
   end subroutine limit
 
-  !> Keep spectra in a folder, too.
+  !> Store spectra in a folder, too.
   subroutine use_folder(self, folder, maker, word, room, shared)
     class(kernel_cache_t), intent(inout) :: self
-    !> The folder, which is there, with a slash at the end, so that its name may end with a blank; empty: none
+    !> Existing folder, with a slash at the end, so that its name may end with a blank; empty: none
     character(len=*), intent(in) :: folder
     !> What the numbers depend on besides the kernels: program, machine
     character(len=*), intent(in) :: maker
-    !> A word that no other process has
+    !> Word of this process alone
     character(len=*), intent(in) :: word
     !> Bytes that may be written
     integer(int64), intent(in) :: room
@@ -95,6 +95,7 @@ contains
     call unlock(kernel_table)
   end subroutine use_folder
 
+  !> Look up spectra in memory, then in the folder.
   subroutine find(self, key, spectrum)
     class(kernel_cache_t), intent(inout) :: self
     !> What the kernels depend on
@@ -110,7 +111,7 @@ contains
     i = place_of(self, key)
     if (i > 0) then
       spectrum => self%entry(i)%spectrum
-      call spectrum%hold()
+      call spectrum%retain()
       call touch(self, i)
       self%found = self%found + 1
     else if (allocated(self%folder)) then
@@ -132,7 +133,8 @@ contains
     call unlock(kernel_table)
   end subroutine find
 
-  subroutine keep(self, key, spectrum)
+  !> Store spectra in memory and in the folder.
+  subroutine store(self, key, spectrum)
     class(kernel_cache_t), intent(inout) :: self
     !> What the kernels depend on
     type(kernel_key_t), intent(in) :: key
@@ -157,15 +159,15 @@ contains
     call lock(kernel_table)
     self%room = self%room - bytes
     if (allocated(complaint)) then
-      ! one complaint is enough
+      ! a single complaint
       if (self%room > 0) call complain(self, complaint//': no more kernels are kept in the folder')
       self%room = 0
     end if
     call unlock(kernel_table)
-  end subroutine keep
+  end subroutine store
 
-  !> What was wrong since this was last asked; empty: nothing.
-  subroutine take_complaint(self, complaint)
+  !> Return the fault since the last call; empty: none.
+  subroutine fetch_message(self, complaint)
     class(kernel_cache_t), intent(inout) :: self
     !> Sentences, one a line
     character(len=:), allocatable, intent(out) :: complaint
@@ -176,18 +178,19 @@ contains
       call move_alloc(self%complaint, complaint)
     end if
     call unlock(kernel_table)
-  end subroutine take_complaint
+  end subroutine fetch_message
 
+  !> Share the spectra of another cache.
   subroutine copy(self, other)
     class(kernel_cache_t), intent(inout) :: self
     type(kernel_cache_t), intent(in) :: other
 
     call free(self)
-    self%held = 0
+    self%stored = 0
     self%bound = other%bound
   end subroutine copy
 
-  !> Spectra that a problem uses stay until it is gone.
+  !> Free the cache; spectra that a problem uses stay until it is freed.
   subroutine free(self)
     type(kernel_cache_t), intent(inout) :: self
     integer :: i
@@ -197,9 +200,9 @@ contains
     end do
   end subroutine free
 
-  ! What follows is called by the one thread that has the cache.
+  ! The following procedures are called by the one thread that has locked the cache.
 
-  !> Where spectra are kept; 0: nowhere.
+  !> Return the place of spectra in the list; 0: there are none.
   pure integer function place_of(self, key)
     class(kernel_cache_t), intent(in) :: self
     type(kernel_key_t), intent(in) :: key
@@ -212,6 +215,7 @@ contains
     end do
   end function place_of
 
+  !> Mark spectra as used last.
   subroutine touch(self, i)
     class(kernel_cache_t), intent(inout) :: self
     integer, intent(in) :: i
@@ -220,7 +224,7 @@ contains
     self%entry(i)%used = self%clock
   end subroutine touch
 
-  !> Take spectra to those in memory, unless there are some or they are too large.
+  !> Add spectra to those in memory, unless they are there or too large.
   subroutine insert(self, key, spectrum)
     class(kernel_cache_t), intent(inout) :: self
     type(kernel_key_t), intent(in) :: key
@@ -233,14 +237,14 @@ contains
       if (associated(self%entry(i)%spectrum)) cycle
       self%entry(i)%key = key
       self%entry(i)%spectrum => spectrum
-      call spectrum%hold()
+      call spectrum%retain()
       call touch(self, i)
-      self%held = self%held + spectrum%bytes()
+      self%stored = self%stored + spectrum%bytes()
       return
     end do
   end subroutine insert
 
-  !> Drop what was not used for longest until there is an empty place and so many bytes fit.
+  !> Drop what was not used for longest until there is an empty place and as many bytes fit.
   subroutine make_room(self, bytes)
     class(kernel_cache_t), intent(inout) :: self
     integer(int64), intent(in) :: bytes
@@ -255,12 +259,13 @@ contains
         if (oldest == 0) oldest = i
         if (self%entry(i)%used < self%entry(oldest)%used) oldest = i
       end do
-      if (k == 0 .or. (k < n_entry .and. self%held + bytes <= self%bound)) return
-      self%held = self%held - self%entry(oldest)%spectrum%bytes()
+      if (k == 0 .or. (k < n_entry .and. self%stored + bytes <= self%bound)) return
+      self%stored = self%stored - self%entry(oldest)%spectrum%bytes()
       call release(self%entry(oldest)%spectrum)
     end do
   end subroutine make_room
 
+  !> Record a fault of the folder.
   subroutine complain(self, complaint)
     class(kernel_cache_t), intent(inout) :: self
     character(len=*), intent(in) :: complaint

@@ -1,8 +1,8 @@
-!> Spectra of kernels in files: one a file, complete or not there at all.
+!> Files of spectra of kernels: a file is complete, or does not exist.
 !>
-!> A file is written under another name and renamed; its head says what it holds and who made it, and has a hash
-!> of all of it. What is not as expected is not taken, nor what another user may have written, unless files are
-!> shared. Files are written by C, since Fortran's run-time library does not tell of a full disk.
+!> A file is written under another name and renamed; its head contains the key of the spectra, program and machine, and a hash
+!> of the whole file. Files that differ from what is expected are ignored, and so are those that another user may have written,
+!> unless files are shared. Files are written by C, since Fortran's run-time library does not report a full disk.
 module hc_spectrum_file
   use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char, c_size_t, c_int64_t, c_ptr, &
                                          c_null_ptr, c_loc, c_associated, c_f_pointer
@@ -17,15 +17,16 @@ module hc_spectrum_file
   !> The first word of a file, and its layout: to be raised whenever that, or the order of the values, changes.
   character(len=24), parameter :: magic = 'hexcontact kernels'
   integer(int64), parameter :: layout = 2
-  !> Length of the text that says who made a file.
+  !> Length of the text for program and machine.
   integer, parameter :: maker_length = 256
   !> Words of what is known of a head beforehand, and of all of it: bytes of a value, shape and hash come after.
   integer, parameter :: n_known = 13 + maker_length/8, n_head = n_known + 5
-  !> What `open_file` says.
+  !> Status of `open_file`.
   integer(c_int), parameter :: absent = 1, foreign = 3
 
   ! of posix.c, xxh64.c and stdio.h
   interface
+    !> Open a file for reading (posix.c)
     type(c_ptr) function open_file(path, shared, bytes, status) bind(c, name='hexcontact_open')
       import :: c_ptr, c_char, c_int, c_int64_t
       character(kind=c_char), intent(in) :: path(*)
@@ -34,11 +35,13 @@ module hc_spectrum_file
       integer(c_int), intent(out) :: status
     end function open_file
 
+    !> Create a file that only its owner may write (posix.c)
     type(c_ptr) function create_file(path) bind(c, name='hexcontact_create')
       import :: c_ptr, c_char
       character(kind=c_char), intent(in) :: path(*)
     end function create_file
 
+    !> Hash bytes (xxh64.c)
     pure integer(c_int64_t) function xxh64(words, bytes, seed) bind(c, name='hexcontact_xxh64')
       import :: c_int64_t, c_size_t
       integer(c_int64_t), intent(in) :: words(*)
@@ -46,6 +49,7 @@ module hc_spectrum_file
       integer(c_int64_t), value :: seed
     end function xxh64
 
+    !> Read from a stream (C)
     integer(c_size_t) function fread(items, bytes, n, stream) bind(c, name='fread')
       import :: c_ptr, c_size_t
       type(c_ptr), value :: items
@@ -53,6 +57,7 @@ module hc_spectrum_file
       type(c_ptr), value :: stream
     end function fread
 
+    !> Write to a stream (C)
     integer(c_size_t) function fwrite(items, bytes, n, stream) bind(c, name='fwrite')
       import :: c_ptr, c_size_t
       type(c_ptr), value :: items
@@ -60,16 +65,19 @@ module hc_spectrum_file
       type(c_ptr), value :: stream
     end function fwrite
 
+    !> Close a stream (C)
     integer(c_int) function fclose(stream) bind(c, name='fclose')
       import :: c_ptr, c_int
       type(c_ptr), value :: stream
     end function fclose
 
+    !> Rename a file (C)
     integer(c_int) function rename_file(from, onto) bind(c, name='rename')
       import :: c_int, c_char
       character(kind=c_char), intent(in) :: from(*), onto(*)
     end function rename_file
 
+    !> Remove a file (C)
     integer(c_int) function remove_file(path) bind(c, name='remove')
       import :: c_int, c_char
       character(kind=c_char), intent(in) :: path(*)
@@ -78,7 +86,7 @@ module hc_spectrum_file
 
 contains
 
-  !> Name of the file of some kernels; nothing else has the same but by a rare chance, which the head rules out.
+  !> Return the name of the file of some kernels; others have the same by a rare chance only, which the head rules out.
   pure function file_name(key, maker) result(name)
     !> What the kernels depend on
     type(kernel_key_t), intent(in) :: key
@@ -91,7 +99,7 @@ contains
     name = trim(text)
   end function file_name
 
-  !> The part of a head that is known beforehand.
+  !> Return the part of a head that is known beforehand.
   pure function known_head(key, maker) result(head)
     type(kernel_key_t), intent(in) :: key
     character(len=*), intent(in) :: maker
@@ -110,11 +118,11 @@ contains
     type(kernel_key_t), intent(in) :: key
     !> Program and machine
     character(len=*), intent(in) :: maker
-    !> Files of other users are taken, too
+    !> Accept files of other users
     logical, intent(in) :: shared
-    !> The spectra, not associated if they cannot be had
+    !> The spectra; not associated if there are none
     type(kernel_spectrum_t), pointer, intent(out) :: spectrum
-    !> Why a file that is there was not taken
+    !> Why an existing file was ignored
     character(len=:), allocatable, intent(out) :: complaint
 
     integer(int64), target :: head(n_head)
@@ -140,7 +148,7 @@ contains
     if (fclose(stream) /= 0) complaint = path//' cannot be closed'
   end subroutine read_kernels
 
-  !> Read the values of spectra, up to the end of the file; not associated if they are not as they should be.
+  !> Read the values of spectra, up to the end of the file; not associated if they are damaged.
   subroutine read_values(stream, bytes, head, spectrum)
     type(c_ptr), intent(in) :: stream
     !> Bytes that the file has for them
@@ -188,11 +196,11 @@ contains
     character(len=*), intent(in) :: maker
     !> The spectra
     type(kernel_spectrum_t), intent(in) :: spectrum
-    !> A word for the name of the file while it is written, that nobody else has
+    !> Word for the name of the file while it is written, of this process alone
     character(len=*), intent(in) :: word
     !> Bytes that were written
     integer(int64), intent(out) :: bytes
-    !> That it failed
+    !> Why it failed
     character(len=:), allocatable, intent(out) :: complaint
 
     integer(int64), target :: head(n_head)
@@ -227,7 +235,7 @@ contains
     end if
   end subroutine write_kernels
 
-  !> The values of spectra as whole words: their number is a multiple of four.
+  !> Return the values of spectra as whole words: their number is a multiple of four.
   function words_of(spectrum) result(words)
     type(kernel_spectrum_t), intent(in), target :: spectrum
     integer(int64), pointer, contiguous :: words(:)
@@ -239,7 +247,7 @@ contains
     call c_f_pointer(start, words, [spectrum%bytes()/8])
   end function words_of
 
-  !> Hash of words, and of what was hashed before.
+  !> Hash words, and what was hashed before.
   pure integer(int64) function hash_of(words, before)
     integer(int64), intent(in), contiguous :: words(:)
     !> Hash of what stands before them; 0: nothing does

@@ -5,7 +5,7 @@
 !> nodes not fall any more, one node at a time is exchanged (Murty's rule, with
 !> which the iteration ends for every positive definite matrix).
 !>
-!> Equations: docs/theory/normal_contact.md, (N1).
+!> Equations: docs/theory/normal_contact.md, (N1), (N6).
 module hc_direct_contact
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status, raise
@@ -18,8 +18,9 @@ module hc_direct_contact
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, force_control, &
     sweeps_used_up, no_progress
-  use hc_contact_residuals, only: normal_self_compliance, conclude
+  use hc_contact_residuals, only: normal_self_compliance, complete_state
   use hc_contact_solver, only: contact_solver_t
+  use hc_normal_law, only: normal_law_t, unilateral_t
   implicit none
   private
 
@@ -35,6 +36,8 @@ module hc_direct_contact
     logical, allocatable :: candidate(:, :)
     !> Self-compliance of a node [m/Pa]
     real(wp) :: compliance = 0.0_wp
+    !> Law of contact
+    class(normal_law_t), allocatable :: law
     type(options_t) :: options
   contains
     procedure :: solve_step
@@ -45,7 +48,7 @@ module hc_direct_contact
 contains
 
   !> Flexibility of a problem.
-  subroutine new_direct_contact(self, lattice, pair, initial_gap, candidate, error, options)
+  subroutine new_direct_contact(self, lattice, pair, initial_gap, candidate, error, options, law)
     !> Problem to be set up
     type(direct_contact_t), intent(out) :: self
     !> Lattice and window
@@ -60,9 +63,18 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Tolerances, caps and tuning numbers
     type(options_t), intent(in), optional :: options
+    !> Law of contact; absent: unilateral contact
+    class(normal_law_t), intent(in), optional :: law
 
     if (present(options)) self%options = options
     call check_problem(lattice, pair, initial_gap, candidate, error)
+    if (allocated(error)) return
+    allocate (unilateral_t :: self%law)
+    if (present(law)) then
+      deallocate (self%law)
+      allocate (self%law, source=law)
+    end if
+    call self%law%check(error)
     if (allocated(error)) return
     self%initial_gap = initial_gap
     self%candidate = candidate
@@ -111,9 +123,9 @@ contains
     !> Contact area to start from (n_col, n_row); absent: where the undeformed bodies would overlap
     logical, intent(in), optional :: start(:, :)
 
-    real(wp), allocatable :: h(:), p(:)
+    real(wp), allocatable :: h(:), p(:), compliance(:), offset(:)
     logical, allocatable :: candidate(:), active(:), wrong(:)
-    real(wp) :: delta, gap(self%flexibility%lattice%size())
+    real(wp) :: delta, worst, gap(self%flexibility%lattice%size())
     integer :: n, fewest, left
 
     call check_target([control], [target], tolerance, max_sweeps, error)
@@ -130,7 +142,7 @@ contains
     h = reshape(self%initial_gap, [n])
     candidate = reshape(self%candidate, [n])
     delta = minval(h, mask=candidate)
-    allocate (p(n), source=0.0_wp)
+    allocate (p(n), compliance(n), offset(n), source=0.0_wp)
     allocate (wrong(n), source=.false.)
     if (present(start)) then
       active = candidate .and. reshape(start, [n])
@@ -147,10 +159,17 @@ contains
 
     do while (any(active) .and. state%sweeps < max_sweeps)
       state%sweeps = state%sweeps + 1
-      call solve_active(self, control, target, h, active, p, delta, error)
+      call solve_active(self, control, target, h + offset, compliance, active, p, delta, error)
       if (allocated(error)) return
       call find_gap(self, p, h - delta, gap, error)
       if (allocated(error)) return
+      if (self%law%is_compliant()) then
+        worst = 0.0_wp
+        call self%law%violation(1, self%compliance, p, gap, candidate, worst)
+        if (worst <= self%options%direct%final_accuracy*tolerance*maxval(p)) exit
+        call linearize_law(self, p, gap, candidate, active, compliance, offset)
+        cycle
+      end if
 
       ! the gap of a node in contact is zero up to rounding, which must not count as penetration
       wrong = (active .and. p < 0.0_wp) .or. (candidate .and. .not. active .and. gap < 0.0_wp)
@@ -165,10 +184,32 @@ contains
     state%gap = reshape(gap, shape(state%gap))
     state%motion(normal) = delta
     state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
-    call conclude(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance, &
-                  field_space_t(), error)
+    call complete_state(state, self%flexibility%lattice, self%candidate, self%compliance, control, target, tolerance, &
+                  field_space_t(), error, self%law)
     state%operator_applications = self%flexibility%applications
   end subroutine solve
+
+  !> Nodes in contact, and springs of a compliant law that is linearised about the present pressure and gap.
+  pure subroutine linearize_law(self, p, gap, candidate, active, compliance, offset)
+    class(direct_contact_t), intent(in) :: self
+    !> Pressure [Pa] and gap [m]
+    real(wp), intent(in), contiguous :: p(:), gap(:)
+    !> Nodes that may come into contact
+    logical, intent(in), contiguous :: candidate(:)
+    !> Active nodes
+    logical, intent(inout), contiguous :: active(:)
+    !> Compliance [m/Pa] and offset [m] of each spring
+    real(wp), intent(out), contiguous :: compliance(:), offset(:)
+    real(wp) :: r, softest
+
+    associate (options => self%options%contact, pair => self%flexibility%pair, lattice => self%flexibility%lattice)
+      r = options%classification_scale/(2.0_wp*pi*pair%lambda_1*sqrt(lattice%cell_area()*count(active)/pi))
+      softest = options%softest_layer*(self%compliance + self%law%compliance_under(maxval(abs(p))))
+    end associate
+    call self%law%find_contact(r, p, gap, candidate, active)
+    if (.not. any(active)) active = candidate .and. gap <= minval(gap, mask=candidate)
+    call self%law%linearize(1, r, softest, p, gap, active, compliance, offset)
+  end subroutine linearize_law
 
   !> Exchange the wrong nodes; one only as soon as the number of them does not fall any more.
   pure subroutine exchange(wrong, stalled_exchanges, fewest, left, active)
@@ -198,7 +239,7 @@ contains
     end if
   end subroutine exchange
 
-  !> Nodes that the undeformed bodies would overlap on; about twice the contact area of a sphere.
+  !> Nodes that the undeformed bodies would overlap on well; about 1.4 times the contact area of a sphere.
   !>
   !> Under a load the overlap is that at which a flat punch of the same area
   !> would reach the rim of the overlap: mean initial gap + P/(2 E* a) = overlap.
@@ -216,6 +257,9 @@ contains
     !> Nodes that may come into contact
     logical, intent(in) :: candidate(:)
     logical :: active(size(h))
+    !> Share of the overlap that the gap at the edge of a contact never exceeds: it is 2/pi for a cone, 1/2 for a sphere, and less
+    !> for blunter bodies (Sneddon, Int. J. Eng. Sci. 3, 1965)
+    real(wp), parameter :: edge_share = 0.65_wp
     real(wp) :: low, high, overlap, radius
     integer :: i
 
@@ -235,18 +279,19 @@ contains
       end do
       overlap = high
     end if
-    active = candidate .and. h <= overlap
+    low = minval(h, mask=candidate)
+    active = candidate .and. h <= low + edge_share*(overlap - low)
   end function first_guess
 
-  !> Pressure that closes the gap on the active nodes: K p = approach - h.
-  subroutine solve_active(self, control, target, h, active, p, delta, error)
+  !> Pressure that closes the gap on the active nodes, but for what their springs give way: (K + C) p = approach - h.
+  subroutine solve_active(self, control, target, h, compliance, active, p, delta, error)
     class(direct_contact_t), intent(in) :: self
     !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
-    !> Initial gap [m]
-    real(wp), intent(in) :: h(:)
+    !> Initial gap [m], and compliance of the springs [m/Pa]
+    real(wp), intent(in) :: h(:), compliance(:)
     !> Active nodes
     logical, intent(in) :: active(:)
     !> Pressure, zero off the active nodes [Pa]
@@ -272,6 +317,7 @@ contains
     !$omp parallel do if (n > 1000)
     do i = 1, n
       matrix(:i, i) = self%flexibility%normal_influence(node(:i), node(i))
+      matrix(i, i) = matrix(i, i) + compliance(node(i))
     end do
     !$omp end parallel do
     rhs(:, 1) = 1.0_wp

@@ -14,12 +14,14 @@ module hc_direct_friction
   use hc_error, only: error_t
   use hc_options, only: direct_options_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
   use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
     normal, along_x, force_control, displacement_control, loads_not_carried
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
-  use hc_load_constraints, only: overloads, hold_nodes
+  use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: first_guess, exchange
+  use hc_area_factors, only: area_factors_t
   use hc_direct_system, only: direct_iterate_t, infinite, unloaded, solve_area
   implicit none
   private
@@ -29,7 +31,12 @@ module hc_direct_friction
   !> A contact problem with friction and its flexibility.
   type, extends(friction_solver_t) :: direct_friction_t
     private
+    !> Influence coefficients for matrices
     type(dense_flexibility_t) :: flexibility
+    !> Products over the window
+    type(fft_flexibility_t) :: operator
+    !> Factors of the last contact area
+    type(area_factors_t) :: factors
   contains
     procedure :: solve_step
     procedure :: displacements
@@ -48,6 +55,8 @@ contains
 
     self%problem = problem
     call new_dense_flexibility(self%flexibility, problem%lattice, problem%pair, error)
+    if (allocated(error)) return
+    call new_fft_flexibility(self%operator, problem%lattice, problem%pair, error, space=problem%space)
   end subroutine new_direct_friction
 
   subroutine displacements(self, pressure, traction, displacement, error)
@@ -56,7 +65,7 @@ contains
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
 
-    call self%problem%displacements(self%flexibility, pressure, traction, displacement, error)
+    call self%problem%displacements(self%operator, pressure, traction, displacement, error)
   end subroutine displacements
 
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
@@ -78,28 +87,31 @@ contains
       return
     end if
     options = self%problem%options%direct
+    ! with rows of the step before, the last bits would depend on whether the run was interrupted
+    call self%factors%clear()
     call new_friction_state(state, self%problem%lattice)
-    self%flexibility%applications = 0.0_wp
+    self%operator%applications = 0.0_wp
     n = self%problem%lattice%size()
     it%initial_gap = reshape(self%problem%initial_gap, [n])
     it%candidate = reshape(self%problem%candidate, [n])
     it%reference = reshape(reference, [n, 2])
+    it%accuracy = options%first_accuracy
     it%motion = merge(target%value, start%motion, target%control == displacement_control)
-    allocate (it%p(n), it%compliance(n), source=0.0_wp)
+    allocate (it%p(n), it%compliance(n), it%spring(n), it%offset(n), source=0.0_wp)
     allocate (it%q(n, 2), it%direction(2, n), source=0.0_wp)
     allocate (it%zone(n), source=separated)
 
     if (any(start%pressure > 0.0_wp)) then
       call continue_from(self, start, it, error)
     else
-      call begin(self, target, it, error)
+      call set_start(self, target, it, error)
     end if
     unsupported = 0
     share = 1.0_wp
     do sweep = 1, max_sweeps
       if (allocated(error)) return
       before = it
-      ! as long as stick and slip are wrong a settled area is not worth its price
+      ! while stick and slip are wrong, iterating the contact area to its end costs more than it saves
       call find_area(self, target, sweep, it, error)
       if (allocated(error)) return
       if (is_unsupported(self%problem, it)) then
@@ -108,13 +120,15 @@ contains
           before%solves = it%solves
           it = before
           share = options%cautious_share*share
-          call hold_nodes(self%problem%options%contact%held_share, it%compliance, it%zone)
+          call fix_in_stick(self%problem%space, self%problem%options%contact%fixed_share, it%compliance, it%zone)
           call find_area(self, target, sweep, it, error)
           if (allocated(error)) return
         end if
       end if
       call record(self, reference, target, tolerance, it, state, error)
       if (allocated(error) .or. state%converged) exit
+      it%accuracy = min(it%accuracy, max(options%last_accuracy*tolerance, options%inner_accuracy* &
+                                         max(state%residual_normal, state%residual_tangential)))
       if (unsupported > 0 .or. sweep == max_sweeps) then
         state%sliding = overloads(self%problem, target, state%pressure, state%residual_normal)
         if (state%sliding .or. unsupported == options%max_unsupported) exit
@@ -126,7 +140,7 @@ contains
   end subroutine solve_step
 
   !> First contact: without shear traction, and then against the slip that its pressure causes.
-  subroutine begin(self, target, it, error)
+  subroutine set_start(self, target, it, error)
     class(direct_friction_t), intent(inout) :: self
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
@@ -154,7 +168,7 @@ contains
       it%ds(:, i) = it%ds(:, i) - mean
     end do
     call classify(self%problem, self%problem%options%direct%cautious_share, it)
-  end subroutine begin
+  end subroutine set_start
 
   !> Tractions, and contact with a ring around it, of the state to start from.
   subroutine continue_from(self, start, it, error)
@@ -255,18 +269,25 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     logical, dimension(size(it%p)) :: wrong, before
-    real(wp) :: negligible
+    real(wp) :: negligible, violation
     integer :: i, fewest, left, try
 
     fewest = huge(1)
     left = self%problem%options%direct%stalled_exchanges
     do try = 1, max_tries
-      call solve_area(self%problem, self%flexibility, target, it, error)
+      if (self%problem%normal_law%is_compliant() .and. any(abs(it%p) > 0.0_wp)) call linearize_law(self%problem, it)
+      call solve_area(self%problem, self%flexibility, self%operator, self%factors, target, it, error)
       if (allocated(error)) return
       it%solves = it%solves + 1
       call evaluate(self, it, error)
       if (allocated(error)) return
-      negligible = self%problem%options%direct%pressure_rounding*maxval(it%p)
+      if (self%problem%normal_law%is_compliant()) then
+        violation = 0.0_wp
+        call self%problem%normal_law%violation(1, self%problem%normal_compliance, it%p, it%gap, it%candidate, violation)
+        if (violation <= self%problem%options%direct%settled_spring*maxval(it%p)) return
+        cycle
+      end if
+      negligible = max(self%problem%options%direct%pressure_rounding, it%accuracy)*maxval(it%p)
       wrong = merge(it%p < -negligible, &
                     it%candidate .and. it%gap < -negligible*self%problem%normal_compliance, it%contact)
       if (.not. any(wrong)) return
@@ -278,6 +299,27 @@ contains
       end do
     end do
   end subroutine find_area
+
+  !> Nodes in contact, and springs of a compliant law, that the present pressure and gap call for.
+  pure subroutine linearize_law(problem, it)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Iterate
+    type(direct_iterate_t), intent(inout) :: it
+    logical :: before(size(it%p))
+    real(wp) :: r
+    integer :: i
+
+    before = it%contact
+    r = problem%normal_classification_parameter(count(it%contact))
+    call problem%normal_law%find_contact(r, it%p, it%gap, it%candidate, it%contact)
+    if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
+    call problem%normal_law%linearize(1, r, problem%softest_spring(maxval(abs(it%p))), it%p, it%gap, it%contact, &
+                                      it%spring, it%offset)
+    do i = 1, size(it%p)
+      if (it%contact(i) .and. .not. before(i)) call enter(problem, it, i)
+    end do
+  end subroutine linearize_law
 
   !> Gap and slip under the tractions and motions of an iterate.
   subroutine evaluate(self, it, error)
@@ -315,7 +357,7 @@ contains
     real(wp) :: displacement(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3)
     real(wp) :: p(size(it%p)), q(size(it%p), 2), unit
 
-    call self%problem%normal_law%project(1, it%p, p)
+    call self%problem%normal_law%project(it%p, p)
     unit = maxval(p)
     if (unit > 0.0_wp) unit = 1.0_wp/unit
     call self%problem%friction%project(1, unit, p, it%q(:, 1), it%q(:, 2), q(:, 1), q(:, 2))
@@ -324,9 +366,9 @@ contains
     state%motion = it%motion
     call self%displacements(state%pressure, state%traction, displacement, error)
     if (allocated(error)) return
-    call self%problem%conclude(target, tolerance, reference, displacement, state)
+    call self%problem%complete_state(target, tolerance, reference, displacement, state)
     state%sweeps = it%solves
-    state%operator_applications = self%flexibility%applications
+    state%operator_applications = self%operator%applications
   end subroutine record
 
 end module hc_direct_friction

@@ -2,14 +2,18 @@
 !>
 !> Equations: docs/theory/friction.md, (F7).
 module hc_direct_system
-  use, intrinsic :: iso_fortran_env, only: real32
+  use, intrinsic :: iso_fortran_env, only: real32, int64
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_memory, only: require_memory
   use hc_lapack, only: dsgesv, dgelss
   use hc_block_cholesky, only: solve_blocks
+  use hc_flexibility, only: flexibility_t
   use hc_flexibility_dense, only: dense_flexibility_t
+  use hc_area_factors, only: area_factors_t
+  use hc_area_system, only: solve_with_factors
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
-  use hc_coulomb, only: normal_to
+  use hc_disc_law, only: normal_to
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
   implicit none
@@ -39,10 +43,14 @@ module hc_direct_system
     !> compliance across it; a node with an infinite one has no traction across
     integer, allocatable :: zone(:)
     real(wp), allocatable :: direction(:, :), compliance(:)
+    !> Under a compliant law of contact: compliance [m/Pa] and offset [m] of the spring along the normal, 0 off the contact
+    real(wp), allocatable :: spring(:), offset(:)
     !> The tractions carry all prescribed loads
     logical :: carried = .true.
     !> Linear systems solved so far
     integer :: solves = 0
+    !> Residual that the next one may leave, relative to the largest pressure or traction
+    real(wp) :: accuracy = 0.0_wp
   end type direct_iterate_t
 
 contains
@@ -64,12 +72,16 @@ contains
   !> The unknowns are p on the contact, q_x and q_y in stick, tau in slip, in this order, and the changes
   !> of the rigid motions whose loads are prescribed. Unknown k acts with `traction(:, k)`, and its row
   !> adds up the displacements by `weight(:, k)`: they differ by the mu e in q = mu p e + tau t. Lengths are
-  !> divided by the self-compliance of a node, so that every number is a pressure.
-  subroutine solve_area(problem, flexibility, target, it, error)
+  !> divided by the self-compliance of a node, so that every number is a pressure. Kept factors serve where they are of use,
+  !> those of the whole matrix else.
+  subroutine solve_area(problem, flexibility, operator, factors, target, it, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
-    !> Its flexibility
+    !> Its flexibility: coefficients, and products
     type(dense_flexibility_t), intent(in) :: flexibility
+    class(flexibility_t), intent(inout) :: operator
+    !> Factors of the last area, of this one on return
+    type(area_factors_t), intent(inout) :: factors
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Iterate
@@ -78,26 +90,37 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(driven_motions_t) :: driven
-    real(wp), allocatable :: matrix(:, :), rhs(:, :), unknown(:, :), weight(:, :), traction(:, :), resultant(:, :), &
-                             rigid(:, :), direction(:, :)
-    real(real32), allocatable :: first(:, :)
+    real(wp), allocatable :: rhs(:, :), unknown(:, :), weight(:, :), traction(:, :), resultant(:, :), &
+                             rigid(:, :), direction(:, :), spring(:), change(:)
     logical :: solved
     integer, allocatable :: contact(:), stuck(:), sliding(:), node(:), place(:)
-    real(wp) :: load(n_motion), slope(size(it%p))
+    real(wp) :: load(n_motion), fixed(size(it%p), 2)
+    real(wp), dimension(size(it%p)) :: slope, bound, ahead, aside
+    real(wp), allocatable :: moved(:, :)
     integer :: i, k, n, n_p, n_free, stat
 
     contact = pack([(i, i=1, size(it%p))], it%contact)
     stuck = pack(contact, it%zone(contact) == stick)
     sliding = pack(contact, it%zone(contact) == slip .and. it%compliance(contact) < infinite)
+    solved = size(contact) > problem%options%direct%most_explicit .and. .not. problem%normal_law%is_compliant() &
+             .and. .not. problem%pair%tangential_layer > 0.0_wp
+    if (solved) then
+      call factorize_area(problem, flexibility, contact, stuck, sliding, it, factors, solved, error)
+      if (allocated(error)) return
+    end if
+    if (solved) then
+      contact = factors%order
+      stuck = contact(:size(stuck))
+    end if
     allocate (node, source=[contact, stuck, stuck, sliding])
-    place = unpack([(i, i=1, size(contact))], it%contact, 0)
+    allocate (place(size(it%p)), source=0)
+    place(contact) = [(i, i=1, size(contact))]
     place = place(node)
     call new_driven_motions(driven, problem, target, reshape(it%contact, problem%lattice%extent))
     n = size(node)
     n_p = size(contact)
     n_free = size(driven%motion) + merge(1, 0, target%control(normal) == force_control)
-    allocate (matrix(n, n), rhs(n, 0:n_free), unknown(n, 0:n_free), weight(3, n), resultant(n, n_free), &
-              first(n_p, n_p), stat=stat)
+    allocate (rhs(n, 0:n_free), unknown(n, 0:n_free), weight(3, n), resultant(n, n_free), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, no_memory)
       return
@@ -110,15 +133,25 @@ contains
       weight(along_x:, k) = normal_to(it%direction(:, node(k)))
     end do
     traction = weight
+    fixed = 0.0_wp
     call problem%friction%find_slopes(1, it%p, slope)
+    call problem%friction%find_bounds(1, it%p, bound)
+    call problem%friction%find_boundary(it%direction, ahead, aside)
     do k = 1, n_p
       if (it%zone(node(k)) == stick .or. .not. problem%friction%is_bounded()) cycle
-      traction(along_x:, k) = slope(node(k))*it%direction(:, node(k))
+      associate (i => node(k), e => it%direction(:, node(k)))
+        traction(along_x:, k) = slope(i)*(ahead(i)*e + aside(i)*normal_to(e))
+        ! what a bound that is not proportional to the pressure has besides
+        if (it%p(i) > 0.0_wp) fixed(i, :) = (bound(i) - slope(i)*it%p(i))*(ahead(i)*e + aside(i)*normal_to(e))
+      end associate
     end do
+    call displace_fixed(problem, flexibility, contact, fixed, moved)
 
     rigid = unloaded(problem, it)
     do k = 1, n
       rhs(k, 0) = -dot_product(weight(:, k), rigid(node(k), :))/problem%normal_compliance
+      if (k <= n_p) rhs(k, 0) = rhs(k, 0) - it%offset(node(k))/problem%normal_compliance
+      if (allocated(moved)) rhs(k, 0) = rhs(k, 0) - dot_product(weight(:, k), moved(:, place(k)))
     end do
     if (n_free > size(driven%motion)) then
       load(1) = target%value(normal)/problem%lattice%cell_area()
@@ -131,29 +164,140 @@ contains
       direction = reshape(driven%direction(i, problem), [size(it%p), 2])
       rhs(:, k) = sum(weight(along_x:, :)*transpose(direction(node, :)), dim=1)
       resultant(:, k) = sum(traction(along_x:, :)*transpose(direction(node, :)), dim=1)
+      load(k) = load(k) - sum(fixed*direction)
     end do
-    call assemble(problem, flexibility, contact, place, weight, traction, matrix)
-    do k = n_p + 2*size(stuck) + 1, n
-      matrix(k, k) = matrix(k, k) + it%compliance(node(k))/problem%normal_compliance
-    end do
-    do i = 1, n_p
-      first(:, i) = real(flexibility%normal_influence(contact, contact(i))/problem%normal_compliance, real32)
-    end do
-    call solve_blocks(n, n_p, 1 + n_free, first, matrix, rhs, unknown, solved)
-    if (.not. solved) then
-      call solve_whole(matrix, rhs, unknown, error)
+    allocate (spring(n), source=0.0_wp)
+    spring(:n_p) = it%spring(contact)/problem%normal_compliance
+    spring(n_p + 2*size(stuck) + 1:) = it%compliance(sliding)/problem%normal_compliance
+    if (solved) then
+      unknown(:, 0) = [it%p(contact), it%q(stuck, 1), it%q(stuck, 2), spread(0.0_wp, 1, size(sliding))]
+      call solve_with_factors(problem, operator, factors, node, weight, traction, spring, rhs, resultant, load(:n_free), &
+                              it%accuracy, unknown(:, 0), change, solved, error)
       if (allocated(error)) return
     end if
-
-    call satisfy_loads(problem, driven, load(:n_free), resultant, unknown, it, error)
-    if (allocated(error)) return
+    if (solved) then
+      call move_motions(problem, driven, change, it)
+      it%carried = are_carried(problem, load(:n_free), resultant, unknown(:, 0))
+    else
+      call solve_whole_area(problem, flexibility, contact, place, weight, traction, spring, rhs, unknown, error)
+      if (allocated(error)) return
+      call satisfy_loads(problem, driven, load(:n_free), resultant, unknown, it, error)
+      if (allocated(error)) return
+    end if
     it%p = 0.0_wp
-    it%q = 0.0_wp
+    it%q = fixed
     it%p(contact) = unknown(:n_p, 0)
     do k = 1, n
       it%q(node(k), :) = it%q(node(k), :) + unknown(k, 0)*traction(along_x:, k)
     end do
   end subroutine solve_area
+
+  !> Factorize the area as it stands.
+  subroutine factorize_area(problem, flexibility, contact, stuck, sliding, it, factors, done, error)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Its flexibility
+    type(dense_flexibility_t), intent(in) :: flexibility
+    !> Nodes in contact, those that stick, those that slip with a spring across
+    integer, intent(in) :: contact(:), stuck(:), sliding(:)
+    !> Iterate
+    type(direct_iterate_t), intent(in) :: it
+    !> Factors of the last area, of this one on return
+    type(area_factors_t), intent(inout) :: factors
+    !> False: not positive definite in single precision
+    logical, intent(out) :: done
+    !> Allocated if there is not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: key(size(stuck)), bound(size(it%p)), side(2, size(sliding))
+    logical :: other(size(it%p))
+    integer :: i
+
+    call problem%friction%find_bounds(1, it%p, bound)
+    do i = 1, size(stuck)
+      ! how far a node is from slip and from the edge of the contact
+      key(i) = it%p(stuck(i))/max(maxval(it%p), tiny(1.0_wp))
+      if (bound(stuck(i)) > 0.0_wp) key(i) = min(key(i), 1.0_wp - norm2(it%q(stuck(i), :))/bound(stuck(i)))
+    end do
+    do i = 1, size(sliding)
+      side(:, i) = normal_to(it%direction(:, sliding(i)))
+    end do
+    other = it%contact
+    other(stuck) = .false.
+    other(sliding) = .false.
+    associate (pair => problem%pair, unit => problem%normal_compliance)
+      call factors%factorize(flexibility, unit, 1.0_wp + 0.5_wp*pair%lambda_5/pair%lambda_1, stuck, key, sliding, &
+                             pack(contact, other(contact)), side, it%compliance(sliding)/unit, done, error)
+    end associate
+  end subroutine factorize_area
+
+  !> Solve (F7) with the factors of the whole matrix, for the present motions and for unit motions.
+  subroutine solve_whole_area(problem, flexibility, contact, place, weight, traction, spring, rhs, unknown, error)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Its flexibility
+    type(dense_flexibility_t), intent(in) :: flexibility
+    !> Nodes in contact, and the place of each unknown's node among them
+    integer, intent(in) :: contact(:), place(:)
+    !> Displacements that each row adds up, traction of each unknown (3, size(place))
+    real(wp), intent(in) :: weight(:, :), traction(:, :)
+    !> Springs (size(place))
+    real(wp), intent(in) :: spring(:)
+    !> Right-hand sides, and unknowns (size(place), 0:)
+    real(wp), intent(in), contiguous :: rhs(:, :)
+    real(wp), intent(out), contiguous :: unknown(:, :)
+    !> Allocated on failure: not enough memory, a singular matrix
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: matrix(:, :)
+    real(real32), allocatable :: first(:, :)
+    logical :: solved
+    integer :: i, n, n_p, stat
+
+    n = size(place)
+    n_p = size(contact)
+    call require_memory(8*int(n, int64)**2 + 4*int(n_p, int64)**2 + 4*int(n - n_p, int64)**2, error)
+    if (allocated(error)) return
+    allocate (matrix(n, n), first(n_p, n_p), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, no_memory)
+      return
+    end if
+    call assemble(problem, flexibility, contact, place, weight, traction, matrix)
+    do i = 1, n
+      matrix(i, i) = matrix(i, i) + spring(i)
+    end do
+    do i = 1, n_p
+      first(:, i) = real(flexibility%normal_influence(contact, contact(i))/problem%normal_compliance, real32)
+      first(i, i) = first(i, i) + real(spring(i), real32)
+    end do
+    call solve_blocks(n, n_p, size(rhs, 2), first, matrix, rhs, unknown, solved, problem%options%direct)
+    if (.not. solved) call solve_whole(matrix, rhs, unknown, error)
+  end subroutine solve_whole_area
+
+  !> Displacements by tractions that do not change with the unknowns, over the self-compliance of a node; not allocated if
+  !> there are none.
+  subroutine displace_fixed(problem, flexibility, contact, fixed, moved)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Its flexibility
+    type(dense_flexibility_t), intent(in) :: flexibility
+    !> Nodes in contact
+    integer, intent(in) :: contact(:)
+    !> Shear tractions of all nodes (n, 2) [Pa]
+    real(wp), intent(in) :: fixed(:, :)
+    !> w, u_x, u_y of the nodes in contact (3, size(contact)) [Pa]
+    real(wp), allocatable, intent(out) :: moved(:, :)
+    real(wp) :: u(3, size(contact))
+    integer :: k
+
+    if (.not. any(abs(fixed) > 0.0_wp)) return
+    allocate (moved(3, size(contact)), source=0.0_wp)
+    do k = 1, size(contact)
+      if (.not. any(abs(fixed(contact(k), :)) > 0.0_wp)) cycle
+      call flexibility%response(contact, contact(k), [0.0_wp, fixed(contact(k), :)]/problem%normal_compliance, u)
+      moved = moved + u
+    end do
+    if (problem%goodman) moved(normal, :) = 0.0_wp
+  end subroutine displace_fixed
 
   !> Solve matrix.unknown = rhs by LU.
   subroutine solve_whole(matrix, rhs, unknown, error)
@@ -199,7 +343,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     real(wp) :: stiffness(n_motion, n_motion), change(n_motion, 1), singular(n_motion), work(64)
-    integer :: n, m, rank, info
+    integer :: n, rank, info
 
     n = size(load)
     if (n == 0) return
@@ -212,14 +356,38 @@ contains
       return
     end if
     rhs(:, 0) = rhs(:, 0) + matmul(rhs(:, 1:), change(:n, 1))
-    it%carried = maxval(abs(load - matmul(rhs(:, 0), resultant))) <= &
-                 problem%options%direct%load_rounding*sum(abs(rhs(:, 0)))
-
-    change(:n, 1) = change(:n, 1)*problem%normal_compliance
-    m = size(driven%motion)
-    if (n > m) it%motion(normal) = it%motion(normal) + change(1, 1)
-    call driven%set_motions(driven%multipliers(it%motion) + change(n - m + 1:n, 1), it%motion)
+    it%carried = are_carried(problem, load, resultant, rhs(:, 0))
+    call move_motions(problem, driven, change(:n, 1), it)
   end subroutine satisfy_loads
+
+  !> Tell whether the unknowns carry the loads, but for rounding errors.
+  pure logical function are_carried(problem, load, resultant, unknown)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Loads over the cell area, loads of unit unknowns (size(unknown), size(load)), unknowns [Pa]
+    real(wp), intent(in) :: load(:), resultant(:, :), unknown(:)
+
+    are_carried = maxval(abs(load - matmul(unknown, resultant))) <= &
+                  problem%options%direct%load_rounding*sum(abs(unknown))
+  end function are_carried
+
+  !> Add changes of the motions that loads drive.
+  subroutine move_motions(problem, driven, change, it)
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> Tangential motions driven by their loads
+    type(driven_motions_t), intent(in) :: driven
+    !> Changes of the approach, if it is driven, and of these, over the self-compliance of a node
+    real(wp), intent(in) :: change(:)
+    !> Iterate
+    type(direct_iterate_t), intent(inout) :: it
+    integer :: n, m
+
+    n = size(change)
+    m = size(driven%motion)
+    if (n > m) it%motion(normal) = it%motion(normal) + change(1)*problem%normal_compliance
+    call driven%set_motions(driven%multipliers(it%motion) + change(n - m + 1:n)*problem%normal_compliance, it%motion)
+  end subroutine move_motions
 
   !> Matrix of the nodes' mutual influence: weight.K.traction, divided by the self-compliance.
   subroutine assemble(problem, flexibility, contact, place, weight, traction, matrix)

@@ -16,7 +16,7 @@ module hc_edge_form
 
 contains
 
-  !> Integrals of (x - xi)^k (y - eta)^m / rho^j over a triangle, summed over its edges.
+  !> Integrate (x - xi)^k (y - eta)^m / rho^j over a triangle, summed over its edges.
   !>
   !> With t the abscissa along an edge and n the distance of the field point from
   !> its line (positive on the left), homogeneity leaves line integrals (4.5):
@@ -61,7 +61,7 @@ contains
     integral = sign(1.0_rk, twice_area(corner))*integral
   end function edge_form
 
-  !> int t^q r^-j dt from t1 to t2; every difference in a form that keeps its digits.
+  !> Compute int t^q r^-j dt from t1 to t2; every difference in a form without cancellation.
   pure function edge_moments(n, t1, t2, length) result(moment)
     !> Distance of the field point from the line, not zero
     real(rk), intent(in) :: n
@@ -113,7 +113,7 @@ contains
                       0.5_rk*d_tr - 1.5_rk*nn*log_sum + nn*d_t_over_r]
   end function edge_moments
 
-  !> Coefficients in t of (-t c - n s)^k (n c - t s)^m.
+  !> Expand (-t c - n s)^k (n c - t s)^m in powers of t.
   pure function expanded(tangent, n, k, m) result(polynomial)
     !> Direction (c, s) of the edge
     real(rk), intent(in) :: tangent(2)
@@ -141,7 +141,7 @@ contains
     end do
   end function expanded
 
-  !> The linear loads that are 1 at one vertex and 0 at the two others:
+  !> Return the linear loads that are 1 at one vertex and 0 at the two others:
   !> value at the field point and slopes, load = c1 + c2 (x - xi) + c3 (y - eta).
   pure function vertex_loads(corner) result(coefficient)
     !> Vertices relative to the field point, as columns
@@ -160,7 +160,7 @@ contains
     end do
   end function vertex_loads
 
-  !> Twice the area, positive if the vertices run counter-clockwise.
+  !> Compute twice the area, positive if the vertices run counter-clockwise.
   pure real(rk) function twice_area(corner)
     !> Vertices, as columns
     real(rk), intent(in) :: corner(2, 3)
@@ -168,7 +168,7 @@ contains
     twice_area = cross(corner(:, 2) - corner(:, 1), corner(:, 3) - corner(:, 1))
   end function twice_area
 
-  !> Cross product of two vectors of the plane.
+  !> Compute the cross product of two vectors of the plane.
   pure real(rk) function cross(a, b)
     !> Vectors
     real(rk), intent(in) :: a(2), b(2)

@@ -1,4 +1,4 @@
-!> Two elastic bodies reduced to the three constants that contact can feel.
+!> Two elastic bodies reduced to the three constants that matter in contact.
 !>
 !> For bodies with shear moduli G and Poisson's ratios nu (sums over both):
 !>
@@ -17,7 +17,7 @@ module hc_elastic_pair
   implicit none
   private
 
-  public :: material_t, elastic_pair_t, new_elastic_pair, check_pair
+  public :: material_t, elastic_pair_t, new_elastic_pair, check_pair, find_bulk_strain
 
   !> An isotropic elastic or a rigid material.
   type :: material_t
@@ -37,6 +37,8 @@ module hc_elastic_pair
     real(wp) :: lambda_2 = 0.0_wp
     !> Extra tangential compliance [1/Pa]
     real(wp) :: lambda_5 = 0.0_wp
+    !> Displacement that springs between the bodies give way by under a unit shear traction, 1/k_T [m/Pa]
+    real(wp) :: tangential_layer = 0.0_wp
   contains
     !> Effective modulus E* [Pa]
     procedure :: effective_modulus
@@ -50,7 +52,7 @@ module hc_elastic_pair
 
 contains
 
-  !> Compliance constants of two bodies.
+  !> Compute the compliance constants of two bodies.
   pure subroutine new_elastic_pair(pair, body_1, body_2, error)
     !> Pair to be set up
     type(elastic_pair_t), intent(out) :: pair
@@ -73,7 +75,7 @@ contains
     pair%lambda_5 = tangential(body_1) + tangential(body_2)
   end subroutine new_elastic_pair
 
-  !> Refuse constants that no two elastic bodies have; whoever sets them without new_elastic_pair may.
+  !> Refuse constants that no two elastic bodies have, which new_elastic_pair never sets.
   pure subroutine check_pair(pair, error)
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
@@ -83,10 +85,17 @@ contains
 
     sound = all(ieee_is_finite([pair%lambda_1, pair%lambda_2, pair%lambda_5]))
     if (sound) sound = pair%lambda_1 > 0.0_wp .and. abs(pair%lambda_2) < pair%lambda_1 .and. pair%lambda_5 > -pair%lambda_1
-    if (.not. sound) call raise(error, status%invalid_input, 'the elastic constants of the pair: finite numbers with '// &
-                                'lambda_1 > 0, |lambda_2| < lambda_1 and lambda_5 > -lambda_1 expected')
+    if (sound) sound = ieee_is_finite(pair%tangential_layer)
+    if (sound) then
+      if (pair%tangential_layer >= 0.0_wp) return
+      call raise(error, status%invalid_input, 'tangential stiffness of the interface: a positive number expected')
+      return
+    end if
+    call raise(error, status%invalid_input, 'the elastic constants of the pair: finite numbers with '// &
+               'lambda_1 > 0, |lambda_2| < lambda_1 and lambda_5 > -lambda_1 expected')
   end subroutine check_pair
 
+  !> Refuse elastic constants of a body that make no sense.
   pure subroutine check(body, name, error)
     type(material_t), intent(in) :: body
     character(len=*), intent(in) :: name
@@ -104,49 +113,71 @@ contains
     end if
   end subroutine check
 
-  !> (1 - nu)/(2 pi G)
+  !> Find the strain of a bulk stress in the plane of the surface by Hooke's law, and the stress of a direction without strain.
+  pure subroutine find_bulk_strain(body, plane_strain, stress, strain)
+    !> Material of an elastic body
+    type(material_t), intent(in) :: body
+    !> 0: free sides (plane stress); 1, 2: no strain along x, along y
+    integer, intent(in) :: plane_strain
+    !> xx, yy, xy, tension positive; that along the direction without strain is set [Pa]
+    real(wp), intent(inout) :: stress(3)
+    !> xx, yy, xy
+    real(wp), intent(out) :: strain(3)
+
+    associate (nu => body%poisson_ratio)
+      if (plane_strain == 1) stress(1) = nu*stress(2)
+      if (plane_strain == 2) stress(2) = nu*stress(1)
+      strain = [stress(1) - nu*stress(2), stress(2) - nu*stress(1), (1.0_wp + nu)*stress(3)]/body%young_modulus
+      if (plane_strain /= 0) strain(plane_strain) = 0.0_wp ! without rounding errors
+    end associate
+  end subroutine find_bulk_strain
+
+  !> Compute (1 - nu)/(2 pi G)
   elemental real(wp) function normal(body)
     type(material_t), intent(in) :: body
     normal = 0.0_wp
     if (.not. body%rigid) normal = (1.0_wp - body%poisson_ratio)/(2.0_wp*pi*shear_modulus(body))
   end function normal
 
-  !> (1 - 2 nu)/(4 pi G)
+  !> Compute (1 - 2 nu)/(4 pi G)
   elemental real(wp) function coupling(body)
     type(material_t), intent(in) :: body
     coupling = 0.0_wp
     if (.not. body%rigid) coupling = (1.0_wp - 2.0_wp*body%poisson_ratio)/(4.0_wp*pi*shear_modulus(body))
   end function coupling
 
-  !> nu/(2 pi G)
+  !> Compute nu/(2 pi G)
   elemental real(wp) function tangential(body)
     type(material_t), intent(in) :: body
     tangential = 0.0_wp
     if (.not. body%rigid) tangential = body%poisson_ratio/(2.0_wp*pi*shear_modulus(body))
   end function tangential
 
-  !> Shear modulus [Pa]
+  !> Return the shear modulus [Pa]
   elemental real(wp) function shear_modulus(body)
     type(material_t), intent(in) :: body
     shear_modulus = body%young_modulus/(2.0_wp*(1.0_wp + body%poisson_ratio))
   end function shear_modulus
 
+  !> Return E* [Pa]
   elemental real(wp) function effective_modulus(self)
     class(elastic_pair_t), intent(in) :: self
     effective_modulus = 1.0_wp/(pi*self%lambda_1)
   end function effective_modulus
 
+  !> Return Dundurs' beta
   elemental real(wp) function dundurs_beta(self)
     class(elastic_pair_t), intent(in) :: self
     dundurs_beta = self%lambda_2/self%lambda_1
   end function dundurs_beta
 
+  !> Return gamma = lambda_5/lambda_1
   elemental real(wp) function tangential_gamma(self)
     class(elastic_pair_t), intent(in) :: self
     tangential_gamma = self%lambda_5/self%lambda_1
   end function tangential_gamma
 
-  !> A pair of which lambda_1 is one.
+  !> Return the pair over its lambda_1.
   pure type(elastic_pair_t) function scaled(self)
     class(elastic_pair_t), intent(in) :: self
     scaled = elastic_pair_t(1.0_wp, self%beta(), self%gamma())

@@ -16,7 +16,7 @@ module hc_hat_moments
 
 contains
 
-  !> E[z**a conj(z)**b] for z distributed like the hat, a + b <= max_order.
+  !> Compute E[z**a conj(z)**b] for z distributed like the hat, a + b <= max_order.
   pure function hat_moments(edge) result(moment)
     !> Edge directions in the complex plane
     complex(wp), intent(in) :: edge(3)
@@ -54,7 +54,7 @@ contains
     end do
   end function hat_moments
 
-  !> Taylor coefficients of (1 - u)**exponent.
+  !> Compute Taylor coefficients of (1 - u)**exponent.
   pure function binomial_series(exponent) result(c)
     !> Exponent
     real(wp), intent(in) :: exponent
@@ -67,7 +67,7 @@ contains
     end do
   end function binomial_series
 
-  !> Binomial coefficient.
+  !> Compute the binomial coefficient.
   pure real(wp) function binomial(n, k)
     !> Upper and lower argument
     integer, intent(in) :: n, k

@@ -1,7 +1,7 @@
 !> Influence functions of one pyramid of traction on the surface of a half-space.
 !>
 !> The pyramid h is the piecewise linear hat of a lattice node: one at the node,
-!> zero at its six neighbours. With rho the distance to the field point (x, y),
+!> zero at its six neighbors. With rho the distance to the field point (x, y),
 !> five kernels give every displacement of both bodies (Table 8.1):
 !>
 !>     K1  = iint h/rho                    K_x  = iint h (x - xi)/rho^2
@@ -16,13 +16,13 @@
 !> probability density of z = sum_q U_q d_q with U_q uniform on (-1/2, 1/2) and
 !> d_q the three edge directions, so that its moments are coefficients of
 !> product_q sinh(w_q/2)/(w_q/2), w_q = s d_q + t conj(d_q), and the kernels are
-!> power series in 1/z (hc_hat_moments). Both hold for any lattice; lengths are in units of the
+!> power series in 1/z (hc_hat_moments). Both are valid for any lattice; lengths are in units of the
 !> longest edge inside this module.
 !>
 !> Equations: docs/theory/elasticity.md, (E5) to (E13).
 module hc_pyramid_influence
   use hc_precision, only: wp
-  use hc_lattice, only: edge_directions
+  use hc_hat_creases, only: crease_t, hat_creases
   use hc_hat_moments, only: hat_moments, binomial_series, max_order
   implicit none
   private
@@ -33,25 +33,13 @@ module hc_pyramid_influence
   !> Positions of the five kernels in a vector.
   integer, parameter :: k_1 = 1, k_xx = 2, k_xy = 3, k_x = 4, k_y = 5
 
-  !> The moment expansion holds from here on, in longest edges.
+  !> Distance from which the moment expansion is used, in longest edges.
   real(wp), parameter :: far_radius = 3.0_wp
-  !> Number of powers of 1/R^2 that are kept.
+  !> Number of powers of 1/R^2 in the series.
   integer, parameter :: max_power = max_order/2
   !> Beyond band_radius(k) the orders up to 2*band_power(k) suffice (truncation < 3e-16 K1).
   real(wp), parameter :: band_radius(5) = [5.0_wp, 8.0_wp, 20.0_wp, 60.0_wp, 300.0_wp]
   integer, parameter :: band_power(5) = [8, 6, 4, 3, 2]
-
-  !> One family of parallel creases: a spoke through the node and two rims.
-  type :: crease_t
-    !> Unit direction and unit normal
-    real(wp) :: along(2) = 0.0_wp, normal(2) = 0.0_wp
-    !> Length of a rim; the spoke is twice as long
-    real(wp) :: length = 0.0_wp
-    !> Distance of the rims from the node
-    real(wp) :: height = 0.0_wp
-    !> Abscissa of the centre of the rim on the side of the normal
-    real(wp) :: skew = 0.0_wp
-  end type crease_t
 
   !> The pyramid of a lattice: creases and moments, ready for evaluation.
   type :: pyramid_t
@@ -84,39 +72,20 @@ module hc_pyramid_influence
 
 contains
 
-  !> Creases and moments of the pyramid of a lattice.
+  !> Set up creases and moments of the pyramid of a lattice.
   pure subroutine new_pyramid(pyramid, basis)
     !> Pyramid to be set up
     type(pyramid_t), intent(out) :: pyramid
     !> Basis vectors of the lattice as columns [m]
     real(wp), intent(in) :: basis(2, 2)
 
-    real(wp) :: edges(2, 3), rim(2, 3)
-    integer :: q
+    real(wp) :: edges(2, 3)
 
-    edges = edge_directions(basis)
-    pyramid%spacing = maxval(norm2(edges, dim=1))
-    edges = edges/pyramid%spacing
-    pyramid%volume = edges(1, 1)*edges(2, 2) - edges(2, 1)*edges(1, 2)
-    ! centres of the rims on the side to which the normals point
-    rim(:, 1) = edges(:, 2) - 0.5_wp*edges(:, 1)
-    rim(:, 2) = 0.5_wp*edges(:, 2) - edges(:, 1)
-    rim(:, 3) = -0.5_wp*(edges(:, 1) + edges(:, 2))
-    do q = 1, 3
-      associate (crease => pyramid%crease(q))
-        crease%length = norm2(edges(:, q))
-        crease%along = edges(:, q)/crease%length
-        crease%normal = [-crease%along(2), crease%along(1)]
-        crease%height = pyramid%volume/crease%length
-        crease%skew = dot_product(rim(:, q), crease%along)
-        ! a rim is centred on its spoke exactly where the lattice is equilateral
-        if (abs(crease%skew) < 4.0_wp*epsilon(1.0_wp)) crease%skew = 0.0_wp
-      end associate
-    end do
+    call hat_creases(basis, pyramid%crease, edges, pyramid%spacing, pyramid%volume)
     call expand(pyramid, cmplx(edges(1, :), edges(2, :), wp))
   end subroutine new_pyramid
 
-  !> The five kernels at a point relative to the node.
+  !> Compute the five kernels at a point relative to the node.
   pure function kernels(self, x, y) result(k)
     class(pyramid_t), intent(in) :: self
     !> Field point relative to the node [m]
@@ -134,7 +103,7 @@ contains
     end if
   end function kernels
 
-  !> K1 at a point relative to the node [m].
+  !> Compute K1 at a point relative to the node [m].
   pure real(wp) function normal_kernel(self, x, y) result(k)
     class(pyramid_t), intent(in) :: self
     !> Field point relative to the node [m]
@@ -151,13 +120,13 @@ contains
     end if
   end function normal_kernel
 
-  !> Have the edges one length? Then the kernels have the symmetries of a hexagon.
+  !> Return whether the edges have one length: then the kernels have the symmetries of a hexagon.
   pure logical function is_equilateral(self)
     class(pyramid_t), intent(in) :: self
     is_equilateral = self%fold == 6
   end function is_equilateral
 
-  !> Kernels at the offsets i*basis(:, 1) + j*basis(:, 2) with |i| <= n(1), |j| <= n(2).
+  !> Tabulate the kernels at the offsets i*basis(:, 1) + j*basis(:, 2) with |i| <= n(1), |j| <= n(2).
   !>
   !> Only half of the offsets is evaluated: the kernels are even or odd.
   subroutine kernel_table(self, basis, table)
@@ -183,7 +152,7 @@ contains
     !$omp end parallel do
   end subroutine kernel_table
 
-  !> Line integrals over the nine creases; exact everywhere, loses digits like R^2.
+  !> Sum line integrals over the nine creases; exact everywhere, loses digits like R^2.
   pure function near_kernels(self, x, y) result(k)
     class(pyramid_t), intent(in) :: self
     !> Field point relative to the node, in longest edges
@@ -213,7 +182,7 @@ contains
     end do
   end function near_kernels
 
-  !> Integrals of rho and of n*ln(rho) along a straight segment, in a form
+  !> Integrate rho and n*ln(rho) along a straight segment, in a form
   !> that cancels nowhere; the constant -length*n of the second is left out,
   !> it adds up to zero over a crease family.
   pure subroutine segment(n, tm, half, s, w)
@@ -260,7 +229,7 @@ contains
     w = n*(tm*log_ratio + half*log(r1*r2) + n*atan2(n*length, n*n + t1*t2))
   end subroutine segment
 
-  !> Moment series.
+  !> Sum the moment series.
   pure function far_kernels(self, x, y) result(k)
     class(pyramid_t), intent(in) :: self
     !> Field point relative to the node, in longest edges
@@ -301,7 +270,7 @@ contains
     k = self%volume/r*[real(k1, wp), 0.5_wp*real(k1 + k2, wp), 0.5_wp*aimag(k2), real(kc, wp), -aimag(kc)]
   end function far_kernels
 
-  !> Moment series of K1.
+  !> Sum the moment series of K1.
   pure real(wp) function far_normal_kernel(self, x, y) result(k)
     class(pyramid_t), intent(in) :: self
     !> Field point relative to the node, in longest edges
@@ -325,7 +294,7 @@ contains
     k = self%volume/r*k
   end function far_normal_kernel
 
-  !> Powers of 1/R^2 that suffice at a distance.
+  !> Return the powers of 1/R^2 that suffice at a distance.
   pure integer function powers_needed(r)
     !> Distance, in longest edges
     real(wp), intent(in) :: r
@@ -337,7 +306,7 @@ contains
     end do
   end function powers_needed
 
-  !> Polynomial with complex coefficients at a real argument, smallest terms first.
+  !> Evaluate a polynomial with complex coefficients at a real argument, smallest terms first.
   pure complex(wp) function horner(coefficient, q)
     !> Coefficients of q**0, q**1, ...
     complex(wp), intent(in) :: coefficient(0:)
@@ -351,7 +320,7 @@ contains
     end do
   end function horner
 
-  !> Coefficients of the moment series from the three edge directions.
+  !> Expand the moment series from the three edge directions.
   pure subroutine expand(pyramid, edge)
     !> Pyramid whose series are set up
     type(pyramid_t), intent(inout) :: pyramid

@@ -37,7 +37,7 @@ module hc_triangle_integrals
 
   !> From here on, in longest edges from the centroid, quadrature replaces the edge form.
   real(wp), parameter :: far_distance = 1.5_wp
-  !> A triangle whose longest edge exceeds its height so many times is a sliver.
+  !> Longest edge over the height from which a triangle is a sliver.
   real(wp), parameter :: sliver_aspect = 8.0_wp
 
   !> A triangle seen from a field point, scaled to a size of 1 or so.
@@ -58,7 +58,7 @@ module hc_triangle_integrals
 
 contains
 
-  !> Whether I_jkm is one of the 27 integrals of this module.
+  !> Return whether I_jkm is one of the 27 integrals of this module.
   elemental logical function is_supported(j, k, m)
     !> Exponents of 1/rho, x - xi, y - eta
     integer, intent(in) :: j, k, m
@@ -66,7 +66,7 @@ contains
     is_supported = j >= 1 .and. j <= 3 .and. k >= 0 .and. m >= 0 .and. k + m + 2 - j >= 1 .and. k + m + 2 - j <= 3
   end function is_supported
 
-  !> I_jkm; NaN for exponents that are not supported.
+  !> Compute I_jkm; NaN for exponents that are not supported.
   pure real(wp) function triangle_integral(vertices, x, y, j, k, m)
     !> Vertices, as columns [m]
     real(wp), intent(in) :: vertices(2, 3)
@@ -85,7 +85,7 @@ contains
     end if
   end function triangle_integral
 
-  !> Several I_jkm of one triangle and field point.
+  !> Compute several I_jkm of one triangle and field point.
   pure function triangle_integrals(vertices, x, y, exponents) result(integral)
     !> Vertices, as columns [m]
     real(wp), intent(in) :: vertices(2, 3)
@@ -111,7 +111,7 @@ contains
     integral = scale(integral, view%unit*(exponents(2, :) + exponents(3, :) + 2 - exponents(1, :)))
   end function triangle_integrals
 
-  !> The six kernels of the point loads, integrated with the linear loads that
+  !> Compute the six kernels of the point loads, integrated with the linear loads that
   !> are 1 at one vertex and 0 at the two others.
   pure function vertex_kernels(vertices, x, y) result(kernels)
     !> Vertices, as columns [m]
@@ -142,7 +142,7 @@ contains
     kernels = scale(kernels, view%unit)
   end function vertex_kernels
 
-  !> Displacement by the load (x - xi)^k (y - eta)^m in one direction on a
+  !> Compute the displacement by the load (x - xi)^k (y - eta)^m in one direction on a
   !> triangle: the lines of Tables 4.1 and 4.2, with k, m = 0 or 1.
   pure function load_displacement(vertices, x, y, direction, k, m, shear_modulus, poisson_ratio) result(u)
     !> Vertices, as columns [m]
@@ -167,7 +167,7 @@ contains
     u = displacement(kernels, shear_modulus, poisson_ratio)
   end function load_displacement
 
-  !> Displacement by tractions that vary linearly over a triangle.
+  !> Compute the displacement by tractions that vary linearly over a triangle.
   pure function linear_load_displacement(vertices, x, y, traction, shear_modulus, poisson_ratio) result(u)
     !> Vertices, as columns [m]
     real(wp), intent(in) :: vertices(2, 3)
@@ -189,7 +189,7 @@ contains
     u = displacement(kernels, shear_modulus, poisson_ratio)
   end function linear_load_displacement
 
-  !> I_jkm at many points.
+  !> Evaluate I_jkm at many points.
   subroutine evaluate_integral(vertices, x, y, j, k, m, integral, error)
     !> Vertices, as columns [m]
     real(wp), intent(in) :: vertices(2, 3)
@@ -220,7 +220,7 @@ contains
     !$omp end parallel do
   end subroutine evaluate_integral
 
-  !> load_displacement at many points.
+  !> Evaluate load_displacement at many points.
   subroutine evaluate_displacement(vertices, x, y, direction, k, m, shear_modulus, poisson_ratio, u, error)
     !> Vertices, as columns [m]
     real(wp), intent(in) :: vertices(2, 3)
@@ -258,7 +258,7 @@ contains
     !$omp end parallel do
   end subroutine evaluate_displacement
 
-  !> linear_load_displacement at many points.
+  !> Evaluate linear_load_displacement at many points.
   subroutine evaluate_linear_displacement(vertices, x, y, traction, shear_modulus, poisson_ratio, u, error)
     !> Vertices, as columns [m]
     real(wp), intent(in) :: vertices(2, 3)
@@ -291,7 +291,7 @@ contains
     !$omp end parallel do
   end subroutine evaluate_linear_displacement
 
-  !> The triangle as it is seen from a field point.
+  !> Return the triangle relative to a field point.
   pure function seen_from(vertices, x, y) result(view)
     !> Vertices, as columns [m]
     real(wp), intent(in) :: vertices(2, 3)
@@ -321,7 +321,7 @@ contains
     view%corner_extended(2, :) = exact(2, :) - scale(real(y, xp), -view%unit)
   end function seen_from
 
-  !> Means over the triangle of load times (x - xi)^k (y - eta)^m / rho^j.
+  !> Average load times (x - xi)^k (y - eta)^m / rho^j over the triangle.
   pure function quadrature(view, load, exponents) result(mean)
     !> Triangle, far from the field point
     type(view_t), intent(in) :: view
@@ -360,7 +360,7 @@ contains
     end do
   end function quadrature
 
-  !> Displacement from the integrals of the six kernels with the load.
+  !> Compute the displacement from the integrals of the six kernels with the load.
   !> z points into the body, and loads act along the axes: (3.13)-(3.15), (3.19)-(3.21).
   pure function displacement(kernels, shear_modulus, poisson_ratio) result(u)
     !> Kernels times the load along x, y, z (6, direction of the load)
@@ -382,7 +382,7 @@ contains
     u(3) = a*kernels(1, 3) + b*(kernels(2, 1) + kernels(3, 2))
   end function displacement
 
-  !> Coordinates must be finite and their numbers must agree.
+  !> Refuse coordinates that are not finite or differ in number.
   pure subroutine check_points(vertices, x, y, n, error)
     !> Vertices, as columns
     real(wp), intent(in) :: vertices(2, 3)
@@ -402,7 +402,7 @@ contains
     end if
   end subroutine check_points
 
-  !> The elastic constants must make sense.
+  !> Refuse elastic constants that make no sense.
   pure subroutine check_material(shear_modulus, poisson_ratio, error)
     !> Shear modulus
     real(wp), intent(in) :: shear_modulus

@@ -1,64 +1,95 @@
-!> What the tractions of an iterate call for: contact area, stick and slip, and loads as constraints.
+!> Active sets of an iterate: contact area, stick and slip, and loads as constraints.
 !>
-!> Equations: docs/theory/friction.md, (F5), (F8).
+!> Equations: docs/theory/friction.md, (F5), (F8); docs/theory/normal_contact.md, (N6).
 module hc_active_zones
   use hc_precision, only: wp
-  use hc_contact_state, only: separated, stick, slip, along_x, along_y, about_z, n_motion, force_control
-  use hc_coulomb, only: normal_to
+  use hc_contact_state, only: separated, stick, slip, about_z, n_motion, remote_displacement, force_control
+  use hc_disc_law, only: normal_to
   use hc_friction_iterate, only: friction_iterate_t
-  use hc_symbol_preconditioner, only: soft
-  use hc_load_constraints, only: driven_motions_t, new_driven_motions, hold_nodes
+  use hc_load_constraints, only: driven_motions_t, new_driven_motions, fix_in_stick
   implicit none
   private
 
-  public :: find_contact, classify, find_constraints, find_prescribed_displacement
+  public :: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
 
 contains
 
-  !> Nodes that the law of contact calls for, (F5): one step of a projected gradient map, which contracts
+  !> Find the nodes that the law of contact calls for, (F5): one step of a projected gradient map, which contracts
   !> because r' is scaled with the size of the contact.
   subroutine find_contact(now, gap, contact)
+    !> Iterate
     type(friction_iterate_t), intent(in) :: now
     !> Gap of the present tractions [m]
     real(wp), intent(in), contiguous :: gap(:)
     !> The nodes (n)
     logical, allocatable, intent(out) :: contact(:)
-    real(wp) :: r
-    integer :: row, n_contact, from, to
+    real(wp) :: r, least
+    integer :: row, from, to
 
     r = now%problem%normal_classification_parameter(now%operators%space%count(now%contact))
     allocate (contact(size(gap)))
-    n_contact = 0
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to) reduction(+: n_contact)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
     do row = 1, now%problem%lattice%extent(2)
       to = row*now%problem%lattice%extent(1)
       from = to - now%problem%lattice%extent(1) + 1
-      call now%problem%normal_law%find_contact(from, r, now%p(from:to), gap(from:to), now%candidate(from:to), contact(from:to))
-      n_contact = n_contact + count(contact(from:to))
+      call now%problem%normal_law%find_contact(r, now%p(from:to), gap(from:to), now%candidate(from:to), contact(from:to))
     end do
     !$omp end parallel do
-    if (n_contact == 0) contact = now%candidate .and. gap <= minval(gap, mask=now%candidate)
+    if (now%operators%space%count(contact) > 0) return
+    least = now%operators%space%min(gap, now%candidate)
+    contact = now%candidate .and. gap <= least
   end subroutine find_contact
 
-  !> Stick, slip and frames that the present tractions call for.
+  !> Linearise a compliant law of contact about the present pressure and gap.
+  subroutine linearize_law(now, gap, from_pressure)
+    !> Iterate
+    type(friction_iterate_t), intent(inout) :: now
+    !> Gap of the present tractions [m]
+    real(wp), intent(in), contiguous :: gap(:)
+    !> The gap means nothing yet: about the pressure
+    logical, intent(in) :: from_pressure
+    real(wp) :: r, p_max
+    integer :: row, from, to
+
+    p_max = 0.0_wp
+    if (allocated(now%pressure%compliance)) p_max = now%operators%space%max(abs(now%p))
+    if (.not. (allocated(now%pressure%compliance) .and. p_max > 0.0_wp)) return
+    r = 0.0_wp
+    if (.not. from_pressure) r = now%problem%normal_classification_parameter(now%operators%space%count(now%contact))
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
+    do row = 1, now%problem%lattice%extent(2)
+      to = row*now%problem%lattice%extent(1)
+      from = to - now%problem%lattice%extent(1) + 1
+      call now%problem%normal_law%linearize(from, r, now%problem%softest_spring(p_max), now%p(from:to), gap(from:to), &
+                                            now%contact(from:to), now%pressure%compliance(from:to), now%pressure%offset(from:to))
+    end do
+    !$omp end parallel do
+    call now%operators%normal%set_active(now%contact, now%pressure%compliance)
+  end subroutine linearize_law
+
+  !> Find stick, slip and frames that the present tractions call for.
   !>
   !> The shear traction is put on the cone where a node slips, and its component across
   !> left as a start.
-  subroutine classify(now, holding, active)
-    type(friction_iterate_t), intent(inout) :: now
-    !> Let some nodes stick where none does
-    logical, intent(in) :: holding
+  subroutine classify(now, fixing, active)
+    !> Iterate
+    type(friction_iterate_t), intent(inout), target :: now
+    !> Fix some nodes in stick where none sticks
+    logical, intent(in) :: fixing
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
     logical, allocatable, intent(out) :: active(:)
     integer, allocatable :: zone(:)
-    real(wp) :: ds(now%problem%lattice%extent(1), 2), bound(now%problem%lattice%extent(1)), r, p_max, across, e(2)
+    real(wp) :: ds(now%problem%lattice%extent(1), 2), r, p_max, across, e(2)
+    real(wp), dimension(now%problem%lattice%extent(1)) :: bound, ahead, aside
     integer :: n, row, col, i, from, to
 
     n = size(now%p)
     allocate (zone(n), active(2*n))
     r = now%globalization%share_of_r*now%problem%classification_parameter(now%operators%space%count(now%contact))
-    if (now%first .and. .not. any(abs(now%q) > 0.0_wp)) r = now%problem%options%newton%cautious_share*r
-    associate (friction => now%problem%friction)
+    if (now%first) then
+      if (.not. now%operators%space%max_abs(now%q) > 0.0_wp) r = now%problem%options%newton%cautious_share*r
+    end if
+    associate (friction => now%problem%friction, soft => now%problem%options%preconditioner%soft_spring)
       p_max = now%operators%space%max(now%p)
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, i, from, to)
       do row = 1, now%problem%lattice%extent(2)
@@ -73,34 +104,38 @@ contains
         end do
       end do
       !$omp end parallel do
-      now%held = holding
-      if (now%held) call hold_nodes(now%problem%options%contact%held_share, now%shear%compliance, zone)
+      now%fixed = fixing
+      if (now%fixed) call fix_in_stick(now%operators%space, now%problem%options%contact%fixed_share, now%shear%compliance, zone)
 
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, across, e, col, i, from, to)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) &
+      !$omp& private(bound, ahead, aside, across, e, col, i, from, to)
       do row = 1, now%problem%lattice%extent(2)
         to = row*size(bound)
         from = to - size(bound) + 1
         call friction%find_bounds(from, now%p(from:to), bound)
+        call friction%find_boundary(now%shear%direction(:, from:to), ahead, aside)
+        if (allocated(now%shear%rest)) now%shear%rest(from:to) = bound*aside
         do col = 1, size(bound)
           i = from + col - 1
           active(i) = zone(i) /= separated
           active(n + i) = zone(i) == stick
           if (zone(i) /= slip) cycle
           e = now%shear%direction(:, i)
-          across = 0.0_wp
+          across = bound(col)*aside(col)
           if (now%shear%compliance(i) < soft*now%shear%elastic_compliance) then
             across = dot_product(normal_to(e), [now%q(i), now%q(n + i)])
           end if
-          now%q([i, n + i]) = bound(col)*e + across*normal_to(e)
+          now%q([i, n + i]) = bound(col)*ahead(col)*e + across*normal_to(e)
         end do
       end do
       !$omp end parallel do
     end associate
-    call now%shear%weigh(now%contact)
+    call now%shear%set_contact(now%contact)
   end subroutine classify
 
-  !> Loads that are prescribed as constraints on the unknowns.
+  !> Find the loads that are prescribed as constraints on the unknowns.
   subroutine find_constraints(now, active, driven, constraint, missing)
+    !> Iterate
     type(friction_iterate_t), intent(in) :: now
     !> Unknowns, in the frames (2 n)
     logical, intent(in) :: active(:)
@@ -135,25 +170,26 @@ contains
     end do
   end subroutine find_constraints
 
-  !> Displacements that sticking nodes should have as far as it is known: where they stood, and the motions that
+  !> Find the displacements that sticking nodes should have as far as it is known: where they stood, and the motions that
   !> are prescribed.
   subroutine find_prescribed_displacement(now, frame)
+    !> Iterate
     type(friction_iterate_t), intent(in) :: now
     !> In the frames (2 n)
     real(wp), intent(out), contiguous :: frame(:)
-    real(wp) :: motion(n_motion), x, y
+    real(wp) :: motion(n_motion), s(2)
     integer :: n, row, col, i
 
     n = size(now%p)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(x, y, col, i)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(s, col, i)
     do row = 1, now%problem%lattice%extent(2)
       do col = 1, now%problem%lattice%extent(1)
         i = (row - 1)*now%problem%lattice%extent(1) + col
-        x = now%origin(i) + (motion(along_x) - motion(about_z)*now%problem%y(col, row))
-        y = now%origin(n + i) + (motion(along_y) + motion(about_z)*now%problem%x(col, row))
-        frame(i) = -now%shear%direction(2, i)*x + now%shear%direction(1, i)*y
-        frame(n + i) = now%shear%direction(1, i)*x + now%shear%direction(2, i)*y
+        s = [now%origin(i), now%origin(n + i)] &
+            + remote_displacement(motion, now%problem%x(col, row), now%problem%y(col, row))
+        frame(i) = -now%shear%direction(2, i)*s(1) + now%shear%direction(1, i)*s(2)
+        frame(n + i) = now%shear%direction(1, i)*s(1) + now%shear%direction(2, i)*s(2)
       end do
     end do
     !$omp end parallel do

@@ -1,9 +1,9 @@
 !> A coupled sweep: a step of Newton's method for pressure, shear traction and motions at once.
 !>
 !> Where pressure and shear traction act strongly on each other (dissimilar materials and much friction), staggered sweeps
-!> keep exchanging nodes at the edge of the contact. Here F(p, q, motions) = 0, (F2) to (F4) of docs/theory/friction.md as they
-!> stand at the top of staggered_newton, is linearised as a whole (Alart & Curnier, Comput. Methods Appl. Mech. Eng. 92,
-!> 1991; Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003):
+!> exchange nodes at the edge of the contact again and again. Here F(p, q, motions) = 0, (F2) to (F4) of
+!> docs/theory/friction.md as they stand at the top of staggered_newton, is linearised as a whole (Alart & Curnier,
+!> Comput. Methods Appl. Mech. Eng. 92, 1991; Hintermueller, Ito & Kunisch, SIAM J. Optim. 13, 2003):
 !>
 !>     ( E_t^T T E + D   -E_t^T B ) ( p, q_stick, tau )   ( E_t^T (-h, s^n) )
 !>     (  A B^T E            0    ) (     motions     ) = ( P, Q_x, Q_y, M_z ),                    (F7)
@@ -24,11 +24,11 @@ module hc_coupled_newton
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, classify, find_constraints, find_prescribed_displacement
+  use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
   use hc_coupled_system, only: coupled_system_t
-  use hc_linear_system, only: fulfil
+  use hc_linear_system, only: satisfy_constraints
   use hc_projected_gmres, only: projected_gmres
   implicit none
   private
@@ -37,24 +37,24 @@ module hc_coupled_newton
 
 contains
 
-  !> One step of Newton's method.
+  !> Take one step of Newton's method.
   subroutine coupled_sweep(now, failed, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
-    !> Nothing came of it: no node resists the loads
+    !> No node resists the loads: the iterate is unchanged
     logical, intent(out) :: failed
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
     type(coupled_system_t) :: system
-    real(wp), allocatable :: x(:), ax(:), rhs(:), weight(:), columns(:, :), mb(:, :), rows(:, :)
+    real(wp), allocatable :: x(:), ax(:), rhs(:), columns(:, :), mb(:, :), rows(:, :)
     real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:)
-    real(wp), allocatable :: gap(:)
+    real(wp), allocatable :: gap(:), ahead(:), aside(:)
     logical, allocatable :: active(:), shear_active(:), contact(:)
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
     type(newton_options_t) :: options
-    real(wp) :: missing(4), multiplier(4), goal, residual, drift
+    real(wp) :: missing(4), multiplier(4), weight(2), goal, residual, drift
     integer :: n, m, k, n_shear, iterations
     logical :: independent
 
@@ -65,35 +65,56 @@ contains
     call find_contact(now, gap, contact)
     call move_alloc(contact, now%contact)
     now%p = merge(max(now%p, 0.0_wp), 0.0_wp, now%contact)
+    call linearize_law(now, gap, .false.)
+    deallocate (gap)
     call classify(now, .false., shear_active)
     ! 2.
     system%operators => now%operators
     system%shear => now%shear
-    call now%pressure%take(now%contact)
-    system%edge = now%pressure%edge
+    if (.not. allocated(now%pressure%compliance)) call now%operators%normal%set_active(now%contact)
+    if (allocated(now%pressure%compliance)) system%compliance = now%pressure%compliance
     system%space = now%operators%space
-    allocate (active(3*n), x(3*n), ax(3*n), rhs(3*n), weight(3*n), plane(2*n))
+    allocate (active(3*n), x(3*n), plane(2*n))
     active(:n) = now%contact
     active(n + 1:) = shear_active
     allocate (system%slope(n), source=0.0_wp)
+    allocate (ahead(n), aside(n))
+    call now%problem%friction%find_boundary(now%shear%direction, ahead, aside)
     if (now%problem%friction%is_bounded()) then
       call now%problem%friction%find_slopes(1, now%p, system%slope)
       where (.not. now%contact .or. shear_active(n + 1:)) system%slope = 0.0_wp
+      if (allocated(now%shear%rest)) then
+        system%tilt = aside*system%slope
+        now%shear%rest = now%shear%rest - system%tilt*now%p
+      end if
+      system%slope = ahead*system%slope
     end if
     x(:n) = now%p
     call now%shear%to_frame(now%q, x(n + 1:))
     ! what p carries along is not counted twice
     x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
     where (.not. shear_active) x(n + 1:) = 0.0_wp
+    if (now%problem%friction%is_bounded()) then
+      ! the part of a bound that does not grow with the pressure stays as it is
+      call now%problem%friction%find_bounds(1, now%p, plane(:n))
+      where (now%contact .and. .not. shear_active(n + 1:)) x(2*n + 1:) = ahead*plane(:n) - system%slope*now%p
+    end if
 
     ! 3.
     call find_constraints(now, shear_active, driven, shear_columns, shear_missing)
     n_shear = size(shear_missing)
     m = n_shear
     if (now%target%control(normal) == force_control) m = m + 1
-    allocate (columns(3*n, m), rows(3*n, m), source=0.0_wp)
+    allocate (mb(3*n, m), source=0.0_wp)
+    call find_rigid_traction(now, shear_active, shear_columns, .false., part, error)
+    if (allocated(error)) return
+    mb(n + 1:, :n_shear) = part
+    deallocate (part)
+    allocate (columns(3*n, m), source=0.0_wp)
     columns(n + 1:, :n_shear) = shear_columns
-    rows(n + 1:, :n_shear) = shear_columns
+    deallocate (shear_columns)
+    if (m > n_shear) columns(:n, m) = merge(1.0_wp, 0.0_wp, now%contact)
+    rows = columns
     do k = 1, n_shear
       ! the traction mu p e belongs to the pressure
       plane = reshape(driven%direction(k, now%problem), [2*n])
@@ -102,42 +123,46 @@ contains
     missing(:n_shear) = shear_missing
     multiplier(:n_shear) = driven%multipliers(now%motion)
     if (m > n_shear) then
-      columns(:n, m) = merge(1.0_wp, 0.0_wp, now%contact)
-      rows(:, m) = columns(:, m)
-      missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - sum(now%p)
+      missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - system%space%sum(now%p)
       multiplier(m) = now%motion(normal)
     end if
-    allocate (mb(3*n, m), source=0.0_wp)
-    call find_rigid_traction(now, shear_active, shear_columns, .false., part, error)
-    if (allocated(error)) return
-    mb(n + 1:, :n_shear) = part
+    deallocate (plane)
     if (m > n_shear) then
       call find_punch_pressure(now, columns(:n, m:), part, error)
       if (allocated(error)) return
       mb(:n, m:) = part
+      deallocate (part)
     end if
-    call fulfil(rows, mb, missing(:m), x, independent, system%space)
+    call satisfy_constraints(rows, mb, missing(:m), x, independent, system%space)
     ! 4.
     if (independent) then
+      allocate (ax(3*n), rhs(3*n))
       call system%product(x, ax, error)
       if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
+      if (allocated(now%pressure%offset)) rhs(:n) = rhs(:n) - now%pressure%offset
       call find_prescribed_displacement(now, rhs(n + 1:))
-      weight(:n) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
-      weight(n + 1:) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
+      call now%shear%add_rest(rhs(n + 1:))
+      weight(1) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
+      if (allocated(system%compliance)) then
+        weight(1) = now%problem%normal_compliance/now%problem%sprung_compliance(system%space%max(now%p))*weight(1)
+      end if
+      weight(2) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       goal = max(options%inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
                  options%final_accuracy*now%tolerance)
       goal = goal*real(system%space%count(active), wp)**0.25_wp
-      call projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, goal, options%max_directions, multiplier(:m), &
-                           independent, residual, iterations, now%outcome, error, drift)
+      call projected_gmres(system, active, columns, mb, rows, weight([1, 2, 2]), rhs, x, ax, goal, options%max_directions, &
+                           multiplier(:m), independent, residual, iterations, now%outcome, error, drift)
       if (allocated(error)) return
       if (drift > options%displacement_rounding) call system%product(x, ax, error)
       if (allocated(error)) return
     end if
     ! where all nodes slip, only their directions resist a load: not beyond reason
     failed = .not. independent
-    if (.not. failed .and. n_shear > 0 .and. .not. any(shear_active(n + 1:))) then
-      failed = maxval(abs(x(n + 1:2*n))) > options%most_across*now%traction_scale()
+    if (.not. failed .and. n_shear > 0) then
+      if (.not. any(shear_active(n + 1:))) then
+        failed = system%space%max_abs(x(n + 1:2*n)) > options%most_across*now%traction_scale()
+      end if
     end if
     if (failed) then
       call now%refresh(error)
@@ -151,11 +176,18 @@ contains
     x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
     call now%shear%to_plane(x(n + 1:), now%q)
     now%w = ax(:n)
+    call now%pressure%stretch(-1.0_wp, now%p, now%w)
     now%closing = 0.0_wp
     now%cut = .false.
     now%joint = .true.
     ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*x(n + 1:2*n)
+    if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) + now%shear%compliance*system%tilt*now%p
     call now%shear%to_plane(ax(n + 1:), now%u)
+    if (now%shear%spring_rounding(x(n + 1:)) > options%displacement_rounding*now%problem%tangential_compliance &
+        *now%traction_scale()) then
+      call now%refresh(error)
+      if (allocated(error)) return
+    end if
     call now%find_residuals()
     now%first = .false.
   end subroutine coupled_sweep

@@ -3,7 +3,6 @@ module hc_coupled_system
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_preconditioner_extension, only: edge_extension_t
   use hc_elastic_operators, only: operators_t
   use hc_shear_system, only: shear_system_t
   use hc_linear_system, only: linear_system_t
@@ -12,17 +11,18 @@ module hc_coupled_system
 
   public :: coupled_system_t
 
-  !> Pressure and shear traction together: the pressure of a slipping node carries mu p e along.
+  !> Pressure and shear traction together: the pressure of a slipping node carries mu p e along. Where the law has a direction,
+  !> it moves the traction across at which the spring of the node rests, too.
   !>
   !> Its matrix is not symmetric. A vector is the pressure, then the shear in the frames.
   type, extends(linear_system_t) :: coupled_system_t
     type(operators_t), pointer :: operators => null()
     !> Frames and compliances of the nodes
     type(shear_system_t), pointer :: shear => null()
-    !> Continuation of displacements beyond the contact
-    type(edge_extension_t) :: edge
-    !> mu at slipping nodes, 0 elsewhere
-    real(wp), allocatable :: slope(:)
+    !> Compliance of the springs of a compliant law of contact; not there without [m/Pa]
+    real(wp), allocatable :: compliance(:)
+    !> mu at slipping nodes, 0 elsewhere; traction across at rest over the pressure, not there if all are 0
+    real(wp), allocatable :: slope(:), tilt(:)
   contains
     procedure :: product => coupled_product
     procedure :: precondition => coupled_precondition
@@ -30,35 +30,43 @@ module hc_coupled_system
 
 contains
 
+  !> Multiply by the matrix of (F11).
   subroutine coupled_product(self, x, y, error)
     class(coupled_system_t), intent(inout) :: self
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: frame(:), traction(:), moved(:)
+    real(wp), allocatable :: traction(:)
+    real(wp) :: t, e
     integer :: n, i
 
     n = size(x)/3
-    allocate (frame(2*n), traction(3*n), moved(3*n))
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, n
-      frame(i) = x(n + i)
-      frame(n + i) = x(2*n + i) + self%slope(i)*x(i)
-      traction(i) = x(i)
-    end do
-    !$omp end parallel do
-    call self%shear%to_plane(frame, traction(n + 1:))
-    call self%operators%apply([normal, along_x, along_y], traction, [normal, along_x, along_y], moved, error)
+    allocate (traction(3*n))
+    associate (direction => self%shear%direction)
+      !$omp parallel do schedule(static) num_threads(self%space%threads) private(t, e)
+      do i = 1, n
+        t = x(n + i)
+        e = x(2*n + i) + self%slope(i)*x(i)
+        traction(i) = x(i)
+        traction(n + i) = -direction(2, i)*t + direction(1, i)*e
+        traction(2*n + i) = direction(1, i)*t + direction(2, i)*e
+      end do
+      !$omp end parallel do
+    end associate
+    call self%operators%apply([normal, along_x, along_y], traction, [normal, along_x, along_y], y, error)
     if (allocated(error)) return
-    call self%space%copy(moved(:n), y(:n))
-    call self%shear%to_frame(moved(n + 1:), y(n + 1:))
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, n
-      y(n + i) = y(n + i) + self%shear%compliance(i)*x(n + i)
-    end do
-    !$omp end parallel do
+    if (allocated(self%compliance)) y(:n) = y(:n) + self%compliance*x(:n)
+    call self%shear%add_springs(x(n + 1:), y(n + 1:))
+    if (allocated(self%tilt)) then
+      !$omp parallel do schedule(static) num_threads(self%space%threads)
+      do i = 1, n
+        y(n + i) = y(n + i) - self%shear%compliance(i)*self%tilt(i)*x(i)
+      end do
+      !$omp end parallel do
+    end if
   end subroutine coupled_product
 
+  !> Precondition pressure and shear traction each by its own preconditioner.
   subroutine coupled_precondition(self, x, y, error)
     class(coupled_system_t), intent(inout) :: self
     real(wp), intent(in), contiguous, target :: x(:)
@@ -67,7 +75,7 @@ contains
     integer :: n
 
     n = size(x)/3
-    call self%operators%precondition_pressure(self%edge, x(:n), y(:n))
+    call self%operators%normal%apply(x(:n), y(:n), self%operators%preconditioning)
     call self%shear%precondition(x(n + 1:), y(n + 1:), error)
   end subroutine coupled_precondition
 

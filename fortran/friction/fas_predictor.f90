@@ -7,18 +7,17 @@
 !>
 !>     h_c = g + approach - w_c,     s_c = u_c - shift - twist x r - (s - s^n).
 !>
-!> The new loads are then applied to it (full approximation scheme, Brandt, Math. Comput. 31, 1977), after a
-!> still coarser lattice has been asked in the same way, and the change of its
+!> The new loads are then applied to it (full approximation scheme, Brandt, Math. Comput. 31, 1977), after the
+!> same on a still coarser lattice, and the change of its
 !> tractions and motions is added to the fine ones. Nodes between coarse ones that slip are put
 !> onto the cone. The fronts of contact, stick and slip are where
-!> they should be then but for a node or two, and no history has to be kept for it.
+!> they should be then but for a node or two, without any stored history.
 !>
 !> Equations: docs/theory/multilevel.md, (M1).
 module hc_fas_predictor
   use hc_precision, only: wp
   use hc_error, only: error_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t, slip, normal, force_control
-  use hc_coulomb, only: magnitude
+  use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t, slip, normal, force_control
   use hc_contact_problem, only: friction_problem_t
   use hc_elastic_operators, only: operators_t
   use hc_lattice_solver, only: solve_on_lattice
@@ -30,7 +29,7 @@ module hc_fas_predictor
 
 contains
 
-  !> Tractions and motions to start a step from.
+  !> Find tractions and motions to start a step from.
   recursive subroutine predict(problem, coarse, operators, start, reference, target, guess, &
                                predicted, work, error)
     !> The problem
@@ -44,7 +43,7 @@ contains
     real(wp), intent(in) :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    !> State to start from: the old one with new tractions and motions; the old one itself if nothing better is found
+    !> State to start from: the old one with new tractions and motions, or unchanged if the coarse lattices do not help
     type(contact_state_t), intent(out) :: guess
     !> There is something better
     logical, intent(out) :: predicted
@@ -62,11 +61,11 @@ contains
 
     work = 0.0_wp
     predicted = .false.
-    call take_tractions(start, guess, problem%space)
+    call copy_tractions(start, guess, problem%space)
     if (size(coarse) == 0) return
     model = coarse(1)
     call restrict_state(problem, start, model, before)
-    if (count(before%pressure > 0.0_wp) < problem%options%multilevel%least_contact) return
+    if (model%space%count(before%pressure > 0.0_wp) < problem%options%multilevel%least_contact) return
 
     allocate (displacement(model%lattice%extent(1), model%lattice%extent(2), 3))
     operators(1)%flexibility%applications = 0.0_wp
@@ -92,7 +91,7 @@ contains
     work = work*model%lattice%size()/problem%lattice%size()
   end subroutine predict
 
-  !> A state at the coarse nodes.
+  !> Restrict a state to the coarse nodes.
   subroutine restrict_state(problem, fine, coarse_problem, coarse)
     type(friction_problem_t), intent(in) :: problem, coarse_problem
     type(contact_state_t), intent(in) :: fine
@@ -118,7 +117,7 @@ contains
     !> Fine state: tractions and motions change
     type(contact_state_t), intent(inout) :: state
     real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
-    real(wp) :: bound(size(state%pressure, 1)), length
+    real(wp), dimension(size(state%pressure, 1)) :: bound, length
     integer :: col, row
 
     allocate (change, mold=state%pressure)
@@ -142,11 +141,13 @@ contains
           cycle
         end if
         state%traction(col, row, :) = state%traction(col, row, :) + change_of_traction(col, row, :)
-        ! what is interpolated between tractions on the cone lies inside, and would stick
-        if (slipping(col, row) < 1.0_wp) cycle
-        length = magnitude(state%traction(col, row, :))
-        if (length > 0.0_wp .and. length < bound(col)) then
-          state%traction(col, row, :) = state%traction(col, row, :)*(bound(col)/length)
+      end do
+      ! what is interpolated between tractions on the cone lies inside, and would stick
+      call problem%friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), length)
+      do col = 1, size(slipping, 1)
+        if (slipping(col, row) < 1.0_wp .or. state%pressure(col, row) <= 0.0_wp) cycle
+        if (length(col) > 0.0_wp .and. length(col) < bound(col)) then
+          state%traction(col, row, :) = state%traction(col, row, :)*(bound(col)/length(col))
         end if
       end do
     end do

@@ -1,15 +1,15 @@
 !> An iterate of a frictional load step on one lattice.
 !>
-!> It holds tractions and motions with what they cause, and says which residuals follow from
-!> them. Which zones they call for stands in active_zones; how to get to the next iterate is left to
-!> staggered_newton and coupled_newton.
+!> An iterate is tractions and motions with the displacements that they cause; this module computes its residuals.
+!> The zones that it calls for are found in active_zones, the next iterate in staggered_newton and coupled_newton.
 !>
 !> Equations: docs/theory/friction.md, (F1).
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, force_control
+  use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, &
+    remote_displacement, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
@@ -40,8 +40,8 @@ module hc_friction_iterate
     !> Approach, shifts and twist
     real(wp) :: motion(n_motion) = 0.0_wp
     real(wp) :: residual_normal = 1.0_wp, residual_tangential = 1.0_wp
-    !> Too few nodes stick on their own, some were held so that a prescribed load can be carried
-    logical :: held = .false.
+    !> Too few nodes stick: some were fixed in stick so that a prescribed load can be carried
+    logical :: fixed = .false.
     !> Even so nothing resists a motion whose load is prescribed
     logical :: unsupported = .false.
 
@@ -63,13 +63,13 @@ module hc_friction_iterate
     real(wp), allocatable :: punch_pressure(:, :), rigid_traction(:, :)
     !> How the linear solutions of the last sweep ended, the worst of them
     integer :: outcome = solution_accurate
-    !> The start knew of no contact
-    logical :: cold = .false.
+    !> The start had no contact
+    logical :: without_start = .false.
     !> Nothing has been solved yet
     logical :: first = .true.
   contains
-    !> Start from a state
-    procedure :: begin
+    !> Set the tractions and motions of a start
+    procedure :: set_start
     !> Displacements of the present tractions, from scratch
     procedure :: refresh
     !> Gap of the present tractions and approach, and its residual
@@ -77,12 +77,12 @@ module hc_friction_iterate
     !> Relative displacement since the beginning of the step, along one row
     procedure :: slip_row
     !> Shear traction cut to the cone
-    procedure :: cut_to_cone
+    procedure :: project_to_cone
     !> Largest shear traction that there can be
     procedure :: traction_scale
     !> Residuals of the present tractions
     procedure :: find_residuals, find_tangential_residual
-    !> Are all numbers numbers?
+    !> Are tractions and motions finite?
     procedure :: is_finite
     !> Are displacements those of the tractions?
     procedure :: check_displacements
@@ -90,8 +90,8 @@ module hc_friction_iterate
 
 contains
 
-  !> Start from a state.
-  subroutine begin(self, problem, operators, start, reference, target, tolerance, error)
+  !> Set tractions and motions from those of a state, and find what they displace.
+  subroutine set_start(self, problem, operators, start, reference, target, tolerance, error)
     class(friction_iterate_t), intent(inout) :: self
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
@@ -119,6 +119,7 @@ contains
     self%pressure%operators => operators
     self%pressure%space = operators%space
     call new_shear_system(self%shear, operators)
+    if (.not. problem%friction%is_isotropic()) allocate (self%shear%rest(n), source=0.0_wp)
     self%shear_feels_pressure = abs(problem%pair%lambda_2) > 0.0_wp
     self%pressure_feels_shear = self%shear_feels_pressure .and. problem%friction%resists() .and. .not. problem%goodman
     highest = huge(1.0_wp)
@@ -126,6 +127,7 @@ contains
     if (target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) highest = target%value(normal)
     allocate (self%h(n), self%origin(2*n), self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
     allocate (self%candidate(n), self%contact(n))
+    if (problem%normal_law%is_compliant()) allocate (self%pressure%compliance(n), self%pressure%offset(n), source=0.0_wp)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
     do row = 1, problem%lattice%extent(2)
       to = row*problem%lattice%extent(1)
@@ -141,7 +143,7 @@ contains
     end do
     !$omp end parallel do
     self%motion = merge(start%motion, target%value, target%control == force_control)
-    if (any(self%contact)) then
+    if (operators%space%count(self%contact) > 0) then
       ! a twist turns about the middle of the contact, as far as the shifts are free
       call new_driven_motions(driven, problem, target, self%contact)
       associate (turned => self%motion(about_z) - start%motion(about_z))
@@ -150,16 +152,16 @@ contains
       end associate
     else
       ! any pressure is better than none
-      self%cold = .true.
+      self%without_start = .true.
       self%contact = self%candidate
       if (target%control(normal) /= force_control) self%contact = self%contact .and. self%h < target%value(normal)
       self%p = merge(1.0_wp, 0.0_wp, self%contact)
       self%q = 0.0_wp
     end if
     call self%refresh(error)
-  end subroutine begin
+  end subroutine set_start
 
-  !> Displacements of the present tractions, from scratch.
+  !> Compute the displacements of the present tractions anew.
   subroutine refresh(self, error)
     class(friction_iterate_t), intent(inout) :: self
     !> Allocated on failure
@@ -173,7 +175,7 @@ contains
     self%cut = .false.
     self%joint = .false.
     allocate (moved(3*n))
-    if (self%shear_feels_pressure .and. .not. (self%cold .and. self%first)) then
+    if (self%shear_feels_pressure .and. .not. (self%without_start .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
       call space%copy(moved(:n), self%w)
@@ -184,7 +186,7 @@ contains
       call space%fill(self%u, 0.0_wp)
     end if
     call space%fill(self%closing, 0.0_wp)
-    if (all_zero(self%q)) return
+    if (.not. space%max_abs(self%q) > 0.0_wp) return
     if (self%pressure_feels_shear) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
@@ -196,12 +198,7 @@ contains
     call space%add(moved(n + 1:), self%u)
   end subroutine refresh
 
-  pure logical function all_zero(values)
-    real(wp), intent(in) :: values(:)
-    all_zero = .not. any(abs(values) > 0.0_wp)
-  end function all_zero
-
-  !> Gap of the present tractions and approach.
+  !> Compute the gap of the present tractions and approach.
   subroutine find_gap(self, gap)
     class(friction_iterate_t), intent(in) :: self
     !> The gap (n) [m]
@@ -216,7 +213,7 @@ contains
     !$omp end parallel do
   end subroutine find_gap
 
-  !> ds of the present tractions and motions at the nodes of a row in contact, zero elsewhere.
+  !> Compute ds of the present tractions and motions at the nodes of a row in contact, zero elsewhere.
   pure subroutine slip_row(self, row, dsx, dsy)
     class(friction_iterate_t), intent(in) :: self
     integer, intent(in) :: row
@@ -224,19 +221,21 @@ contains
     real(wp), intent(out), contiguous :: dsx(:), dsy(:)
     integer :: i, n, col
     logical :: touches
+    real(wp) :: remote(2)
 
     n = size(self%p)
     do col = 1, size(dsx)
       i = (row - 1)*size(dsx) + col
       touches = self%contact(i) .or. self%p(i) > 0.0_wp
-      dsx(col) = self%u(i) - self%origin(i) - (self%motion(along_x) - self%motion(about_z)*self%problem%y(col, row))
-      dsy(col) = self%u(n + i) - self%origin(n + i) - (self%motion(along_y) + self%motion(about_z)*self%problem%x(col, row))
+      remote = remote_displacement(self%motion, self%problem%x(col, row), self%problem%y(col, row))
+      dsx(col) = self%u(i) - self%origin(i) - remote(1)
+      dsy(col) = self%u(n + i) - self%origin(n + i) - remote(2)
       dsx(col) = merge(dsx(col), 0.0_wp, touches)
       dsy(col) = merge(dsy(col), 0.0_wp, touches)
     end do
   end subroutine slip_row
 
-  !> Largest shear traction that there can be.
+  !> Compute the largest shear traction that there can be.
   real(wp) function traction_scale(self)
     class(friction_iterate_t), intent(in) :: self
     real(wp) :: largest
@@ -246,13 +245,13 @@ contains
     largest = 0.0_wp
     traction_scale = self%operators%space%max(self%p)
     if (.not. self%problem%friction%is_bounded()) then
-      largest = maxval((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
+      largest = self%operators%space%max((self%q(:n)/traction_scale)**2 + (self%q(n + 1:)/traction_scale)**2)
     end if
-    traction_scale = tangential_scale(self%problem%friction, largest)*traction_scale
+    traction_scale = tangential_scale(self%problem%friction, traction_scale, largest)*traction_scale
   end function traction_scale
 
-  !> Shear traction cut to the cone.
-  subroutine cut_to_cone(self, q)
+  !> Project the shear traction on the admissible set.
+  subroutine project_to_cone(self, q)
     class(friction_iterate_t), intent(in) :: self
     !> The traction, components along x and y (2 n) [Pa]
     real(wp), allocatable, intent(out) :: q(:)
@@ -271,9 +270,9 @@ contains
                                          q(n + from:n + to))
     end do
     !$omp end parallel do
-  end subroutine cut_to_cone
+  end subroutine project_to_cone
 
-  !> Inverse of the largest pressure, 0 without pressure [1/Pa].
+  !> Compute the inverse of the largest pressure, 0 without pressure [1/Pa].
   real(wp) function pressure_unit(self)
     class(friction_iterate_t), intent(in) :: self
 
@@ -281,7 +280,7 @@ contains
     if (pressure_unit > 0.0_wp) pressure_unit = 1.0_wp/pressure_unit
   end function pressure_unit
 
-  !> Residuals of the present tractions; nothing is multiplied for them.
+  !> Compute the residuals of the present tractions, without a product.
   subroutine find_residuals(self)
     class(friction_iterate_t), intent(inout) :: self
     real(wp), allocatable :: gap(:)
@@ -291,7 +290,7 @@ contains
     call self%find_tangential_residual()
   end subroutine find_residuals
 
-  !> R_t alone.
+  !> Compute R_t alone.
   subroutine find_tangential_residual(self)
     class(friction_iterate_t), intent(inout) :: self
     real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, largest, worst
@@ -313,10 +312,10 @@ contains
                                            self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
     end do
     !$omp end parallel do
-    self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, largest)
+    self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, 1.0_wp/unit, largest)
   end subroutine find_tangential_residual
 
-  !> Are all tractions and motions finite numbers?
+  !> Return whether all tractions and motions are finite numbers.
   logical function is_finite(self)
     class(friction_iterate_t), intent(in) :: self
     integer :: n, i
@@ -337,28 +336,28 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: applications, largest
-    real(wp), allocatable :: q(:), moved(:), dragged(:), w(:), u(:), closing(:)
+    real(wp), allocatable :: q(:), moved(:), by_pressure(:), w(:), u(:), closing(:)
 
     associate (n => size(self%p), rounding => self%problem%options%newton%displacement_rounding)
-      allocate (moved(3*n), dragged(3*n), source=0.0_wp)
+      allocate (moved(3*n), by_pressure(3*n), source=0.0_wp)
       applications = self%operators%flexibility%applications
-      call self%operators%apply([normal], self%p, [normal, along_x, along_y], dragged, error)
+      call self%operators%apply([normal], self%p, [normal, along_x, along_y], by_pressure, error)
       if (allocated(error)) return
-      if (.not. self%shear_feels_pressure) dragged(n + 1:) = 0.0_wp
+      if (.not. self%shear_feels_pressure) by_pressure(n + 1:) = 0.0_wp
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
       if (allocated(error)) return
-      u = dragged(n + 1:) + moved(n + 1:)
+      u = by_pressure(n + 1:) + moved(n + 1:)
       if (self%cut) then
-        call self%cut_to_cone(q)
+        call self%project_to_cone(q)
         call self%operators%apply([along_x, along_y], q, [normal], moved(:n), error)
         if (allocated(error)) return
       end if
       if (.not. self%pressure_feels_shear) moved(:n) = 0.0_wp
-      w = dragged(:n) + merge(moved(:n), 0.0_wp, self%joint)
+      w = by_pressure(:n) + merge(moved(:n), 0.0_wp, self%joint)
       closing = merge(0.0_wp, moved(:n), self%joint)
       self%operators%flexibility%applications = applications
       ! what sticks moves little: pressure and shear traction cancel there
-      largest = maxval(abs(dragged(n + 1:))) + maxval(abs(moved(n + 1:)))
+      largest = maxval(abs(by_pressure(n + 1:))) + maxval(abs(moved(n + 1:)))
       if (.not. (agree(self%w, w, maxval(abs(w)), rounding) .and. &
                  agree(self%closing, closing, maxval(abs(w)), rounding) .and. &
                  (agree(self%u, u, largest, rounding) .or. .not. self%problem%friction%resists()))) then
@@ -367,7 +366,7 @@ contains
     end associate
   end subroutine check_displacements
 
-  !> Do two fields agree but for rounding errors?
+  !> Return whether two fields agree but for rounding errors.
   pure logical function agree(one, other, scale, rounding)
     real(wp), intent(in) :: one(:), other(:)
     !> Size of what they belong to
@@ -378,7 +377,7 @@ contains
     agree = all(abs(one - other) <= rounding*scale)
   end function agree
 
-  !> R_n of a gap under the present pressure.
+  !> Compute R_n of a gap under the present pressure.
   real(wp) function gap_residual(self, gap)
     class(friction_iterate_t), intent(in), target :: self
     !> Gap (n) [m]

@@ -1,8 +1,8 @@
-!> One load step with Coulomb friction, on FFTs.
+!> One load step with friction, on FFTs.
 !>
 !> Sweeps of a semismooth Newton method (see lattice_solver) lead from the last
-!> state to the next, after coarser lattices have told what will change (see
-!> friction_predictor). Without an earlier state the first guess comes from them, too.
+!> state to the next, from a start by coarser lattices (see
+!> fas_predictor). Without an earlier state the first guess comes from them, too. Where a guess is given it comes first.
 !>
 !> Theory: docs/theory/multilevel.md.
 module hc_frictional_contact
@@ -10,15 +10,16 @@ module hc_frictional_contact
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: space_over
+  use hc_hierarchy, only: level_count, build_levels
   use hc_flexibility, only: check_operator
-  use hc_contact_state, only: contact_state_t, new_friction_state, take_tractions, load_target_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_elastic_operators, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_on_lattice
   use hc_fas_predictor, only: predict
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_transfer, only: prolong_edge, prolong_shear, restrict_vector, level_count
+  use hc_transfer, only: prolong_edge, prolong_shear, restrict_vector
   implicit none
   private
 
@@ -38,7 +39,7 @@ module hc_frictional_contact
 
 contains
 
-  !> Operators of a problem on all its lattices.
+  !> Set up the operators of a problem on all its lattices.
   subroutine new_frictional_contact(self, problem, error, n_threads, cache)
     !> Solver to be set up
     type(frictional_contact_t), intent(out) :: self
@@ -48,7 +49,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
-    !> Spectra that are kept
+    !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     integer :: l, n_level
 
@@ -57,38 +58,43 @@ contains
     self%problem = problem
     n_level = level_count(problem%lattice%extent, problem%options%multilevel%smallest_side)
     allocate (self%operators(n_level), self%coarse(2:n_level))
-    do l = 1, n_level
-      if (l == 2) then
-        call problem%coarsen(self%coarse(l))
-      else if (l > 2) then
-        call self%coarse(l - 1)%coarsen(self%coarse(l))
-      end if
-      if (l == 1) then
-        self%problem%space = space_over(problem%lattice%extent, n_threads)
-        call new_operators(self%operators(l), problem%lattice, problem%pair, self%problem%space, error, cache)
-      else
-        self%coarse(l)%space = space_over(self%coarse(l)%lattice%extent, n_threads)
-        call new_operators(self%operators(l), self%coarse(l)%lattice, problem%pair, self%coarse(l)%space, error, cache)
-      end if
+    call build_levels(self%problem, self%coarse)
+    call prepare(self%problem, self%operators(1))
+    do l = 2, n_level
       if (allocated(error)) return
+      call prepare(self%coarse(l), self%operators(l))
     end do
+
+  contains
+
+    !> Set up threads and operators of one lattice.
+    subroutine prepare(level, operators)
+      type(friction_problem_t), intent(inout) :: level
+      type(operators_t), intent(out) :: operators
+
+      level%space = space_over(level%lattice%extent, n_threads)
+      call new_operators(operators, level%lattice, level%pair, level%space, error, cache, level%options%preconditioner)
+    end subroutine prepare
+
   end subroutine new_frictional_contact
 
-  !> Bytes that a problem takes between its steps: operators and what is given, on all lattices.
-  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads)
+  !> Count the bytes of a problem between its steps: operators and what is given, on all lattices.
+  pure integer(selected_int_kind(18)) function frictional_contact_memory(extent, threads, unlike)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
+    !> The materials are unlike
+    logical, intent(in) :: unlike
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
     ! initial gap, coordinates, candidates
-    finest = operators_memory(extent, threads) + 28*int(extent(1), long)*extent(2)
+    finest = operators_memory(extent, threads, unlike) + 28*int(extent(1), long)*extent(2)
     frictional_contact_memory = finest + finest/3
   end function frictional_contact_memory
 
-  !> Bytes that are needed besides while a step is solved; the coarse lattices have done by then.
+  !> Count the additional bytes while a step is solved; the coarse lattices have done by then.
   pure integer(selected_int_kind(18)) function friction_step_memory(extent, n_contact, n_force, coupled)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -101,32 +107,35 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
-    !> Directions of GMRES: so many are enough as a rule
+    !> Directions of GMRES that are enough as a rule
     integer, parameter :: n_direction = 4
-    integer(long) :: n, everywhere, inside
+    integer(long) :: n, everywhere, building, iterating, inside
 
     n = int(extent(1), long)*extent(2)
-    ! states before and after, tractions to start from, displacements
-    everywhere = 2*(9*field + half + 2*half) + 3*field + 3*field
-    ! iterate; shear system: directions, compliance, weights, vectors in both precisions
-    everywhere = everywhere + 9*field + 4*half + 9*field + 5*half
-    ! zones, gap, edge of the contact, values of expressions; constraints of the loads and what they drag along
-    everywhere = everywhere + 2*field + 2*half + 4*field + (2 + 2*2*max(n_force - 1, 1))*field
+    ! states before and after, tractions to start from
+    everywhere = 2*(9*field + half) + 3*field
+    ! iterate with traction estimates; shear system; weights and vectors of its preconditioner
+    everywhere = everywhere + (10 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 5*field + half + 4*field + half
     if (coupled) then
-      ! active nodes, unknowns, product, right-hand side, weights, shear in the plane, slope; constraints thrice
-      everywhere = everywhere + 3*half + (4*3 + 2 + 1 + 3*3*n_force)*field
-      ! the product; GMRES: vector and image, the products of all directions
-      everywhere = everywhere + (2 + 3 + 3 + 3*(2 + n_direction))*field
+      ! unknowns, slope, constraints thrice, and either what makes them or product, right-hand side
+      everywhere = everywhere + (3 + 1)*field + 3*half
+      building = (3*3*n_force + 2)*field
+      ! product; GMRES: vector and image, the products of all directions, the product itself
+      iterating = (3 + 2*3 + 3*n_direction + 3)*field
       ! packed: both of all directions, residuals, weights, constraints thrice
       inside = 3*(2*n_direction + 4 + 3*n_force)*field
     else
-      ! unknowns, product, right-hand side, shear; conjugate gradients: vector and image; preconditioned constraints
-      everywhere = everywhere + (4*2 + 2*2 + 5)*field
+      ! unknowns, product, traction before; constraints twice, or the vector and image of conjugate gradients
+      everywhere = everywhere + 3*2*field + 2*half
+      building = 2*2*max(n_force - 1, 1)*field
+      iterating = 2*2*field
+      ! packed: vectors of conjugate gradients, constraints twice
       inside = 2*(7 + 2*max(n_force - 1, 1))*field
     end if
-    friction_step_memory = n*everywhere + n_contact*inside
+    friction_step_memory = n*everywhere + max(n*building, n*iterating + n_contact*inside)
   end function friction_step_memory
 
+  !> Compute the displacements of given tractions by the operator of the finest lattice.
   subroutine displacements(self, pressure, traction, displacement, error)
     class(frictional_contact_t), intent(inout) :: self
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
@@ -136,6 +145,7 @@ contains
     call self%problem%displacements(self%operators(1)%flexibility, pressure, traction, displacement, error)
   end subroutine displacements
 
+  !> Solve a load step: predict on coarser lattices, iterate on the finest.
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(frictional_contact_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
@@ -147,36 +157,45 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: guess
-    real(wp) :: work
+    real(wp) :: work, coarse_work
     integer :: sweeps
-    logical :: guessed
+    logical :: guessed, touching
 
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
       return
     end if
     work = 0.0_wp
-    call take_tractions(start, guess, self%problem%space)
+    sweeps = 0
+    touching = self%problem%space%max(start%pressure) > 0.0_wp
+    if (allocated(self%guess)) then
+      call attempt(self%guess)
+      if (allocated(error)) return
+      state%sweeps = sweeps
+      state%operator_applications = work
+      if (state%converged) return
+    end if
+    call copy_tractions(start, guess, self%problem%space)
     guessed = .false.
     if (size(self%operators) > 1) then
-      if (any(start%pressure > 0.0_wp)) then
-        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, guessed, work, error)
+      if (touching) then
+        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, guessed, coarse_work, error)
       else
-        call coarse_guess(self, reference, target, max_sweeps, guess, work, error)
+        call coarse_guess(self, reference, target, max_sweeps, guess, coarse_work, error)
         guessed = .not. allocated(error)
-        if (guessed) guessed = any(guess%pressure > 0.0_wp)
+        if (guessed) guessed = self%problem%space%max(guess%pressure) > 0.0_wp
       end if
       if (allocated(error)) return
+      work = work + coarse_work
     end if
-    sweeps = 0
     call attempt(guess)
     if (allocated(error)) return
-    ! what coarse lattices found may lead astray: the old state is a start as good
+    ! the start by coarse lattices may not converge where the old state does
     if (guessed .and. .not. (state%converged .or. state%sliding)) call attempt(start)
     if (allocated(error)) return
     ! a first step has no state to fall back on: it goes on from where it stands
-    if (.not. (state%converged .or. state%sliding .or. any(start%pressure > 0.0_wp))) then
-      call take_tractions(state, guess, self%problem%space)
+    if (.not. (state%converged .or. state%sliding .or. touching)) then
+      call copy_tractions(state, guess, self%problem%space)
       call attempt(guess)
       if (allocated(error)) return
     end if
@@ -197,7 +216,7 @@ contains
 
   end subroutine solve_step
 
-  !> A first guess from the coarser lattices.
+  !> Find a first guess on the coarser lattices.
   subroutine coarse_guess(self, reference, target, max_sweeps, guess, work, error)
     class(frictional_contact_t), intent(inout), target :: self
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
@@ -227,7 +246,7 @@ contains
     end do
     do l = size(self%operators), 2, -1
       associate (problem => self%coarse(l))
-        if (.not. any(problem%candidate)) cycle
+        if (problem%space%count(problem%candidate) == 0) cycle
         if (.not. problem%is_pressed(target)) cycle
         call new_friction_state(state, problem%lattice, problem%space)
         state%motion = guess%motion
@@ -243,7 +262,7 @@ contains
     if (allocated(coarser%pressure)) call prolong_state(self%coarse(2), coarser, self%problem, guess)
   end subroutine coarse_guess
 
-  !> Tractions and motions of a coarse state as a start on the finer lattice.
+  !> Prolong tractions and motions of a coarse state, to start on the finer lattice.
   subroutine prolong_state(coarse_problem, coarse, problem, state)
     type(friction_problem_t), intent(in) :: coarse_problem
     type(contact_state_t), intent(in) :: coarse

@@ -1,6 +1,6 @@
-!> What leads Newton's method to the solution from afar: damped steps and cuts of the classification parameter
-!> (docs/theory/friction.md, "Globalisation"). Nodes are held where nothing resists a load by `hold_nodes` of
-!> hc_load_constraints, as in the direct method.
+!> Globalisation of Newton's method: damped steps and cuts of the classification parameter
+!> (docs/theory/friction.md, "Globalisation"). Where nothing resists a load, `fix_in_stick` of hc_load_constraints fixes
+!> nodes, as in the direct method.
 module hc_globalization
   use hc_precision, only: wp
   use hc_options, only: newton_options_t
@@ -9,7 +9,7 @@ module hc_globalization
 
   public :: globalization_t
 
-  !> How an iteration fares.
+  !> Progress of an iteration.
   type :: globalization_t
     !> Factor of the classification parameter, the smaller the worse the iteration goes
     real(wp) :: share_of_r = 1.0_wp
@@ -19,7 +19,7 @@ module hc_globalization
     !> Share of the next step that is taken if that residual does not fall
     real(wp), private :: damping = 1.0_wp
   contains
-    !> Cut the classification parameter where nodes have to be held
+    !> Cut the classification parameter where nodes are fixed in stick
     procedure :: cut
     !> Share of a step to take
     procedure :: step_share
@@ -37,7 +37,7 @@ contains
     self%share_of_r = max(factor*self%share_of_r, options%least_share_of_r)
   end subroutine cut
 
-  !> Share of a step to take, 1 or less: a residual that does not fall goes in circles.
+  !> Choose the share of a step to take, 1 or less: a residual that does not fall oscillates.
   subroutine step_share(self, residual, options, share)
     class(globalization_t), intent(inout) :: self
     !> Residual R_t after the whole step

@@ -26,7 +26,7 @@ module hc_lattice_solver
 
 contains
 
-  !> Sweeps on one lattice.
+  !> Sweep on one lattice until the residuals are small.
   subroutine solve_on_lattice(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
@@ -47,31 +47,29 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    type(friction_iterate_t) :: now
+    type(friction_iterate_t), target :: now
     real(wp), allocatable :: displacement(:, :, :)
     type(newton_options_t) :: options
-    integer :: sweep, held, apart
+    integer :: sweep, fixed, staggered
     logical :: failed
 
     options = problem%options%newton
-    held = 0
-    operators%flexibility%applications = 0.0_wp
-    operators%preconditioning = 0.0_wp
+    fixed = 0
+    call operators%reset()
     call new_friction_state(state, problem%lattice, operators%space)
-    allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
-    call now%begin(problem, operators, start, reference, target, tolerance, error)
+    call now%set_start(problem, operators, start, reference, target, tolerance, error)
     if (allocated(error)) return
     ! sweeps that find pressure and shear traction one after the other
-    apart = max_sweeps
-    if (now%pressure_feels_shear) apart = options%staggered_sweeps
+    staggered = max_sweeps
+    if (now%pressure_feels_shear) staggered = options%staggered_sweeps
     if (problem%couples_strongly()) then
-      apart = options%staggered_sweeps_strong
+      staggered = options%staggered_sweeps_strong
       call now%globalization%cut(options%cautious_share, options)
     end if
     do sweep = 1, max_sweeps
       failed = .true.
-      if (sweep > apart .and. (max(now%residual_normal, now%residual_tangential) < options%coupled_residual .or. &
-                              sweep > apart + options%coupled_delay)) then
+      if (sweep > staggered .and. (max(now%residual_normal, now%residual_tangential) < options%coupled_residual .or. &
+                              sweep > staggered + options%coupled_delay)) then
         call coupled_sweep(now, failed, error)
         if (allocated(error)) return
       end if
@@ -80,22 +78,24 @@ contains
       if (.not. now%is_finite()) exit
       if (debug_checks) call now%check_displacements(error)
       if (allocated(error)) return
-      if (now%held) then
-        held = held + 1
+      if (now%fixed) then
+        fixed = fixed + 1
         state%sliding = overloads(problem, target, reshape(now%p, problem%lattice%extent), now%residual_normal)
-        if (state%sliding) held = options%max_held_sweeps
+        if (state%sliding) fixed = options%max_fixed_sweeps
       end if
       state%sweeps = sweep
       if (max(now%residual_normal, now%residual_tangential) > tolerance .and. sweep < max_sweeps &
-          .and. .not. now%unsupported .and. held < options%max_held_sweeps) cycle
+          .and. .not. now%unsupported .and. fixed < options%max_fixed_sweeps) cycle
 
-      ! what is recorded fulfils the bounds exactly, and is judged by a product of its own
+      ! the recorded tractions are admissible exactly, and judged by a product of their own
       call record(now, state)
       state%motion = now%motion
+      allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
       call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
       if (allocated(error)) return
-      call problem%conclude(target, tolerance, reference, displacement, state)
-      if (state%converged .or. now%unsupported .or. held >= options%max_held_sweeps) exit
+      call problem%complete_state(target, tolerance, reference, displacement, state)
+      deallocate (displacement)
+      if (state%converged .or. now%unsupported .or. fixed >= options%max_fixed_sweeps) exit
       call now%refresh(error)
       if (allocated(error)) return
     end do
@@ -104,13 +104,14 @@ contains
     end if
     state%sliding = state%sliding .and. .not. state%converged
     state%operator_applications = operators%work()
+    call operators%clear()
     if (state%converged) return
     state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)
     if (state%sliding) state%stopped = loads_not_carried
     if (.not. now%is_finite()) state%stopped = out_of_range
   end subroutine solve_on_lattice
 
-  !> Tractions of an iterate, without tension and cut to the cone.
+  !> Record the tractions of an iterate, without tension and within the admissible set.
   subroutine record(now, state)
     type(friction_iterate_t), intent(in) :: now
     type(contact_state_t), intent(inout) :: state
@@ -118,12 +119,12 @@ contains
     integer :: n, row, from, to
 
     n = size(now%p)
-    call now%cut_to_cone(q)
+    call now%project_to_cone(q)
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
     do row = 1, size(state%pressure, 2)
       to = row*size(state%pressure, 1)
       from = to - size(state%pressure, 1) + 1
-      call now%problem%normal_law%project(from, now%p(from:to), state%pressure(:, row))
+      call now%problem%normal_law%project(now%p(from:to), state%pressure(:, row))
       state%traction(:, row, 1) = q(from:to)
       state%traction(:, row, 2) = q(n + from:n + to)
     end do

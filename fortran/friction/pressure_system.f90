@@ -1,10 +1,9 @@
 !> The linear problem of the pressure on the nodes in contact, w = K p, for conjugate gradients ((F9) of
-!> docs/theory/friction.md).
+!> docs/theory/friction.md); under a compliant law of contact, w = (K + C) p with the springs of its linearisation.
 module hc_pressure_system
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: normal
-  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
   use hc_elastic_operators, only: operators_t
   use hc_linear_system, only: linear_system_t
   implicit none
@@ -15,26 +14,18 @@ module hc_pressure_system
   !> Pressure on the nodes in contact.
   type, extends(linear_system_t) :: pressure_system_t
     type(operators_t), pointer :: operators => null()
-    !> Continuation of displacements beyond the contact
-    type(edge_extension_t) :: edge
+    !> Compliance C [m/Pa] and offset [m] of the spring of each node, 0 off the contact; not there without a compliant law
+    real(wp), allocatable :: compliance(:), offset(:)
   contains
-    !> Take the nodes in contact
-    procedure :: take => take_contact
+    !> Add to displacements what the springs give way, or take it off
+    procedure :: stretch
     procedure :: product => pressure_product
     procedure :: precondition => pressure_precondition
   end type pressure_system_t
 
 contains
 
-  !> Take the nodes in contact.
-  subroutine take_contact(self, contact)
-    class(pressure_system_t), intent(inout) :: self
-    !> Nodes in contact (n)
-    logical, intent(in) :: contact(:)
-
-    call new_edge_extension(self%edge, reshape(contact, self%operators%flexibility%lattice%extent), self%operators%space)
-  end subroutine take_contact
-
+  !> Multiply by the normal flexibility with the springs of the law of contact.
   subroutine pressure_product(self, x, y, error)
     class(pressure_system_t), intent(inout) :: self
     real(wp), intent(in), contiguous, target :: x(:)
@@ -42,15 +33,37 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call self%operators%apply([normal], x, [normal], y, error)
+    call self%stretch(1.0_wp, x, y)
   end subroutine pressure_product
 
+  !> Add to y: y <- y + factor C x
+  subroutine stretch(self, factor, x, y)
+    class(pressure_system_t), intent(in) :: self
+    !> 1 to add, -1 to take off
+    real(wp), intent(in) :: factor
+    !> Pressure [Pa], and closing of the gap [m]
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp), intent(inout), contiguous :: y(:)
+    integer :: i
+
+    if (.not. allocated(self%compliance)) return
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do i = 1, size(x)
+      y(i) = y(i) + factor*self%compliance(i)*x(i)
+    end do
+    !$omp end parallel do
+  end subroutine stretch
+
+  !> Apply the preconditioner of the pressure.
   subroutine pressure_precondition(self, x, y, error)
     class(pressure_system_t), intent(inout) :: self
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
 
-    call self%operators%precondition_pressure(self%edge, x, y)
+    associate (operators => self%operators, error => error)
+      call operators%normal%apply(x, y, operators%preconditioning)
+    end associate
   end subroutine pressure_precondition
 
 end module hc_pressure_system

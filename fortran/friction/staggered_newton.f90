@@ -13,10 +13,10 @@
 !> and in slip q = mu p e + tau t with t.ds + D tau = 0, (F5), (F6). A sweep is one pass of block Gauss-Seidel over it:
 !>
 !> 1. `solve_pressure`: the contact C by (F5), and (F9), T_pp p - approach = -h - T_pq q on C with sum A p = P, the approach its
-!>    multiplier, by conjugate gradients that keep the load (Polonsky & Keer, Wear 231, 1999, with a preconditioner);
+!>    multiplier, by conjugate gradients at constant load (Polonsky & Keer, Wear 231, 1999, with a preconditioner);
 !> 2. `solve_shear`: stick, slip, directions e and compliances D by (F5), (F6), with r of (F8);
 !> 3. and (F10), (E^T T_qq E + D) (q, tau) - E^T B motions = E^T (s^n - T_qp p - T_qq mu p e), with the prescribed loads, by the
-!>    same conjugate gradients; where nothing resists a load, nodes are held; where the residual does not fall, the
+!>    same conjugate gradients; where nothing resists a load, nodes are fixed in stick; where the residual does not fall, the
 !>    step is damped (hc_globalization);
 !> 4. the closing of the gap by the shear traction, cut to the cone, and the residuals R_n and R_t, which take no product more.
 !>
@@ -27,9 +27,9 @@ module hc_staggered_newton
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_load_constraints, only: driven_motions_t
-  use hc_active_zones, only: find_contact, classify, find_constraints, find_prescribed_displacement
+  use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
-  use hc_linear_system, only: precondition_constraints, fulfil, solution_accurate
+  use hc_linear_system, only: precondition_constraints, satisfy_constraints, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
   private
@@ -38,10 +38,10 @@ module hc_staggered_newton
 
 contains
 
-  !> One sweep: pressure, then shear traction, each with what it does to the other.
+  !> Solve for the pressure, then for the shear traction, each under the displacements by the other.
   subroutine staggered_sweep(now, error)
     !> Tractions and motions
-    type(friction_iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout), target :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: q(:)
@@ -53,18 +53,18 @@ contains
     ! 1.
     call solve_pressure(now, error)
     if (allocated(error)) return
-    if (now%shear_feels_pressure .and. now%cold .and. now%first) then
+    if (now%shear_feels_pressure .and. now%without_start .and. now%first) then
       call now%operators%apply([normal], now%p, [along_x, along_y], now%u, error)
       if (allocated(error)) return
     end if
-    ! what the new pressure makes of the old shear traction is what has to be mended
+    ! R_t of the old shear traction under the new pressure: what the step has to reduce
     if (.not. now%first) call now%find_tangential_residual()
     ! 2. and 3.
     call solve_shear(now, error)
     if (allocated(error)) return
     ! 4.
     if (now%pressure_feels_shear) then
-      call now%cut_to_cone(q)
+      call now%project_to_cone(q)
       call now%operators%apply([along_x, along_y], q, [normal], now%closing, error)
       if (allocated(error)) return
       now%cut = .true.
@@ -73,7 +73,7 @@ contains
     now%first = .false.
   end subroutine staggered_sweep
 
-  !> Pressure under the present shear traction, (F9).
+  !> Solve for the pressure under the present shear traction, (F9).
   subroutine solve_pressure(now, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -85,15 +85,15 @@ contains
     type(newton_options_t) :: options
     real(wp) :: goal, scale, residual, drift, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations, outcome
-    logical :: changed, independent, searching
+    logical :: changed, independent, searching, compliant, unknown_gap
 
     n = size(now%p)
     options = now%problem%options%newton
-    ! a start that knows of no contact: the one without shear has to be found before stick and slip can be
-    searching = now%cold .and. now%first
+    ! a start without contact: the contact without shear is found before stick and slip
+    searching = now%without_start .and. now%first
+    compliant = now%problem%normal_law%is_compliant()
     cell_area = now%problem%lattice%cell_area()
     n_constraint = merge(1, 0, now%target%control(normal) == force_control)
-    allocate (constraint(n, n_constraint), rhs(n))
     level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
     do area = 1, merge(options%max_areas, options%max_areas_uncoupled, now%pressure_feels_shear .and. .not. searching)
       call now%find_gap(gap)
@@ -104,15 +104,20 @@ contains
       if (now%residual_normal <= options%final_accuracy*now%tolerance .and. &
           abs(missing(1)) <= options%final_accuracy*now%tolerance*carried) return
       changed = now%first .and. area == 1
-      if (.not. (changed .and. now%cold)) then
+      if (.not. (changed .and. now%without_start)) then
         call find_contact(now, gap, contact)
-        if (.not. changed) changed = count(contact .neqv. now%contact) > 0
+        if (.not. changed) changed = now%pressure%space%count(contact .neqv. now%contact) > 0
         call move_alloc(contact, now%contact)
       end if
-      if (searching .and. now%pressure_feels_shear .and. .not. changed) return
+      if (searching .and. now%pressure_feels_shear .and. .not. changed .and. &
+          .not. (compliant .and. now%residual_normal > options%settled_residual)) return
+      ! a first pressure has the load, but no gap yet
+      unknown_gap = changed .and. now%without_start .and. now%first .and. area == 1 .and. n_constraint == 1
+      if (compliant .and. .not. unknown_gap) call linearize_law(now, gap, .false.)
 
-      if (changed) call now%pressure%take(now%contact)
+      if (changed .and. (.not. compliant .or. unknown_gap)) call now%operators%normal%set_active(now%contact)
       if (searching .and. now%pressure_feels_shear .and. allocated(now%punch_pressure)) deallocate (now%punch_pressure)
+      allocate (constraint(n, n_constraint), rhs(n))
       !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, n
         if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))
@@ -125,28 +130,40 @@ contains
       if (changed) then
         if (n_constraint == 1) then
           missing = now%target%value(normal)/cell_area - now%pressure%space%sum(now%p)
-          call fulfil(constraint, mb, missing, now%p, independent, now%pressure%space)
+          call satisfy_constraints(constraint, mb, missing, now%p, independent, now%pressure%space)
         end if
+        if (compliant .and. unknown_gap) call linearize_law(now, gap, .true.)
         call now%pressure%product(now%p, now%w, error)
         if (allocated(error)) return
+      else
+        call now%pressure%stretch(1.0_wp, now%p, now%w)
       end if
+      if (compliant) rhs = rhs - now%pressure%offset
       goal = options%final_accuracy*now%tolerance
-      if (changed .or. now%pressure_feels_shear) goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
-      scale = now%problem%normal_compliance*now%pressure%space%max(now%p)
+      if (changed .or. compliant .or. now%pressure_feels_shear) then
+        goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
+      end if
+      scale = now%pressure%space%max(now%p)
+      if (compliant) then
+        scale = now%problem%sprung_compliance(scale)*scale
+      else
+        scale = now%problem%normal_compliance*scale
+      end if
       call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
                         multiplier(:n_constraint), residual, iterations, outcome, error, drift)
       if (allocated(error)) return
       if (drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
       if (allocated(error)) return
+      call now%pressure%stretch(-1.0_wp, now%p, now%w)
       now%outcome = max(now%outcome, outcome)
       if (n_constraint == 1) now%motion(normal) = multiplier(1)
     end do
   end subroutine solve_pressure
 
-  !> Shear traction under the present pressure, (F10).
+  !> Solve for the shear traction under the present pressure, (F10).
   subroutine solve_shear(now, error)
     !> Tractions and motions
-    type(friction_iterate_t), intent(inout) :: now
+    type(friction_iterate_t), intent(inout), target :: now
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -157,7 +174,7 @@ contains
     type(newton_options_t) :: options
     real(wp) :: goal, scale, residual, drift, share, motion(n_motion)
     integer :: n, iterations, outcome
-    logical :: independent, holding
+    logical :: independent, fixing
 
     n = size(now%p)
     options = now%problem%options%newton
@@ -165,33 +182,35 @@ contains
       now%q = 0.0_wp
       return
     end if
-    allocate (x(2*n), ax(2*n), rhs(2*n), q(2*n))
+    allocate (x(2*n), ax(2*n), q(2*n))
     call now%shear%space%copy(now%q, q)
-    holding = .false.
+    fixing = .false.
+    scale = now%problem%tangential_compliance*now%traction_scale()
     do
-      call classify(now, holding, active)
+      call classify(now, fixing, active)
       call now%shear%to_frame(now%q, x)
       call find_constraints(now, active, driven, constraint, missing)
       multiplier = driven%multipliers(now%motion)
       call find_rigid_traction(now, active, constraint, .false., mb, error)
       if (allocated(error)) return
-      call fulfil(constraint, mb, missing, x, independent, now%shear%space)
+      call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space)
       if (.not. independent) then
         call find_rigid_traction(now, active, constraint, .true., mb, error)
         if (allocated(error)) return
-        call fulfil(constraint, mb, missing, x, independent, now%shear%space)
+        call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space)
       end if
       if (independent) then
         call displace(now, x, ax, error)
         if (allocated(error)) return
         ! motions that are prescribed are known; the others are multipliers
+        allocate (rhs(2*n))
         call find_prescribed_displacement(now, rhs)
+        call now%shear%add_rest(rhs)
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
         goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, &
                                                               now%pressure_feels_shear)))
         goal = max(goal, options%final_accuracy*now%tolerance)
-        scale = now%problem%tangential_compliance*now%traction_scale()
         call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
                           residual, iterations, outcome, error, drift)
         if (allocated(error)) return
@@ -200,13 +219,13 @@ contains
         now%outcome = max(now%outcome, outcome)
       end if
       now%unsupported = .not. independent
-      if (size(missing) == 0 .or. holding) exit
+      if (size(missing) == 0 .or. fixing) exit
       ! where all nodes slip, only their directions resist a load: not beyond reason
       if (independent) then
         if (any(active(n + 1:))) exit
-        if (maxval(abs(x(:n))) <= options%most_across*now%traction_scale()) exit
+        if (now%shear%space%max_abs(x(:n)) <= options%most_across*now%traction_scale()) exit
       end if
-      holding = .true.
+      fixing = .true.
       call now%globalization%cut(options%cautious_share, options)
       now%q = q
     end do
@@ -218,23 +237,24 @@ contains
     motion = now%motion
     call driven%set_motions(multiplier, now%motion)
     call now%shear%to_plane(x, now%q)
-    call now%shear%take_springs_off(x, ax)
+    call now%shear%subtract_springs(x, ax)
     call now%shear%to_plane(ax, now%u)
     call now%find_tangential_residual()
     call now%globalization%step_share(now%residual_tangential, options, share)
     if (share < 1.0_wp) then
-      ! Newton's method goes in circles: what lies between carries the same loads
+      ! Newton's method oscillates: any iterate between carries the same loads
       now%q = merge(q + share*(now%q - q), 0.0_wp, [now%contact, now%contact])
       now%motion = motion + share*(now%motion - motion)
       call now%shear%to_frame(now%q, x)
       call displace(now, x, ax, error)
       if (allocated(error)) return
-      call now%shear%take_springs_off(x, ax)
+      call now%shear%subtract_springs(x, ax)
       call now%shear%to_plane(ax, now%u)
     end if
+    if (now%shear%spring_rounding(x) > options%displacement_rounding*scale) call now%refresh(error)
   end subroutine solve_shear
 
-  !> What a shear traction and the pressure displace together, springs included.
+  !> Compute the displacements by a shear traction and the pressure together, springs included.
   subroutine displace(now, x, ax, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -244,28 +264,23 @@ contains
     real(wp), intent(out), contiguous, target :: ax(:)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: traction(:), moved(:)
-    integer :: n, i
+    real(wp), allocatable :: traction(:)
+    integer :: n
 
     if (.not. now%shear_feels_pressure) then
       call now%shear%product(x, ax, error)
       return
     end if
     n = size(now%p)
-    allocate (traction(3*n), moved(2*n))
+    allocate (traction(3*n))
     call now%shear%space%copy(now%p, traction(:n))
     call now%shear%to_plane(x, traction(n + 1:))
-    call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], moved, error)
+    call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], ax, error)
     if (allocated(error)) return
-    call now%shear%to_frame(moved, ax)
-    !$omp parallel do schedule(static) num_threads(now%shear%space%threads)
-    do i = 1, n
-      ax(i) = ax(i) + now%shear%compliance(i)*x(i)
-    end do
-    !$omp end parallel do
+    call now%shear%add_springs(x, ax)
   end subroutine displace
 
-  !> Estimate of the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
+  !> Estimate the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
   subroutine find_punch_pressure(now, constraint, mb, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -291,7 +306,7 @@ contains
     end do
   end subroutine find_punch_pressure
 
-  !> Estimate of the shear traction that rigid motions of the unknowns cause, V of (F11): made once a step, if it serves.
+  !> Estimate the shear traction that rigid motions of the unknowns cause, V of (F11): made once a step, if it serves.
   subroutine find_rigid_traction(now, active, constraint, afresh, mb, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
@@ -313,7 +328,7 @@ contains
     if (known) then
       allocate (mb, mold=constraint)
       do k = 1, size(mb, 2)
-        call now%shear%soften(constraint(:, k), now%rigid_traction(:, k), active, mb(:, k))
+        call now%shear%apply_slip_compliance(constraint(:, k), now%rigid_traction(:, k), active, mb(:, k))
       end do
     else
       call precondition_constraints(now%shear, active, constraint, mb, error)

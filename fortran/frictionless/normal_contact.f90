@@ -10,6 +10,7 @@ module hc_normal_contact
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
+  use hc_hierarchy, only: level_count, build_levels
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
   use hc_fft_layout_single, only: convolution_memory
@@ -18,12 +19,13 @@ module hc_normal_contact
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, load_target_t, new_contact_state, check_problem, check_target, normal
   use hc_contact_solver, only: contact_solver_t
-  use hc_symbol_preconditioner, only: preconditioner_memory
+  use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_inverse_symbol, only: preconditioner_memory
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
   use hc_subwindow, only: next_part
-  use hc_transfer, only: level_count, prolong_edge, coarsen_bodies
+  use hc_transfer, only: prolong_edge
   implicit none
   private
 
@@ -39,14 +41,13 @@ module hc_normal_contact
     !> The part of the finest lattice around the contact, and its first column and row there
     type(normal_lattice_t), allocatable :: inner
     integer :: corner(2) = 0
-    type(elastic_pair_t) :: pair
     !> Tuning numbers
     type(options_t) :: options
     !> The kernel, as far as it was needed
     type(normal_kernel_t) :: kernel
-    !> Spectra that are kept
+    !> Cache of spectra
     type(kernel_cache_t), pointer :: cache => null()
-    !> Threads that were asked for; 0: as many as OpenMP would take
+    !> Threads to use; 0: as many as OpenMP would take
     integer :: threads = 0
   contains
     procedure :: solve_step
@@ -56,8 +57,8 @@ module hc_normal_contact
 
 contains
 
-  !> Operators of a problem on all its lattices.
-  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads, cache, options)
+  !> Set up the operators of a problem on all its lattices.
+  subroutine new_normal_contact(self, lattice, pair, initial_gap, candidate, error, n_threads, cache, options, law)
     !> Problem to be set up
     type(normal_contact_t), intent(out) :: self
     !> Lattice and window
@@ -72,42 +73,45 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> Threads to use; absent or 0: as many as OpenMP would take
     integer, intent(in), optional :: n_threads
-    !> Spectra that are kept; it has to outlive the problem
+    !> Cache of spectra; it has to outlive the problem
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     !> Tuning numbers; absent: the usual ones
     type(options_t), intent(in), optional :: options
+    !> Law of contact; absent: unilateral contact
+    class(normal_law_t), intent(in), optional :: law
 
     integer :: l
 
-    self%pair = pair
     if (present(n_threads)) self%threads = n_threads
     if (present(cache)) self%cache => cache
     if (present(options)) self%options = options
     call check_problem(lattice, pair, initial_gap, candidate, error, n_threads)
     if (allocated(error)) return
+    if (present(law)) call law%check(error)
+    if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, self%options%multilevel%smallest_side)))
     allocate (self%iterate(size(self%level)))
+    associate (finest => self%level(1))
+      finest%lattice = lattice
+      finest%initial_gap = initial_gap
+      finest%candidate = candidate
+      finest%pair = pair
+      finest%options = self%options
+      if (present(law)) then
+        allocate (finest%law, source=law)
+      else
+        allocate (unilateral_t :: finest%law)
+      end if
+      call build_levels(finest, self%level(2:))
+    end associate
     do l = 1, size(self%level)
-      associate (level => self%level(l))
-        level%options = self%options
-        if (l == 1) then
-          level%lattice = lattice
-          level%initial_gap = initial_gap
-          level%candidate = candidate
-        else
-          associate (finer => self%level(l - 1))
-            call coarsen_bodies(finer%lattice, finer%initial_gap, finer%candidate, level%lattice, level%initial_gap, &
-                                level%candidate)
-          end associate
-        end if
-        ! what the finest lattice needs for iterations waits for the first one: perhaps a part of it is enough
-        call level%prepare(pair, self%kernel, l == 1, l > 1, space_of(self, level%lattice), error, self%cache)
-        if (allocated(error)) return
-      end associate
+      ! operators for iterations on the finest lattice are set up on demand: a part of it may be enough
+      call self%level(l)%prepare(self%kernel, l == 1, l > 1, space_of(self, self%level(l)%lattice), error, self%cache)
+      if (allocated(error)) return
     end do
   end subroutine new_normal_contact
 
-  !> Bytes that a problem takes, for a window of the given size.
+  !> Count the bytes that a problem takes, for a window of the given size.
   pure integer(selected_int_kind(18)) function normal_contact_memory(extent, threads)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -128,6 +132,7 @@ contains
                             + field*int(maxval(extent), long)**2 + n*(2*field + half + 2*field + 4*half)
   end function normal_contact_memory
 
+  !> Solve a load step, of which the normal load or the approach matters.
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(normal_contact_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
@@ -155,7 +160,7 @@ contains
     real(wp), intent(in) :: tolerance
     !> Active sets that may be tried on each lattice
     integer, intent(in) :: max_sweeps
-    !> Solution; `converged` tells whether the residuals are within the tolerance
+    !> Solution; `converged`: the residuals are within the tolerance
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure: a target that cannot be solved for, numbers that are not finite
     type(error_t), allocatable, intent(out) :: error
@@ -169,7 +174,7 @@ contains
     work = 0.0_wp
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
-        if (.not. any(level%candidate)) cycle
+        if (level%space%count(level%candidate) == 0) cycle
         allocate (state%pressure(level%lattice%extent(1), level%lattice%extent(2)), source=0.0_wp)
         if (allocated(coarse%pressure)) then
           call prolong_edge(self%level(l + 1)%lattice, coarse%pressure, level%lattice, state%pressure, level%space)
@@ -191,7 +196,7 @@ contains
     state%operator_applications = work
   end subroutine solve
 
-  !> Space of a lattice: one thread where waking the others for each of the short passes takes longer than they save.
+  !> Return the space of a lattice: one thread where the start of the others takes longer than each of the short passes.
   type(field_space_t) function space_of(self, lattice)
     class(normal_contact_t), intent(in) :: self
     type(lattice_t), intent(in) :: lattice
@@ -202,7 +207,7 @@ contains
     end if
   end function space_of
 
-  !> Nodes of a part of a lattice over those of the whole.
+  !> Return the nodes of a part of a lattice over those of the whole.
   pure real(wp) function share_of(part, whole)
     type(normal_lattice_t), intent(in) :: part, whole
     share_of = real(part%lattice%size(), wp)/whole%lattice%size()
@@ -237,11 +242,11 @@ contains
       do try = 1, self%options%multilevel%max_parts + 1
         call next_part(try, self%options%multilevel, whole%lattice, whole%candidate, state, low, high, found)
         if (.not. found) exit
-        call take_part(self, low, high, error)
+        call extract_part(self, low, high, error)
         if (allocated(error)) return
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
           part%pressure = state%pressure(first(1):last(1), first(2):last(2))
-          ! the product over the window sees what single precision left
+          ! the product over the window contains the errors of single precision
           call solve_on_normal_lattice(inner, self%iterate(1), control, target, &
                                        self%options%normal%part_tolerance*tolerance, max_sweeps, part, error)
           if (allocated(error)) return
@@ -252,7 +257,7 @@ contains
         end associate
         state%motion = part%motion
         state%stopped = part%stopped
-        call whole%conclude_anew(control, target, tolerance, state, error)
+        call whole%complete_from_pressure(control, target, tolerance, state, error)
         if (allocated(error)) return
         work = work + whole%work()
         state%sweeps = sweeps
@@ -260,7 +265,7 @@ contains
         if (.not. part%converged) exit
       end do
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
-      call whole%prepare(self%pair, self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)
+      call whole%prepare(self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)
       if (allocated(error)) return
       call solve_on_normal_lattice(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
@@ -269,10 +274,10 @@ contains
     end associate
   end subroutine solve_finest
 
-  !> Set up the part of the finest lattice between some columns and rows, unless it is at hand.
+  !> Set up the part of the finest lattice between some columns and rows, unless it is set up already.
   !>
   !> No other part is taken, be it large enough: a load gives the same bits whatever came before it.
-  subroutine take_part(self, low, high, error)
+  subroutine extract_part(self, low, high, error)
     class(normal_contact_t), intent(inout) :: self
     integer, intent(in) :: low(2), high(2)
     !> Allocated on failure: not enough memory
@@ -284,13 +289,8 @@ contains
     end if
     allocate (self%inner)
     self%corner = low
-    associate (inner => self%inner, whole => self%level(1))
-      inner%lattice = whole%lattice%subwindow(low, high)
-      inner%options = self%options
-      inner%initial_gap = whole%initial_gap(low(1):high(1), low(2):high(2))
-      inner%candidate = whole%candidate(low(1):high(1), low(2):high(2))
-      call inner%prepare(self%pair, self%kernel, .true., .true., space_of(self, inner%lattice), error, self%cache)
-    end associate
-  end subroutine take_part
+    call self%level(1)%extract_part(low, high, self%inner)
+    call self%inner%prepare(self%kernel, .true., .true., space_of(self, self%inner%lattice), error, self%cache)
+  end subroutine extract_part
 
 end module hc_normal_contact

@@ -1,4 +1,4 @@
-!> Steps of an iteration for frictionless contact: where to go, and how far.
+!> Steps of an iteration for frictionless contact: direction and length.
 !>
 !> Equations: docs/theory/normal_contact.md, (N3) to (N5).
 module hc_normal_directions
@@ -9,13 +9,15 @@ module hc_normal_directions
   implicit none
   private
 
-  public :: find_residual, projected_step, next_direction, find_step
+  public :: find_residual, projected_step, next_direction, find_step, multiply_direction
 
 contains
 
-  !> r = approach - h - w on the active nodes.
+  !> Compute r = approach - h - w on the active nodes.
   subroutine find_residual(level, now)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     real(wp) :: gap, scale
     integer :: col, row
@@ -32,11 +34,14 @@ contains
     !$omp end parallel do
   end subroutine find_residual
 
-  !> d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or what is left of p, on a set to be held.
-  subroutine projected_step(level, now, held, by_load, pressures)
+  !> Compute d = max(p + c z, 0) - p on the active nodes, -p elsewhere; or the part of p on a fixed set.
+  subroutine projected_step(level, now, fixed, by_load, pressures)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    logical, intent(in) :: held, by_load
+    !> The set of active nodes is fixed; the normal load is prescribed, not the approach
+    logical, intent(in) :: fixed, by_load
     !> Sum of the pressures under a prescribed load
     real(wp), intent(in) :: pressures
     real(wp) :: part(size(now%p, 2)), aim, mean, row_sum, step_length
@@ -45,7 +50,7 @@ contains
 
     step_length = level%options%normal%step_length
     mean = 0.0_wp
-    if (by_load .and. .not. held) then
+    if (by_load .and. .not. fixed) then
       !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, row_sum)
       do row = 1, size(now%p, 2)
         row_sum = 0.0_wp
@@ -66,7 +71,7 @@ contains
         aim = 0.0_wp
         if (now%active(col, row)) then
           aim = now%p(col, row)/now%p_unit
-          if (.not. held) then
+          if (.not. fixed) then
             aim = aim + step_length*now%z(col, row, 1)
             if (by_load) aim = aim - step_length*mean*now%punch(col, row)
           end if
@@ -94,10 +99,13 @@ contains
     !$omp end parallel do
   end subroutine projected_step
 
-  !> Direction of conjugate gradients.
+  !> Compute the next direction of conjugate gradients.
   subroutine next_direction(level, now, by_load, recurrence)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
+    !> The normal load is prescribed, not the approach
     logical, intent(in) :: by_load
     !> That of the last direction; on return that of the new one
     type(conjugate_gradient_t), intent(inout) :: recurrence
@@ -141,10 +149,32 @@ contains
     !$omp end parallel do
   end subroutine next_direction
 
-  !> Length of a step of conjugate gradients; 0 if there is no curvature.
+  !> Compute K d, with the springs of a compliant law.
+  subroutine multiply_direction(level, now)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(inout) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(inout) :: now
+    real(wp) :: unit
+    integer :: row
+
+    call level%multiply(now%d, now%kd)
+    if (.not. allocated(now%compliance)) return
+    unit = now%p_unit/now%w_unit
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      now%kd(:, row, 1) = now%kd(:, row, 1) + real(unit*now%compliance(:, row)*now%d(:, row, 1), sp)
+    end do
+    !$omp end parallel do
+  end subroutine multiply_direction
+
+  !> Compute the length of a step of conjugate gradients; 0 if there is no curvature.
   real(wp) function find_step(level, now, recurrence)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(in) :: now
+    !> Recurrence of conjugate gradients
     type(conjugate_gradient_t), intent(in) :: recurrence
     real(wp) :: part(size(now%p, 2))
     integer :: row

@@ -1,16 +1,19 @@
 !> The state of an iteration for frictionless contact, and the passes over its fields.
+!>
+!> Equations: docs/theory/normal_contact.md, (N2) to (N6).
 module hc_normal_iterate
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t, status, raise
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
-  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_rows, only: judge_row, add_row, largest_of
+  use hc_normal_rows, only: classify_row, add_row, largest_of
   implicit none
   private
 
-  public :: normal_iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, fit_load, push_only
+  public :: normal_iterate_t, find_span, rescale, find_approach, classify, classification_parameter, set_active, linearize_law, &
+            add_springs, subtract_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
 
   !> Error of a product in single precision, relative to its largest value.
   real(wp), parameter :: single_error = epsilon(1.0_sp)
@@ -20,22 +23,23 @@ module hc_normal_iterate
   !> Those in single precision are zero off the active nodes, r but for the rings of the
   !> continuation and z and kd everywhere; their units are p_unit and p_unit times that of the preconditioner.
   type :: normal_iterate_t
-    !> Pressure [Pa] and the closing of the gap that it causes [m]
+    !> Pressure [Pa] and the closing of the gap that it causes [m]; that of the springs below is part of it
     real(wp), allocatable :: p(:, :), w(:, :)
+    !> Under a compliant law: compliance [m/Pa] and offset [m] of the spring of each node, 0 off the active nodes
+    real(wp), allocatable :: compliance(:, :), offset(:, :)
     !> Residual, preconditioned residual, direction and its product
     real(sp), allocatable :: r(:, :, :), z(:, :, :), d(:, :, :), kd(:, :, :)
-    !> About the pressure of a rigid punch over the active nodes: M times one; zero off them
+    !> Estimate of the pressure of a rigid punch over the active nodes: M times one; zero off them
     real(sp), allocatable :: punch(:, :)
     real(wp) :: punch_sum = 0.0_wp
     logical, allocatable :: active(:, :)
     !> Columns between which the active nodes of each row lie, now and before: no pressure outside
     integer, allocatable :: span(:, :)
-    type(edge_extension_t) :: edge
     real(wp) :: approach = 0.0_wp
     !> Unit of the pressure in single precision [Pa], and of the closing of the gap [m]
     real(wp) :: p_unit = 1.0_wp, w_unit = 1.0_wp
     !> Error that products in single precision may have left in w [m]
-    real(wp) :: stale = 0.0_wp
+    real(wp) :: closing_error = 0.0_wp
     real(wp) :: p_max = 0.0_wp
     !> Residual R_n, and the same on the active nodes alone
     real(wp) :: residual = huge(1.0_wp), residual_active = huge(1.0_wp)
@@ -45,90 +49,23 @@ module hc_normal_iterate
 
 contains
 
-  !> Pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
-  subroutine begin(level, now, by_load, target, candidate, start, error)
-    type(normal_lattice_t), intent(inout) :: level
-    type(normal_iterate_t), intent(inout) :: now
-    logical, intent(in) :: by_load
-    real(wp), intent(in) :: target
-    logical, intent(in) :: candidate(:, :)
-    real(wp), intent(in) :: start(:, :)
-    type(error_t), allocatable, intent(out) :: error
-    real(wp) :: part(size(start, 2)), scale, largest
-    integer :: n(2), n_active, row, stat
-    logical :: known
-
-    n = level%lattice%extent
-    stat = 0
-    if (allocated(now%w)) then
-      if (any(shape(now%w) /= n)) deallocate (now%w, now%r, now%z, now%d, now%kd, now%active, now%span)
-    end if
-    if (allocated(now%punch)) deallocate (now%punch)
-    if (allocated(now%p)) deallocate (now%p)
-    if (.not. allocated(now%w)) then
-      allocate (now%w(n(1), n(2)), now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
-                now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
-    end if
-    if (stat == 0) allocate (now%p(n(1), n(2)), stat=stat)
-    if (stat /= 0) then
-      call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
-      return
-    end if
-    known = any(start > 0.0_wp .and. candidate)
-    n_active = 0
-    largest = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(+: n_active) reduction(max: largest)
-    do row = 1, n(2)
-      now%active(:, row) = candidate(:, row)
-      if (known) now%active(:, row) = candidate(:, row) .and. start(:, row) > 0.0_wp
-      now%p(:, row) = 1.0_wp
-      if (known) now%p(:, row) = start(:, row)
-      now%p(:, row) = merge(now%p(:, row), 0.0_wp, now%active(:, row))
-      now%w(:, row) = 0.0_wp
-      now%r(:, row, 1) = 0.0_sp
-      n_active = n_active + count(now%active(:, row))
-      largest = max(largest, maxval(now%p(:, row)))
-      part(row) = sum(now%p(:, row))
-    end do
-    !$omp end parallel do
-    now%n_active = n_active
-    now%approach = target
-    now%stale = 0.0_wp
-    scale = 1.0_wp
-    if (by_load) scale = target/(level%lattice%cell_area()*sum(part))
-    now%span(1, :) = n(1) + 1
-    now%span(2, :) = 0
-    call find_span(now, level%space)
-    now%p_unit = scale*largest
-    now%w_unit = now%p_unit*level%preconditioner%unit
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
-    do row = 1, n(2)
-      now%d(:, row, 1) = real(now%p(:, row)/largest, sp)
-      now%p(:, row) = 0.0_wp
-    end do
-    !$omp end parallel do
-    call level%multiply(now%d, now%kd)
-    call advance(level, now, 1.0_wp)
-    if (.not. by_load) then
-      call rescale(level, now)
-      now%p_unit = level%space%max(now%p)
-      now%w_unit = now%p_unit*level%preconditioner%unit
-    end if
-  end subroutine begin
-
-  !> Scale the pressure so that it has the least energy under a prescribed approach.
+  !> Scale the pressure so that it has the least energy under a prescribed approach; springs as they are linearised.
   subroutine rescale(level, now)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     real(wp) :: overlap(size(now%p, 2)), resistance(size(now%p, 2)), factor
     integer :: row
 
+    if (allocated(now%offset)) now%w = now%w - now%offset
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         overlap(row) = sum(now%p(from:to, row)*(now%approach - level%initial_gap(from:to, row)), &
                            mask=now%active(from:to, row))
         resistance(row) = dot_product(now%p(from:to, row), now%w(from:to, row))
+        if (allocated(now%offset)) overlap(row) = overlap(row) - dot_product(now%p(from:to, row), now%offset(from:to, row))
       end associate
     end do
     !$omp end parallel do
@@ -136,17 +73,20 @@ contains
     if (.not. factor > 0.0_wp) factor = now%approach/level%space%max(now%w)
     now%p = factor*now%p
     now%w = factor*now%w
-    now%stale = factor*now%stale
+    if (allocated(now%offset)) now%w = now%w + now%offset
+    now%closing_error = factor*now%closing_error
   end subroutine rescale
 
-  !> The approach at which gap and pressure are in balance under a prescribed load.
+  !> Find the approach at which gap and pressure are in balance under a prescribed load.
   !>
   !> The residual then has no part along the motion of the punch; before there is one, the mean gap
   !> under the pressure vanishes.
-  subroutine balance(level, now)
+  subroutine find_approach(level, now)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    real(wp) :: weight(size(now%p, 2)), lift(size(now%p, 2)), w, l, u
+    real(wp) :: weight(size(now%p, 2)), moment(size(now%p, 2)), w, l, u
     integer :: col, row
 
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, w, l, u)
@@ -171,18 +111,22 @@ contains
           end do
         end if
         weight(row) = w
-        lift(row) = l
+        moment(row) = l
       end associate
     end do
     !$omp end parallel do
-    now%approach = sum(lift)/sum(weight)
-  end subroutine balance
+    now%approach = sum(moment)/sum(weight)
+  end subroutine find_approach
 
-  !> Residuals, and the set that the present pressure and gap call for.
-  subroutine judge(level, now, candidate, next, changed, error)
+  !> Compute the residuals, and find the set that the present pressure and gap call for.
+  subroutine classify(level, now, candidate, next, changed, error)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
+    !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in), contiguous :: candidate(:, :)
+    !> Nodes that pressure and gap call for (n_col, n_row)
     logical, intent(out), contiguous :: next(:, :)
     !> The new set is another one
     logical, intent(out) :: changed
@@ -191,9 +135,7 @@ contains
     real(wp) :: r, stiffness, p_max, worst, worst_active
     integer :: row, n_next, n_changed, n_wrong
 
-    ! (N2)
-    r = level%options%contact%classification_scale/(2.0_wp*pi*level%pair%lambda_1 &
-                                                    *sqrt(level%lattice%cell_area()*now%n_active/pi))
+    r = classification_parameter(level, now)
     stiffness = 1.0_wp/level%compliance
     p_max = 0.0_wp
     worst = 0.0_wp
@@ -204,7 +146,12 @@ contains
     !$omp parallel do schedule(static) num_threads(level%space%threads) &
     !$omp& reduction(max: p_max, worst, worst_active) reduction(+: n_next, n_changed, n_wrong)
     do row = 1, size(now%p, 2)
-      call judge_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
+      if (allocated(now%offset)) then
+        call classify_compliant_row(level, now, row, r, candidate(:, row), next(:, row), p_max, worst, worst_active, n_next, &
+                                 n_changed, n_wrong)
+        cycle
+      end if
+      call classify_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
                      candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed, n_wrong)
     end do
     !$omp end parallel do
@@ -215,17 +162,121 @@ contains
     now%p_max = p_max
     now%residual = worst/p_max
     now%residual_active = worst_active/(level%compliance*p_max)
+    if (allocated(now%offset)) now%residual_active = worst_active/p_max
     changed = n_changed > 0 .and. n_next > 0
     now%n_next = n_next
     if (n_next > 0) return
     ! too much pressure everywhere: less of it on the old set
     next = now%active
     now%n_next = now%n_active
-  end subroutine judge
+  end subroutine classify
+
+  !> Compute r' of (N2) [Pa/m].
+  pure real(wp) function classification_parameter(level, now) result(r)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(in) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(in) :: now
+
+    r = level%options%contact%classification_scale/(2.0_wp*pi*level%pair%lambda_1 &
+                                                    *sqrt(level%lattice%cell_area()*now%n_active/pi))
+  end function classification_parameter
+
+  !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of what it was
+  !> linearised to.
+  subroutine classify_compliant_row(level, now, row, r, candidate, next, p_max, worst, worst_active, n_next, n_changed, n_wrong)
+    type(normal_lattice_t), intent(in) :: level
+    type(normal_iterate_t), intent(in) :: now
+    integer, intent(in) :: row
+    !> Classification parameter [Pa/m]
+    real(wp), intent(in) :: r
+    logical, intent(in), contiguous :: candidate(:)
+    logical, intent(out), contiguous :: next(:)
+    !> What the rows before gave, and now this one too
+    real(wp), intent(inout) :: p_max, worst, worst_active
+    integer, intent(inout) :: n_next, n_changed
+    !> Nodes whose pressure or gap is not a finite number
+    integer, intent(inout) :: n_wrong
+    real(wp) :: gap(size(next)), left(size(next))
+    integer :: first
+
+    first = (row - 1)*size(next) + 1
+    left = level%initial_gap(:, row) + now%w(:, row) - now%approach
+    gap = left - now%compliance(:, row)*now%p(:, row) - now%offset(:, row)
+    n_wrong = n_wrong + count(.not. (ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate)))
+    if (n_wrong > 0) return
+    call level%law%find_contact(r, now%p(:, row), gap, candidate, next)
+    call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate, worst)
+    p_max = max(p_max, maxval(now%p(:, row)))
+    worst_active = max(worst_active, maxval(abs(left)/(level%compliance + now%compliance(:, row)), mask=now%active(:, row)))
+    n_next = n_next + count(next)
+    n_changed = n_changed + count(next .neqv. now%active(:, row))
+  end subroutine classify_compliant_row
+
+  !> Linearise a compliant law about the present pressure and gap.
+  subroutine linearize_law(level, now, r)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(inout) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(inout) :: now
+    !> Classification parameter; 0: about the present pressure [Pa/m]
+    real(wp), intent(in) :: r
+    real(wp) :: gap(size(now%p, 1)), softest, p_max
+    integer :: row
+
+    call subtract_springs(level, now)
+    p_max = level%space%max(abs(now%p))
+    softest = level%options%contact%softest_layer*(level%compliance + level%law%compliance_under(p_max))
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(gap)
+    do row = 1, size(now%p, 2)
+      gap = level%initial_gap(:, row) + now%w(:, row) - now%approach
+      call level%law%linearize((row - 1)*size(gap) + 1, r, softest, now%p(:, row), gap, now%active(:, row), &
+                               now%compliance(:, row), now%offset(:, row))
+    end do
+    !$omp end parallel do
+    call add_springs(level, now)
+    associate (n => size(now%p))
+      call level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
+    end associate
+  end subroutine linearize_law
+
+  !> Add the springs to what the pressure closes, or take them off again.
+  subroutine add_springs(level, now)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(in) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(inout) :: now
+    integer :: row
+
+    if (.not. allocated(now%offset)) return
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      now%w(:, row) = now%w(:, row) + (now%compliance(:, row)*now%p(:, row) + now%offset(:, row))
+    end do
+    !$omp end parallel do
+  end subroutine add_springs
+
+  !> Subtract the springs from what the pressure closes.
+  subroutine subtract_springs(level, now)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(in) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(inout) :: now
+    integer :: row
+
+    if (.not. allocated(now%offset)) return
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      now%w(:, row) = now%w(:, row) - (now%compliance(:, row)*now%p(:, row) + now%offset(:, row))
+    end do
+    !$omp end parallel do
+  end subroutine subtract_springs
 
   !> Take a new set of active nodes.
-  subroutine take_set(level, now, next)
-    type(normal_lattice_t), intent(in) :: level
+  subroutine set_active(level, now, next)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(inout) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> The new set; on return the old one
     logical, allocatable, intent(inout) :: next(:, :)
@@ -237,7 +288,7 @@ contains
     call move_alloc(swap, next)
     now%n_active = now%n_next
     call find_span(now, level%space)
-    call new_edge_extension(now%edge, now%active, level%space)
+    call level%preconditioner%set_active(reshape(now%active, [size(now%active)]))
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = 0.0_sp
@@ -248,11 +299,13 @@ contains
     if (.not. allocated(now%punch)) return
     now%punch_sum = level%space%sum(now%punch)
     if (.not. now%punch_sum > 0.0_wp) deallocate (now%punch)
-  end subroutine take_set
+  end subroutine set_active
 
-  !> Columns between which the active nodes of each row lie, those of earlier sets included.
+  !> Find the columns between which the active nodes of each row lie, those of earlier sets included.
   subroutine find_span(now, space)
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
+    !> Space of the fields
     type(field_space_t), intent(in) :: space
     integer :: row
 
@@ -265,9 +318,11 @@ contains
     !$omp end parallel do
   end subroutine find_span
 
-  !> Pressure of a rigid punch over the active nodes, about, and nowhere negative.
-  subroutine press_punch(level, now)
+  !> Estimate the pressure of a rigid punch over the active nodes, nowhere negative.
+  subroutine find_punch_pressure(level, now)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
 
     integer :: row
@@ -277,7 +332,7 @@ contains
       now%r(:, row, 1) = merge(1.0_sp, 0.0_sp, now%active(:, row))
     end do
     !$omp end parallel do
-    call level%precondition(now%edge, now%r, now%z)
+    call level%precondition(now%r, now%z)
     allocate (now%punch(size(now%p, 1), size(now%p, 2)))
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
@@ -285,37 +340,42 @@ contains
     end do
     !$omp end parallel do
     now%punch_sum = level%space%sum(now%punch)
-  end subroutine press_punch
+  end subroutine find_punch_pressure
 
-  !> p <- p + share d, w <- w + share K d.
+  !> Update p <- p + share d, w <- w + share K d.
   subroutine advance(level, now, share)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
+    !> Share of the direction that is added
     real(wp), intent(in) :: share
-    real(wp) :: step, lift
+    real(wp) :: step, closing
     real(sp) :: largest
     integer :: row
 
     step = share*now%p_unit
-    lift = share*now%w_unit
+    closing = share*now%w_unit
     largest = 0.0_sp
     !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
         call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
-        ! what left is gone, but for what single precision would leave of it
+        ! nodes that left the set carry no pressure, not even what single precision would leave of it
         where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
       end associate
-      call add_row(size(now%p, 1), lift, now%kd(:, row, 1), now%w(:, row))
+      call add_row(size(now%p, 1), closing, now%kd(:, row, 1), now%w(:, row))
       largest = max(largest, largest_of(size(now%p, 1), now%kd(:, row, 1)))
     end do
     !$omp end parallel do
-    now%stale = now%stale + single_error*abs(lift)*largest
+    now%closing_error = now%closing_error + single_error*abs(closing)*largest
   end subroutine advance
 
-  !> Leave no tension: what is within the tolerance.
-  subroutine push_only(level, now, pulls)
+  !> Set tension to zero: it is within the tolerance.
+  subroutine remove_tension(level, now, pulls)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> There was some
     logical, intent(out) :: pulls
@@ -330,26 +390,31 @@ contains
       end associate
     end do
     !$omp end parallel do
-  end subroutine push_only
+  end subroutine remove_tension
 
-  !> What the sum of the pressures lacks because of rounding.
-  real(wp) function load_lack(level, now, pressures)
+  !> Compute what the sum of the pressures lacks because of rounding.
+  real(wp) function missing_load(level, now, pressures)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(in) :: now
     !> What it should be
     real(wp), intent(in) :: pressures
 
-    load_lack = pressures - level%space%sum(now%p)
-  end function load_lack
+    missing_load = pressures - level%space%sum(now%p)
+  end function missing_load
 
-  !> Make up for it.
+  !> Scale the pressures to the prescribed load.
   subroutine fit_load(level, now, pressures)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
+    !> Iterate
     type(normal_iterate_t), intent(inout) :: now
+    !> Sum of the pressures under the prescribed load [Pa]
     real(wp), intent(in) :: pressures
     real(wp) :: lack
 
-    lack = load_lack(level, now, pressures)
+    lack = missing_load(level, now, pressures)
     if (allocated(now%punch)) then
       now%p = now%p + lack/now%punch_sum*now%punch
     else

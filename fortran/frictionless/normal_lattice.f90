@@ -1,13 +1,15 @@
 !> A frictionless contact problem on one lattice, with its operators.
 !>
 !> Corrections are multiplied in single precision, in units of displacement and pressure
-!> whose ratio is that of the preconditioner; the exact operator is there where it is wanted.
+!> whose ratio is that of the preconditioner; the operator in double precision is set up on demand.
+!>
+!> Equations: docs/theory/normal_contact.md, (N2) to (N5).
 module hc_normal_lattice
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: options_t
-  use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
+  use hc_hierarchy, only: level_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
   use hc_fftw, only: good_size
@@ -17,40 +19,39 @@ module hc_normal_lattice
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_convolution_single, only: convolution_t, new_convolution, kernel_source_t
   use hc_contact_state, only: contact_state_t
-  use hc_contact_residuals, only: conclude, normal_self_compliance
-  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner, single_cost
-  use hc_preconditioner_extension, only: edge_extension_t
+  use hc_normal_law, only: normal_law_t
+  use hc_contact_residuals, only: complete_state, normal_self_compliance
+  use hc_inverse_symbol, only: single_cost
+  use hc_preconditioner, only: preconditioner_t
+  use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
   implicit none
   private
 
   public :: normal_lattice_t
 
   !> The problem on one lattice.
-  type :: normal_lattice_t
-    type(lattice_t) :: lattice
-    !> Initial gap (n_col, n_row) [m]
-    real(wp), allocatable :: initial_gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row)
-    logical, allocatable :: candidate(:, :)
+  type, extends(level_t) :: normal_lattice_t
     type(elastic_pair_t) :: pair
+    !> Law of contact
+    class(normal_law_t), allocatable :: law
     type(options_t) :: options
-    type(symbol_preconditioner_t) :: preconditioner
+    class(preconditioner_t), allocatable :: preconditioner
     !> The flexibility in single precision, in the unit of the preconditioner
     type(convolution_t) :: single
-    !> The flexibility in double precision; is it there, and is the rest?
+    !> The flexibility in double precision; whether it is set up, and whether the operators of iterations are
     type(fft_flexibility_t) :: flexibility
     logical :: exact = .false., iterating = .false.
     !> Self-compliance of a node [m/Pa]
     real(wp) :: compliance = 0.0_wp
     !> Work in single precision, in applications of the full operator
     real(wp) :: single_work = 0.0_wp
-    !> Space of the fields
-    type(field_space_t) :: space
   contains
+    !> Bodies, law and tuning numbers from another lattice
+    procedure :: inherit
     !> Operators
     procedure :: prepare
     !> Gap, zones, load and residuals of a given pressure
-    procedure :: conclude_anew
+    procedure :: complete_from_pressure
     !> Products in single precision, of the flexibility and of its approximate inverse, and in double precision
     procedure :: multiply, precondition, multiply_exactly
     !> Work so far, in applications of the full operator
@@ -66,43 +67,57 @@ module hc_normal_lattice
 
 contains
 
-  !> Operators of a problem whose lattice, gap and candidates are known; those that are there are kept.
-  subroutine prepare(self, pair, kernel, exact, iterating, space, error, cache)
+  !> Take bodies, law and tuning numbers of the same problem from another lattice.
+  subroutine inherit(self, from)
     class(normal_lattice_t), intent(inout) :: self
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
-    !> The kernel, as far as it is at hand
+    class(level_t), intent(in) :: from
+
+    select type (from)
+    type is (normal_lattice_t)
+      self%pair = from%pair
+      self%options = from%options
+      if (allocated(self%law)) deallocate (self%law)
+      allocate (self%law, source=from%law)
+    end select
+  end subroutine inherit
+
+  !> Set up the operators that are needed and not set up yet.
+  subroutine prepare(self, kernel, exact, iterating, space, error, cache)
+    class(normal_lattice_t), intent(inout) :: self
+    !> The kernel, as far as it has been computed
     type(normal_kernel_t), intent(inout), target :: kernel
-    !> The operator in double precision is wanted; what iterations need is wanted
+    !> Set up the operator in double precision; set up those of iterations
     logical, intent(in) :: exact, iterating
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Spectra that are kept
+    !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
+    type(pressure_preconditioner_t), allocatable :: preconditioner
     type(rounded_kernel_t) :: rounded
     type(kernel_key_t) :: key
     logical :: found
     integer :: block
 
-    self%pair = pair
-    self%compliance = normal_self_compliance(self%lattice, pair)
+    self%compliance = normal_self_compliance(self%lattice, self%pair)
     self%space = space
     if (exact .and. .not. self%exact) then
-      call new_fft_flexibility(self%flexibility, self%lattice, pair, error, normal_only=.true., space=space, &
+      call new_fft_flexibility(self%flexibility, self%lattice, self%pair, error, normal_only=.true., space=space, &
                                kernel=kernel, cache=cache)
       if (allocated(error)) return
       self%exact = .true.
     end if
     if (self%iterating .or. .not. iterating) return
-    call new_symbol_preconditioner(self%preconditioner, self%lattice, pair, space, error, cache=cache)
+    allocate (preconditioner)
+    call new_symbol_preconditioner(preconditioner, self%lattice, self%pair, space, self%options%preconditioner, error, cache)
     if (allocated(error)) return
+    call move_alloc(preconditioner, self%preconditioner)
     call new_convolution(self%single, self%lattice%extent, good_size(2*self%lattice%extent - 1), 1, 1, space, error)
     if (allocated(error)) return
     if (self%exact) then
       ! copied as fast as it would be found
-      call self%single%take_spectra(found, error)
+      call self%single%find_spectra(found, error)
       if (allocated(error)) return
       !$omp parallel do schedule(static) num_threads(self%space%threads)
       do block = 1, self%single%n_block
@@ -110,22 +125,22 @@ contains
       end do
       !$omp end parallel do
     else
-      key = new_kernel_key(of_pressure_rounded, self%lattice, pair)
-      call self%single%take_spectra(found, error, cache, key)
+      key = new_kernel_key(of_pressure_rounded, self%lattice, self%pair)
+      call self%single%find_spectra(found, error, cache, key)
       if (allocated(error)) return
       if (.not. found) then
         call kernel%cover(self%lattice, space)
         rounded%kernel => kernel
         call self%single%transform_kernels(rounded, error)
         if (allocated(error)) return
-        call self%single%share_spectra(cache, key)
+        call self%single%store_spectra(cache, key)
       end if
     end if
     self%iterating = .true.
   end subroutine prepare
 
-  !> Gap, zones, load and residuals of a given pressure at a given approach.
-  subroutine conclude_anew(self, control, target, tolerance, state, error)
+  !> Compute gap, zones, load and residuals of a given pressure at a given approach.
+  subroutine complete_from_pressure(self, control, target, tolerance, state, error)
     class(normal_lattice_t), intent(inout) :: self
     !> force_control or displacement_control
     integer, intent(in) :: control
@@ -148,10 +163,11 @@ contains
       state%gap(:, row) = self%initial_gap(:, row) + state%gap(:, row) - state%motion(normal)
     end do
     !$omp end parallel do
-    call conclude(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%space, error)
-  end subroutine conclude_anew
+    call complete_state(state, self%lattice, self%candidate, self%compliance, control, target, tolerance, self%space, error, &
+                  self%law)
+  end subroutine complete_from_pressure
 
-  !> K d in single precision, in units of the preconditioner.
+  !> Compute K d in single precision, in units of the preconditioner.
   subroutine multiply(self, d, kd)
     class(normal_lattice_t), intent(inout) :: self
     !> Pressure (n_col, n_row, 1)
@@ -163,21 +179,21 @@ contains
     self%single_work = self%single_work + single_cost/3.0_wp
   end subroutine multiply
 
-  !> z = M r in single precision.
-  subroutine precondition(self, edge, r, z)
+  !> Compute z = M r in single precision.
+  subroutine precondition(self, r, z)
     class(normal_lattice_t), intent(inout) :: self
-    !> Continuation beyond the active nodes
-    type(edge_extension_t), intent(in) :: edge
     !> Displacement on the active nodes (n_col, n_row, 1); changed on the rings around them
-    real(sp), intent(inout), contiguous :: r(:, :, :)
+    real(sp), intent(inout), contiguous, target :: r(:, :, :)
     !> Pressure; of use on the active nodes only (n_col, n_row, 1)
-    real(sp), intent(out), contiguous :: z(:, :, :)
+    real(sp), intent(out), contiguous, target :: z(:, :, :)
+    real(sp), pointer, contiguous :: displacement(:), traction(:)
 
-    call self%preconditioner%apply_single(r, z, edge)
-    self%single_work = self%single_work + self%preconditioner%cost
+    displacement(1:size(r)) => r
+    traction(1:size(z)) => z
+    call self%preconditioner%apply_single(displacement, traction, self%single_work)
   end subroutine precondition
 
-  !> w = K p in double precision.
+  !> Compute w = K p in double precision.
   subroutine multiply_exactly(self, p, w, error)
     class(normal_lattice_t), intent(inout) :: self
     !> Pressure [Pa] and closing of the gap [m] (n_col, n_row)
@@ -192,11 +208,13 @@ contains
     call self%flexibility%apply([normal], field, [normal], closing, error)
   end subroutine multiply_exactly
 
+  !> Return all work so far, in applications of the full operator.
   pure real(wp) function work(self)
     class(normal_lattice_t), intent(in) :: self
     work = self%flexibility%applications + self%single_work
   end function work
 
+  !> Copy a row in single precision.
   pure subroutine rounded_row(self, j, k)
     class(rounded_kernel_t), intent(in) :: self
     integer, intent(in) :: j

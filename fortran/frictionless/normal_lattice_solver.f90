@@ -5,25 +5,32 @@
 !> projected gradient method, p <- max(p + c M r, 0), finds pressure and set
 !> together, with one product of the operator; M is close enough to the inverse of
 !> the operator for that. Once the set stands still the steps become those of preconditioned
-!> conjugate gradients. Where a set changes on and on (rough surfaces), it is held until
+!> conjugate gradients. Where a set changes without end (rough surfaces), it is fixed until
 !> the linear problem on it is solved well enough to trust the next one.
 !>
-!> What is added to the pressure is multiplied in single precision, and pressure and gap are
-!> summed up in double precision. The error that this can have left in the gap is kept
-!> account of; before it matters the gap is found anew from the pressure, in double precision.
+!> A compliant layer between the bodies gives each active node a spring, which is linearised anew with every change of the set,
+!> and where the linear problem is solved better than the whole one, (N6). The closing of the gap contains that of the springs.
 !>
-!> Equations: docs/theory/normal_contact.md, (N2) to (N5).
+!> What is added to the pressure is multiplied in single precision, and pressure and gap are
+!> summed up in double precision. The bound on the error that this leaves in the gap is summed up, too; before it matters
+!> the gap is computed anew from the pressure, in double precision.
+!>
+!> I. A. Polonsky and L. M. Keer, Wear 231, 1999, 206-219; M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 2003,
+!> 865-888.
+!>
+!> Equations: docs/theory/normal_contact.md, (N2) to (N6).
 module hc_normal_lattice_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_options, only: normal_options_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
-  use hc_contact_residuals, only: conclude
+  use hc_contact_residuals, only: complete_state
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_iterate, only: normal_iterate_t, begin, rescale, balance, judge, take_set, press_punch, advance, load_lack, &
-                               fit_load, push_only
-  use hc_normal_directions, only: find_residual, projected_step, next_direction, find_step
+  use hc_normal_iterate, only: normal_iterate_t, rescale, find_approach, classify, classification_parameter, set_active, &
+    linearize_law, add_springs, subtract_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
+  use hc_normal_start, only: set_start
+  use hc_normal_directions, only: find_residual, projected_step, next_direction, find_step, multiply_direction
   implicit none
   private
 
@@ -33,6 +40,7 @@ contains
 
   !> Solve for a normal load or an approach.
   subroutine solve_on_normal_lattice(level, now, control, target, tolerance, max_sweeps, state, error)
+    !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
     !> Iterate of an earlier solution, whose memory is used again
     type(normal_iterate_t), intent(inout) :: now
@@ -58,7 +66,7 @@ contains
     level%single_work = 0.0_wp
     call move_alloc(state%pressure, start)
     call new_contact_state(state, level%lattice, level%space)
-    delta = minval(level%initial_gap, mask=level%candidate)
+    delta = level%space%min(level%initial_gap, level%candidate)
     if (target <= merge(0.0_wp, delta, control == force_control)) then         ! nothing touches
       state%motion(normal) = merge(delta, target, control == force_control)
       state%gap = level%initial_gap - state%motion(normal)
@@ -66,9 +74,10 @@ contains
       call iterate(level, now, control == force_control, target, tolerance, max_sweeps, start, state%sweeps, error)
       if (allocated(error)) return
       state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
-      call push_only(level, now, pulls)
+      call remove_tension(level, now, pulls)
       if (pulls .and. level%exact) call find_closing(level, now, error)
       if (allocated(error)) return
+      call subtract_springs(level, now)
       !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%w, 2)
         state%gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
@@ -77,10 +86,11 @@ contains
       call move_alloc(now%p, state%pressure)
       state%motion(normal) = now%approach
     end if
-    call conclude(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%space, error)
+    call complete_state(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%space, error, &
+                  level%law)
   end subroutine solve_on_normal_lattice
 
-  !> Iterations up to the tolerance.
+  !> Iterate up to the tolerance.
   subroutine iterate(level, now, by_load, target, tolerance, max_sweeps, start, sweeps, error)
     type(normal_lattice_t), intent(inout) :: level
     type(normal_iterate_t), intent(inout) :: now
@@ -97,9 +107,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     logical, allocatable :: candidate(:, :), next(:, :)
-    real(wp) :: history(3), held_start, pressures, share
+    real(wp) :: history(3), fixed_start, pressures, share
     type(conjugate_gradient_t) :: recurrence
-    logical :: changed, held, fresh
+    logical :: changed, fixed, fresh, compliant, settled
     integer :: fits
     type(normal_options_t) :: options
 
@@ -108,20 +118,21 @@ contains
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
     if (.not. by_load) candidate = candidate .and. level%initial_gap < target
     pressures = target/level%lattice%cell_area()                  ! of no meaning under a prescribed approach
-    call begin(level, now, by_load, target, candidate, start, error)
+    call set_start(level, now, by_load, target, candidate, start, error)
     if (allocated(error)) return
     allocate (next, mold=candidate)
+    compliant = level%law%is_compliant()
     history = huge(1.0_wp)
-    held = .false.
+    fixed = .false.
     fresh = .false.
-    held_start = 1.0_wp
+    fixed_start = 1.0_wp
     sweeps = 0
     fits = 0
     do
-      if (by_load) call balance(level, now)
-      call judge(level, now, candidate, next, changed, error)
+      if (by_load) call find_approach(level, now)
+      call classify(level, now, candidate, next, changed, error)
       if (allocated(error)) return
-      if (level%exact .and. now%stale > level%compliance*now%p_max*max(options%residual_share*now%residual, &
+      if (level%exact .and. now%closing_error > level%compliance*now%p_max*max(options%residual_share*now%residual, &
                                                                        options%tolerance_share*tolerance)) then
         if (by_load) call fit_load(level, now, pressures)
         call find_closing(level, now, error)
@@ -129,7 +140,7 @@ contains
         cycle
       end if
       if (now%residual <= tolerance .and. by_load .and. level%exact .and. fits < options%max_fits) then
-        if (abs(load_lack(level, now, pressures)) > options%tolerance_share*tolerance*pressures) then
+        if (abs(missing_load(level, now, pressures)) > options%tolerance_share*tolerance*pressures) then
           fits = fits + 1
           call fit_load(level, now, pressures)
           call find_closing(level, now, error)
@@ -142,40 +153,47 @@ contains
       if (sweeps == 1) changed = .true.
 
       ! has the residual come down, compared with the best but the last two?
-      if (.not. held .and. sweeps > options%first_steps) held = now%residual > options%progress*history(3)
+      if (.not. fixed .and. sweeps > options%first_steps) fixed = now%residual > options%progress*history(3)
       history = [now%residual, history(1), min(history(2), history(3))]
-      if (held .and. changed) then
-        if (fresh .and. now%residual_active > options%held_accuracy*held_start) then
+      if (fixed .and. changed) then
+        if (fresh .and. now%residual_active > options%fixed_accuracy*fixed_start) then
           changed = .false.
         else
-          held_start = min(now%residual, 1.0_wp)
+          fixed_start = min(now%residual, 1.0_wp)
           fresh = .true.
         end if
       end if
 
       if (changed) then
-        call take_set(level, now, next)
+        call set_active(level, now, next)
         call recurrence%restart()
       end if
-      if (by_load .and. .not. allocated(now%punch)) call press_punch(level, now)
-      if (.not. (changed .and. held)) then
-        if (by_load .and. changed) call balance(level, now)
+      ! the law is linearised anew where the linear problem is solved better than the whole one
+      settled = now%residual_active < options%linear_share*now%residual
+      if (compliant .and. (changed .or. settled)) then
+        call linearize_law(level, now, classification_parameter(level, now))
+        if (by_load) call find_approach(level, now)
+        call recurrence%restart()
+      end if
+      if (by_load .and. .not. allocated(now%punch)) call find_punch_pressure(level, now)
+      if (.not. (changed .and. fixed)) then
+        if (by_load .and. changed) call find_approach(level, now)
         call find_residual(level, now)
-        call level%precondition(now%edge, now%r, now%z)
+        call level%precondition(now%r, now%z)
       end if
       if (changed) then
-        call projected_step(level, now, held, by_load, pressures)
+        call projected_step(level, now, fixed, by_load, pressures)
         share = 1.0_wp
       else
         call next_direction(level, now, by_load, recurrence)
       end if
-      call level%multiply(now%d, now%kd)
+      call multiply_direction(level, now)
       if (.not. changed) then
         share = find_step(level, now, recurrence)
         if (.not. share > 0.0_wp) then
           ! nothing is left to gain in single precision, and perhaps at all
-          if (.not. (level%exact .and. now%stale > 0.0_wp)) return
-          now%stale = huge(1.0_wp)
+          if (.not. (level%exact .and. now%closing_error > 0.0_wp)) return
+          now%closing_error = huge(1.0_wp)
           cycle
         end if
       end if
@@ -184,14 +202,15 @@ contains
     end do
   end subroutine iterate
 
-  !> w = K p in double precision: nothing of single precision is left in it.
+  !> Compute w = K p in double precision, without a rest of single precision.
   subroutine find_closing(level, now, error)
     type(normal_lattice_t), intent(inout) :: level
     type(normal_iterate_t), intent(inout) :: now
     type(error_t), allocatable, intent(out) :: error
 
     call level%multiply_exactly(now%p, now%w, error)
-    now%stale = 0.0_wp
+    call add_springs(level, now)
+    now%closing_error = 0.0_wp
   end subroutine find_closing
 
 end module hc_normal_lattice_solver

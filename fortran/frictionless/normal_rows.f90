@@ -1,16 +1,18 @@
-!> Passes over one row of nodes in a frictionless contact, written so that the compiler takes several nodes at a time.
+!> Passes over one row of nodes in a frictionless contact, written so that the compiler vectorises them.
+!>
+!> Equations: docs/theory/normal_contact.md, (N2).
 module hc_normal_rows
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp
   implicit none
   private
 
-  public :: judge_row, add_row, largest_of
+  public :: classify_row, add_row, largest_of
 
 contains
 
-  !> Residuals of the nodes of a row, and which of them pressure and gap call for.
-  pure subroutine judge_row(n, r, stiffness, approach, initial_gap, pressure, closing, candidate, active, next, &
+  !> Compute the residuals of the nodes of a row, and find which of them pressure and gap call for.
+  pure subroutine classify_row(n, r, stiffness, approach, initial_gap, pressure, closing, candidate, active, next, &
                             p_max, worst, worst_active, n_next, n_changed, n_wrong)
     !> Number of nodes
     integer, intent(in) :: n
@@ -43,9 +45,9 @@ contains
     next = enters == 1
     n_next = n_next + sum(enters)
     n_changed = n_changed + sum(abs(enters - merge(1, 0, active)))
-  end subroutine judge_row
+  end subroutine classify_row
 
-  !> field <- field + factor * change
+  !> Add to a field: field <- field + factor * change
   pure subroutine add_row(n, factor, change, field)
     !> Number of nodes
     integer, intent(in) :: n
@@ -59,7 +61,7 @@ contains
     end do
   end subroutine add_row
 
-  !> Largest absolute value.
+  !> Compute the largest absolute value.
   pure real(sp) function largest_of(n, field)
     !> Number of nodes
     integer, intent(in) :: n

@@ -1,4 +1,4 @@
-!> The space of the fields over a window: who shares the work on them, and what combines the values of many nodes.
+!> Space of the fields over a window: threads that share the work, and operations on the values of many nodes.
 !>
 !> Fields are plain arrays: windows (n_col, n_row), or vectors of nodes. Sums are taken in fixed blocks or row by row,
 !> so that they do not depend on the number of threads.
@@ -12,12 +12,12 @@ module hc_field_space
 
   !> Terms that one thread adds up.
   integer, parameter :: sum_block = 4096
-  !> Threads that may be asked for: more than any machine has, fewer than the system refuses to start.
+  !> Largest number of threads: more than any machine has, fewer than the system refuses to start.
   integer, parameter :: most_threads = 1024
-  !> Smaller fields are left to one thread: starting the others takes longer than they save.
+  !> Nodes below which a field has one thread: the start of the others takes longer than they save.
   integer, parameter :: worth_sharing = 16384
 
-  !> Who shares the work on the fields.
+  !> Threads of the fields, and their operations.
   type :: field_space_t
     !> Number of threads
     integer :: threads = 1
@@ -27,17 +27,23 @@ module hc_field_space
     !> Scalar product of two vectors, and of several with one
     procedure :: dot, dots
     !> Sum and largest element of a vector or of a field over the window; of nothing, zero and the least number there is
-    generic :: sum => vector_sum, window_sum, window_sum_single
-    generic :: max => vector_max, window_max
-    !> Number of nodes of a set
-    procedure :: count => count_nodes
+    generic :: sum => vector_sum, window_sum, window_sum_on, window_sum_single
+    generic :: max => vector_max, vector_max_on, window_max, window_max_on
+    !> Smallest element on a set of nodes; of none, the largest number there is
+    generic :: min => vector_min, window_min
+    !> Largest absolute value of a vector
+    procedure :: max_abs
+    !> Number of nodes of a set, and of nodes with a value above zero
+    generic :: count => count_nodes, count_window
+    procedure :: count_positive
     !> Threads for a field of some nodes, one for a small field
     procedure :: threads_for
-    procedure, private :: vector_sum, window_sum, window_sum_single, vector_max, window_max
+    procedure, private :: vector_sum, window_sum, window_sum_on, window_sum_single, vector_max, vector_max_on, window_max, &
+                          window_max_on, vector_min, window_min, count_nodes, count_window
   end type field_space_t
 
   interface
-    !> Scalar product (BLAS)
+    !> Compute a scalar product (BLAS)
     pure real(wp) function ddot(n, dx, incx, dy, incy)
       import :: wp
       implicit none
@@ -48,7 +54,7 @@ module hc_field_space
 
 contains
 
-  !> The space of a window.
+  !> Return the space of a window.
   type(field_space_t) function space_over(extent, n_threads) result(space)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -62,7 +68,7 @@ contains
     end if
   end function space_over
 
-  !> Threads for a field of some nodes.
+  !> Return the threads for a field of some nodes.
   pure integer function threads_for(self, n)
     class(field_space_t), intent(in) :: self
     !> Number of nodes
@@ -71,7 +77,7 @@ contains
     threads_for = merge(self%threads, 1, n >= worth_sharing)
   end function threads_for
 
-  !> x <- value
+  !> Set x <- value.
   subroutine fill(self, x, value)
     class(field_space_t), intent(in) :: self
     !> Vector
@@ -86,7 +92,7 @@ contains
     !$omp end parallel do simd
   end subroutine fill
 
-  !> y <- x
+  !> Copy y <- x.
   subroutine copy(self, x, y)
     class(field_space_t), intent(in) :: self
     !> Vectors of equal length
@@ -101,7 +107,7 @@ contains
     !$omp end parallel do simd
   end subroutine copy
 
-  !> y <- y + x
+  !> Add y <- y + x.
   subroutine add(self, x, y)
     class(field_space_t), intent(in) :: self
     !> Vectors of equal length
@@ -116,7 +122,7 @@ contains
     !$omp end parallel do simd
   end subroutine add
 
-  !> The largest element.
+  !> Return the largest element.
   real(wp) function vector_max(self, x)
     class(field_space_t), intent(in) :: self
     !> Vector
@@ -131,7 +137,7 @@ contains
     !$omp end parallel do simd
   end function vector_max
 
-  !> The largest element of a field over the window.
+  !> Return the largest element of a field over the window.
   real(wp) function window_max(self, x)
     class(field_space_t), intent(in) :: self
     !> Field (n_col, n_row)
@@ -149,7 +155,120 @@ contains
     !$omp end parallel do
   end function window_max
 
-  !> Number of nodes of a set.
+  !> Return the largest element on a set of nodes.
+  real(wp) function vector_max_on(self, x, nodes)
+    class(field_space_t), intent(in) :: self
+    !> Vector
+    real(wp), intent(in), contiguous :: x(:)
+    !> True on the nodes of the set
+    logical, intent(in), contiguous :: nodes(:)
+    integer :: i
+
+    vector_max_on = -huge(1.0_wp)
+    !$omp parallel do simd schedule(static) num_threads(self%threads) reduction(max: vector_max_on)
+    do i = 1, size(x)
+      vector_max_on = max(vector_max_on, merge(x(i), -huge(1.0_wp), nodes(i)))
+    end do
+    !$omp end parallel do simd
+  end function vector_max_on
+
+  !> Return the largest element of a field over the window on a set of nodes.
+  real(wp) function window_max_on(self, x, nodes)
+    class(field_space_t), intent(in) :: self
+    !> Field (n_col, n_row)
+    real(wp), intent(in), contiguous :: x(:, :)
+    !> True on the nodes of the set (n_col, n_row)
+    logical, intent(in), contiguous :: nodes(:, :)
+    integer :: row
+
+    window_max_on = -huge(1.0_wp)
+    !$omp parallel do schedule(static) num_threads(self%threads) reduction(max: window_max_on)
+    do row = 1, size(x, 2)
+      window_max_on = max(window_max_on, maxval(x(:, row), mask=nodes(:, row)))
+    end do
+    !$omp end parallel do
+  end function window_max_on
+
+  !> Return the smallest element on a set of nodes.
+  real(wp) function vector_min(self, x, nodes)
+    class(field_space_t), intent(in) :: self
+    !> Vector
+    real(wp), intent(in), contiguous :: x(:)
+    !> True on the nodes of the set
+    logical, intent(in), contiguous :: nodes(:)
+    integer :: i
+
+    vector_min = huge(1.0_wp)
+    !$omp parallel do simd schedule(static) num_threads(self%threads) reduction(min: vector_min)
+    do i = 1, size(x)
+      vector_min = min(vector_min, merge(x(i), huge(1.0_wp), nodes(i)))
+    end do
+    !$omp end parallel do simd
+  end function vector_min
+
+  !> Return the smallest element of a field over the window on a set of nodes.
+  real(wp) function window_min(self, x, nodes)
+    class(field_space_t), intent(in) :: self
+    !> Field (n_col, n_row)
+    real(wp), intent(in), contiguous :: x(:, :)
+    !> True on the nodes of the set (n_col, n_row)
+    logical, intent(in), contiguous :: nodes(:, :)
+    integer :: row
+
+    window_min = huge(1.0_wp)
+    !$omp parallel do schedule(static) num_threads(self%threads) reduction(min: window_min)
+    do row = 1, size(x, 2)
+      window_min = min(window_min, minval(x(:, row), mask=nodes(:, row)))
+    end do
+    !$omp end parallel do
+  end function window_min
+
+  !> Return the largest absolute value, 0 of nothing.
+  real(wp) function max_abs(self, x)
+    class(field_space_t), intent(in) :: self
+    !> Vector
+    real(wp), intent(in), contiguous :: x(:)
+    integer :: i
+
+    max_abs = 0.0_wp
+    !$omp parallel do simd schedule(static) num_threads(self%threads) reduction(max: max_abs)
+    do i = 1, size(x)
+      max_abs = max(max_abs, abs(x(i)))
+    end do
+    !$omp end parallel do simd
+  end function max_abs
+
+  !> Count the nodes of a set of the window.
+  integer function count_window(self, nodes)
+    class(field_space_t), intent(in) :: self
+    !> True on the nodes of the set (n_col, n_row)
+    logical, intent(in), contiguous :: nodes(:, :)
+    integer :: row
+
+    count_window = 0
+    !$omp parallel do schedule(static) num_threads(self%threads) reduction(+: count_window)
+    do row = 1, size(nodes, 2)
+      count_window = count_window + count(nodes(:, row))
+    end do
+    !$omp end parallel do
+  end function count_window
+
+  !> Count the nodes of the window with a value above zero.
+  integer function count_positive(self, x)
+    class(field_space_t), intent(in) :: self
+    !> Field (n_col, n_row)
+    real(wp), intent(in), contiguous :: x(:, :)
+    integer :: row
+
+    count_positive = 0
+    !$omp parallel do schedule(static) num_threads(self%threads) reduction(+: count_positive)
+    do row = 1, size(x, 2)
+      count_positive = count_positive + count(x(:, row) > 0.0_wp)
+    end do
+    !$omp end parallel do
+  end function count_positive
+
+  !> Count the nodes of a set.
   integer function count_nodes(self, nodes)
     class(field_space_t), intent(in) :: self
     !> Vector, true on the nodes of the set
@@ -164,7 +283,7 @@ contains
     !$omp end parallel do simd
   end function count_nodes
 
-  !> Sum of the elements.
+  !> Sum the elements.
   real(wp) function vector_sum(self, x)
     class(field_space_t), intent(in) :: self
     !> Vector
@@ -180,7 +299,7 @@ contains
     vector_sum = sum(part)
   end function vector_sum
 
-  !> Sum of a field over the window, row by row.
+  !> Sum a field over the window, row by row.
   real(wp) function window_sum(self, x)
     class(field_space_t), intent(in) :: self
     !> Field (n_col, n_row)
@@ -196,7 +315,25 @@ contains
     window_sum = sum(part)
   end function window_sum
 
-  !> The same of a field in single precision: the sum is taken in double precision.
+  !> Sum a field over a set of nodes of the window, row by row.
+  real(wp) function window_sum_on(self, x, nodes)
+    class(field_space_t), intent(in) :: self
+    !> Field (n_col, n_row)
+    real(wp), intent(in), contiguous :: x(:, :)
+    !> True on the nodes of the set (n_col, n_row)
+    logical, intent(in), contiguous :: nodes(:, :)
+    real(wp) :: part(size(x, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(self%threads)
+    do row = 1, size(x, 2)
+      part(row) = sum(x(:, row), mask=nodes(:, row))
+    end do
+    !$omp end parallel do
+    window_sum_on = sum(part)
+  end function window_sum_on
+
+  !> Sum a field in single precision over the window, row by row, in double precision.
   real(wp) function window_sum_single(self, x)
     class(field_space_t), intent(in) :: self
     !> Field (n_col, n_row)
@@ -212,14 +349,14 @@ contains
     window_sum_single = sum(part)
   end function window_sum_single
 
-  !> x <- x + B share
+  !> Add x <- x + B share.
   subroutine add_columns(self, b, share, x)
     class(field_space_t), intent(in) :: self
     !> Vectors to be added
     real(wp), intent(in), contiguous :: b(:, :)
     !> Their factors
     real(wp), intent(in) :: share(:)
-    !> What they are added to
+    !> Sum
     real(wp), intent(inout), contiguous :: x(:)
     integer :: i, m, from, to
 
@@ -235,12 +372,12 @@ contains
     !$omp end parallel do
   end subroutine add_columns
 
-  !> Scalar products of several vectors with one.
+  !> Compute the scalar products of several vectors with one.
   function dots(self, b, x)
     class(field_space_t), intent(in) :: self
-    !> The several
+    !> Vectors
     real(wp), intent(in), contiguous :: b(:, :)
-    !> The one
+    !> Vector
     real(wp), intent(in), contiguous :: x(:)
     real(wp) :: dots(size(b, 2))
     integer :: m
@@ -250,7 +387,7 @@ contains
     end do
   end function dots
 
-  !> Scalar product, summed in fixed blocks.
+  !> Compute a scalar product, summed in fixed blocks.
   real(wp) function dot(self, a, b)
     class(field_space_t), intent(in) :: self
     !> Vectors of equal length

@@ -1,7 +1,7 @@
 !> Fields between the nodes of a lattice.
 !>
 !> A field of the solution is a sum of hat functions, linear on each triangle. The pressure vanishes like a square root
-!> at the edge of the contact, so there its square is interpolated.
+!> at the edge of the contact, so there its square is interpolated: docs/theory/edges.md.
 module hc_interpolation
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use hc_precision, only: wp
@@ -18,7 +18,7 @@ module hc_interpolation
 
 contains
 
-  !> Value of a field at a point, linear on the triangles.
+  !> Interpolate a field at a point, linearly on the triangles.
   pure real(wp) function interpolate(lattice, values, point, outside) result(value)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -47,7 +47,7 @@ contains
     end do
   end function interpolate
 
-  !> Pressure at a point: its square is linear near the edge of the contact, elsewhere it is itself [Pa].
+  !> Interpolate the pressure at a point: its square is linear near the edge of the contact, elsewhere it is itself [Pa].
   pure real(wp) function interpolate_pressure(lattice, pressure, squares, point) result(value)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -66,7 +66,7 @@ contains
     end if
   end function interpolate_pressure
 
-  !> The node next to a point, and whether the window has it; without it the one at the rim.
+  !> Find the node next to a point, and whether it is in the window; else that at the rim.
   pure subroutine nearest_node(lattice, point, node, inside)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -90,7 +90,7 @@ contains
     end associate
   end subroutine nearest_node
 
-  !> Column and row of a point, counted from 0 at the first node of the window.
+  !> Return column and row of a point, counted from 0 at the first node of the window.
   pure function coordinates_of(lattice, point) result(at)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
@@ -104,7 +104,7 @@ contains
     end associate
   end function coordinates_of
 
-  !> Value at a node.
+  !> Return the value at a node.
   pure real(wp) function value_at(values, node, outside)
     !> Values at the nodes (n_col, n_row)
     real(wp), intent(in) :: values(:, :)

@@ -7,31 +7,25 @@
 !> so that any pair of basis vectors gives a regular triangulation with the
 !> three edge directions basis(:, 1), basis(:, 2) and basis(:, 2) - basis(:, 1).
 !> The 60-degree lattice of the dissertation, eq. (5.1), is the default; no
-!> other module knows its angle. A window is the rhombus of nodes that is kept
-!> in memory; a field over it is an array of shape (n_col, n_row).
+!> other module depends on its angle. A window is the rhombus of nodes in
+!> memory; a field over it is an array of shape (n_col, n_row).
 !>
 !> Equations: docs/theory/discretisation.md, (D1), (D2).
 module hc_lattice
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
+  use hc_options, only: multilevel_options_t
   use hc_error, only: error_t, status, raise
   implicit none
   private
 
   public :: lattice_t, new_lattice, check_lattice, equilateral_basis, edge_directions, neighbors
 
-  !> Steps in column and row to the six neighbours of a node, along the edges of the triangulation.
+  !> Steps in column and row to the six neighbors of a node, along the edges of the triangulation.
   integer, parameter :: neighbors(2, 6) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1], [2, 6])
 
   !> Nodes of a window and size of an index that default integers can still work with.
   integer, parameter :: most_nodes = 2**29 - 1, largest_index = most_nodes
-
-  !> A part is worth operators of its own below this share of the nodes of the window.
-  real(wp), parameter :: worth = 0.6_wp
-  !> Nodes around the contact: so many, and its extent over this.
-  integer, parameter :: least_margin = 6, margin_part = 16
-  !> Sides of parts grow in steps of about this share of them.
-  integer, parameter :: step_part = 16
 
   !> Basis, origin and index window of a lattice.
   type :: lattice_t
@@ -62,7 +56,7 @@ module hc_lattice
 
 contains
 
-  !> A lattice from its basis vectors and window.
+  !> Set up a lattice from its basis vectors and window.
   pure subroutine new_lattice(lattice, basis, first, extent, error, origin)
     !> Lattice to be set up
     type(lattice_t), intent(out) :: lattice
@@ -105,7 +99,7 @@ contains
     end if
   end subroutine check_lattice
 
-  !> Basis of the equilateral lattice, eq. (5.1): sides of equal length at 60 degrees.
+  !> Return the basis of the equilateral lattice, eq. (5.1): sides of equal length at 60 degrees.
   pure function equilateral_basis(spacing) result(basis)
     !> Length of a side [m]
     real(wp), intent(in) :: spacing
@@ -116,7 +110,7 @@ contains
     basis(:, 2) = spacing*[0.5_wp, 0.5_wp*sqrt(3.0_wp)]
   end function equilateral_basis
 
-  !> The three edge directions of the triangulation, as columns [m].
+  !> Return the three edge directions of the triangulation, as columns [m].
   pure function edge_directions(basis) result(edges)
     !> Basis vectors as columns [m]
     real(wp), intent(in) :: basis(2, 2)
@@ -128,21 +122,25 @@ contains
     edges(:, 3) = basis(:, 2) - basis(:, 1)
   end function edge_directions
 
+  !> Return the number of nodes of the window.
   pure integer function lattice_size(self)
     class(lattice_t), intent(in) :: self
     lattice_size = product(self%extent)
   end function lattice_size
 
+  !> Return the area of a cell [m^2].
   pure real(wp) function cell_area(self)
     class(lattice_t), intent(in) :: self
     cell_area = self%basis(1, 1)*self%basis(2, 2) - self%basis(2, 1)*self%basis(1, 2)
   end function cell_area
 
+  !> Return the spacing l_e [m].
   pure real(wp) function lattice_spacing(self)
     class(lattice_t), intent(in) :: self
     lattice_spacing = maxval(norm2(edge_directions(self%basis), dim=1))
   end function lattice_spacing
 
+  !> Compute the coordinates of all nodes of the window.
   pure subroutine coordinates(self, x, y)
     class(lattice_t), intent(in) :: self
     !> Coordinates of the nodes, (n_col, n_row) [m]
@@ -160,7 +158,7 @@ contains
     end do
   end subroutine coordinates
 
-  !> Basis vectors over the spacing, as columns: the same to the bit for all equilateral lattices with a row along x.
+  !> Return the basis vectors over the spacing, as columns: the same to the bit for all equilateral lattices with a row along x.
   pure function unit_basis(self) result(basis)
     class(lattice_t), intent(in) :: self
     real(wp) :: basis(2, 2)
@@ -169,7 +167,7 @@ contains
     if (all(abs(basis - equilateral_basis(1.0_wp)) < 4.0_wp*epsilon(1.0_wp))) basis = equilateral_basis(1.0_wp)
   end function unit_basis
 
-  !> Node (i, j) of the coarse lattice is node (2 i, 2 j) of this one; nodes
+  !> Return the lattice of every second node: node (i, j) of it is node (2 i, 2 j) of this one; nodes
   !> outside the window of this one are left out.
   pure function coarsened(self) result(coarse)
     class(lattice_t), intent(in) :: self
@@ -183,19 +181,20 @@ contains
     coarse%extent = floor_half(last) - coarse%first + 1
   end function coarsened
 
-  !> Floor of n/2, also for negative n
+  !> Return the floor of n/2, also for negative n
   elemental integer function floor_half(n)
     integer, intent(in) :: n
     floor_half = (n - modulo(n, 2))/2
   end function floor_half
 
-  !> First and last column and row of the part around some nodes, with a margin as far as the window goes.
+  !> Find first and last column and row of the part around some nodes, with a margin as far as the window goes.
   !>
   !> It depends on nothing else, so that a load gives the same bits whatever came before it.
-  pure subroutine enclose(self, nodes, low, high)
+  pure subroutine enclose(self, nodes, options, low, high)
     class(lattice_t), intent(in) :: self
     !> The nodes (n_col, n_row)
     logical, intent(in) :: nodes(:, :)
+    type(multilevel_options_t), intent(in) :: options
     !> Columns and rows, from 1 on
     integer, intent(out) :: low(2), high(2)
     integer :: d, margin, step
@@ -207,10 +206,10 @@ contains
       low(d) = max(findloc(line, .true., dim=1), 1)
       high(d) = findloc(line, .true., dim=1, back=.true.)
       if (high(d) == 0) high(d) = self%extent(d)
-      margin = least_margin + (high(d) - low(d) + 1)/margin_part
+      margin = options%least_margin + (high(d) - low(d) + 1)/options%margin_divisor
       ! in steps of a power of two, so that loads that are alike share a part
-      step = least_margin
-      do while (step*step_part < high(d) - low(d))
+      step = options%least_margin
+      do while (step*options%step_divisor < high(d) - low(d))
         step = 2*step
       end do
       low(d) = max((low(d) - margin - 1)/step*step + 1, 1)
@@ -218,15 +217,16 @@ contains
     end do
   end subroutine enclose
 
-  !> Is the part so much smaller than the window that operators of its own pay?
-  pure logical function is_worth_parting(self, low, high)
+  !> Return whether the part is so much smaller than the window that operators of its own pay.
+  pure logical function is_worth_parting(self, low, high, options)
     class(lattice_t), intent(in) :: self
     !> First and last column and row of the part
     integer, intent(in) :: low(2), high(2)
-    is_worth_parting = product(high - low + 1) <= worth*self%size()
+    type(multilevel_options_t), intent(in) :: options
+    is_worth_parting = product(high - low + 1) <= options%largest_part*self%size()
   end function is_worth_parting
 
-  !> Lattice and window of a part.
+  !> Return lattice and window of a part.
   pure function subwindow(self, low, high) result(part)
     class(lattice_t), intent(in) :: self
     !> First and last column and row of the part

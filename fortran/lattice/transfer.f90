@@ -3,6 +3,8 @@
 !> Node (i, j) of the coarse lattice is node (2 i, 2 j) of the fine one. The
 !> interpolation is that of the piecewise linear pyramids themselves: the other
 !> fine nodes are the midpoints of coarse edges.
+!>
+!> Theory: docs/theory/multilevel.md.
 module hc_transfer
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t, neighbors
@@ -10,44 +12,9 @@ module hc_transfer
   implicit none
   private
 
-  public :: level_count, prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
-  public :: coarsen_bodies
+  public :: prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector, restrict_mask
 
 contains
-
-  !> Number of lattices, the given one included, when no window gets smaller than it should.
-  pure integer function level_count(extent, smallest_side)
-    !> Number of columns and rows of the finest window
-    integer, intent(in) :: extent(2)
-    !> Nodes that a side should have at least
-    integer, intent(in) :: smallest_side
-    integer :: side
-
-    level_count = 1
-    side = minval(extent)
-    do while (side >= 2*smallest_side)
-      side = side/2
-      level_count = level_count + 1
-    end do
-  end function level_count
-
-  !> Gap of the undeformed bodies and candidates on the lattice of every second node.
-  pure subroutine coarsen_bodies(lattice, initial_gap, candidate, coarse_lattice, coarse_gap, coarse_candidate)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Initial gap (n_col, n_row) [m]
-    real(wp), intent(in) :: initial_gap(:, :)
-    !> Nodes that may come into contact (n_col, n_row)
-    logical, intent(in) :: candidate(:, :)
-    !> The same on the coarser lattice
-    type(lattice_t), intent(out) :: coarse_lattice
-    real(wp), allocatable, intent(out) :: coarse_gap(:, :)
-    logical, allocatable, intent(out) :: coarse_candidate(:, :)
-
-    coarse_lattice = lattice%coarsened()
-    coarse_gap = restrict_field(lattice, initial_gap, coarse_lattice)
-    coarse_candidate = restrict_mask(lattice, candidate, coarse_lattice)
-  end subroutine coarsen_bodies
 
   !> Interpolate a field from the coarse to the fine lattice; zero outside the coarse window.
   subroutine prolong(coarse_lattice, coarse, fine_lattice, fine, space)
@@ -83,7 +50,7 @@ contains
 
   contains
 
-    !> Coarse value at an even fine node
+    !> Return the coarse value at an even fine node
     pure real(wp) function at(fine_col, fine_row)
       !> Absolute indices of the fine node
       integer, intent(in) :: fine_col, fine_row
@@ -121,7 +88,7 @@ contains
     !$omp parallel do schedule(static) private(beyond, around, col, k, n, near, next) num_threads(space%threads_for(size(coarse)))
     do row = 1, size(coarse, 2)
       square(:, row) = max(coarse(:, row), 0.0_wp)**2
-      ! the largest pressure of the neighbours tells whether there is anything to continue
+      ! only nodes with a neighbor under pressure are continued to
       around = 0.0_wp
       do k = 1, size(neighbors, 2)
         associate (c => neighbors(1, k), r => row + neighbors(2, k))
@@ -199,7 +166,7 @@ contains
           ratio(col, row, :) = coarse(col, row, :)/coarse_pressure(col, row)
           cycle
         end if
-        ! beyond the edge: that of the neighbours in contact
+        ! beyond the edge: that of the neighbors in contact
         n = 0
         do k = 1, size(neighbors, 2)
           near = [col, row] + neighbors(:, k)
@@ -222,7 +189,7 @@ contains
     !$omp end parallel do
   end subroutine prolong_shear
 
-  !> Values of a field at the coarse nodes.
+  !> Return the values of a field at the coarse nodes.
   pure function restrict_field(fine_lattice, fine, coarse_lattice) result(coarse)
     !> Fine lattice and window
     type(lattice_t), intent(in) :: fine_lattice
@@ -238,7 +205,7 @@ contains
     coarse = fine(start(1)::2, start(2)::2)
   end function restrict_field
 
-  !> Values of all components of a field at the coarse nodes.
+  !> Return the values of all components of a field at the coarse nodes.
   pure function restrict_vector(fine_lattice, fine, coarse_lattice) result(coarse)
     !> Fine lattice and window
     type(lattice_t), intent(in) :: fine_lattice
@@ -255,7 +222,7 @@ contains
     end do
   end function restrict_vector
 
-  !> Values of a mask at the coarse nodes.
+  !> Return the values of a mask at the coarse nodes.
   pure function restrict_mask(fine_lattice, fine, coarse_lattice) result(coarse)
     !> Fine lattice and window
     type(lattice_t), intent(in) :: fine_lattice

@@ -74,7 +74,7 @@ contains
 
   contains
 
-    !> First node of a block.
+    !> Return the first node of a block.
     pure integer function start(block)
       integer, intent(in) :: block
       start = (block - 1)*block_size + 1
@@ -82,13 +82,13 @@ contains
 
   end subroutine new_active_set
 
-  !> Number of runs of active nodes.
+  !> Count the runs of active nodes.
   pure integer function count_runs(active)
     logical, intent(in), contiguous :: active(:)
     count_runs = merge(1, 0, active(1)) + count(active(2:) .and. .not. active(:size(active) - 1))
   end function count_runs
 
-  !> Runs of active nodes.
+  !> List the runs of active nodes.
   pure subroutine list_runs(active, shift, first, last)
     logical, intent(in), contiguous :: active(:)
     !> What the nodes are shifted by
@@ -114,7 +114,7 @@ contains
     if (before) last(k) = shift + size(active)
   end subroutine list_runs
 
-  !> The active nodes of a field.
+  !> Gather the active nodes of a field.
   subroutine pack_field(self, field, packed)
     class(active_set_t), intent(in) :: self
     !> Field over all nodes
@@ -133,7 +133,7 @@ contains
     !$omp end parallel do
   end subroutine pack_field
 
-  !> Several vectors on the active nodes.
+  !> Gather the active nodes of several vectors.
   subroutine pack_columns(self, columns, packed)
     class(active_set_t), intent(in) :: self
     !> Vectors over all nodes (n, number of vectors)
@@ -148,7 +148,7 @@ contains
     end do
   end subroutine pack_columns
 
-  !> Put values where they belong.
+  !> Scatter values to the active nodes of a field.
   subroutine unpack_field(self, packed, field)
     class(active_set_t), intent(in) :: self
     !> Values at the active nodes (n_active)

@@ -9,23 +9,20 @@
 module hc_block_cholesky
   use, intrinsic :: iso_fortran_env, only: real32
   use hc_precision, only: wp
+  use hc_options, only: direct_options_t
   use hc_lapack, only: dgemm, spotrf, spotrs
   implicit none
   private
 
   public :: solve_blocks
 
-  !> Largest share of the error that a correction may leave; more take longer than LU.
-  real(wp), parameter :: largest_share = 0.3_wp
   !> Residual, relative to the matrix and the largest unknown, that counts as rounding error.
   real(wp), parameter :: rounding = 4.0_wp*epsilon(1.0_wp)
-  !> Corrections.
-  integer, parameter :: max_corrections = 40
 
 contains
 
   !> Solve matrix.unknown = rhs for several right-hand sides at once.
-  subroutine solve_blocks(n, n_1, n_rhs, first, matrix, rhs, unknown, solved)
+  subroutine solve_blocks(n, n_1, n_rhs, first, matrix, rhs, unknown, solved, options)
     !> Numbers of unknowns, of those in the first block, of right-hand sides
     integer, intent(in) :: n, n_1, n_rhs
     !> Symmetric positive definite part of the first block; its factor on return
@@ -39,7 +36,10 @@ contains
     !> False: the coupling is too strong, a block not positive definite, single precision too narrow, or there is
     !> not enough memory; the unknowns mean nothing then
     logical, intent(out) :: solved
+    !> Tuning numbers; absent: the usual ones
+    type(direct_options_t), intent(in), optional :: options
 
+    type(direct_options_t) :: tuning
     real(real32), allocatable :: second(:, :)
     real(real32) :: part_1(n_1, n_rhs), part_2(n - n_1, n_rhs)
     real(wp) :: residual(n, n_rhs), correction(n, n_rhs), along(n - n_1, n_rhs)
@@ -47,6 +47,7 @@ contains
     real(wp) :: norm
     integer :: i, n_2, info, stat
 
+    if (present(options)) tuning = options
     n_2 = n - n_1
     solved = .false.
     unknown = 0.0_wp
@@ -65,10 +66,10 @@ contains
 
     residual = rhs
     last = huge(1.0_wp)
-    do i = 1, max_corrections
+    do i = 1, tuning%max_corrections
       scale = maxval(abs(residual), dim=1)
       where (.not. scale > 0.0_wp) scale = 1.0_wp
-      ! the residuals as numbers about 1, which single precision can hold
+      ! the residuals as numbers about 1, in the range of single precision
       residual = residual/spread(scale, 1, n)
       part_1 = real(residual(:n_1, :), real32)
       call spotrs('L', n_1, n_rhs, first, n_1, part_1, n_1, info)
@@ -89,7 +90,7 @@ contains
       step = maxval(abs(correction), dim=1)
       solved = all(left <= bound)
       if (solved) return
-      if (.not. all(step <= largest_share*last .or. left <= bound)) then
+      if (.not. all(step <= tuning%largest_share*last .or. left <= bound)) then
         solved = all(left <= sqrt(real(n, wp))*bound)  ! no further for rounding, or no convergence
         return
       end if

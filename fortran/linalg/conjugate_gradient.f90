@@ -26,12 +26,13 @@ module hc_conjugate_gradient
 
 contains
 
+  !> Forget the last direction.
   pure subroutine restart(self)
     class(conjugate_gradient_t), intent(inout) :: self
     self%rz = 0.0_wp
   end subroutine restart
 
-  !> Share of the last direction in the next, zero if there is none.
+  !> Compute the share of the last direction in the next, zero if there is none.
   pure subroutine last_share(self, rz, share, anew)
     class(conjugate_gradient_t), intent(inout) :: self
     !> r^T z
@@ -46,7 +47,7 @@ contains
     self%rz = rz
   end subroutine last_share
 
-  !> Length of the step along the direction; zero: nothing is left to gain in working precision, or a matrix is not
+  !> Compute the length of the step along the direction; zero: nothing is left to gain in working precision, or a matrix is not
   !> positive definite.
   pure real(wp) function step_length(self, curvature)
     class(conjugate_gradient_t), intent(in) :: self

@@ -7,14 +7,14 @@ module hc_lapack
   implicit none
   private
 
-  public :: dgemm, dposv, dsgesv, dgelss, spotrf, spotrs
+  public :: dgemm, dposv, dsgesv, dgelss, spotrf, spotrs, sgemv, ssyrk, strsm, strsv
   public :: prepare_lapack, eliminate, least_squares
 
   !> Bytes of address space that OpenBLAS takes for a buffer when it is first called, and a reserve.
   integer(int64), parameter :: buffer_space = 160000000
 
   interface
-    !> C = alpha A B + beta C
+    !> Compute C = alpha A B + beta C (BLAS)
     subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
       import :: wp
       implicit none
@@ -24,7 +24,47 @@ module hc_lapack
       real(wp), intent(inout) :: c(ldc, *)
     end subroutine dgemm
 
-    !> Cholesky factor of a symmetric positive definite A, in single precision
+    !> Compute y <- alpha A x + beta y, or with A^T, in single precision
+    subroutine sgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
+      import :: real32
+      implicit none
+      character(len=1), intent(in) :: trans
+      integer, intent(in) :: m, n, lda, incx, incy
+      real(real32), intent(in) :: alpha, beta, a(lda, *), x(*)
+      real(real32), intent(inout) :: y(*)
+    end subroutine sgemv
+
+    !> Compute x <- A^-1 x for a triangular A, in single precision
+    subroutine strsv(uplo, trans, diag, n, a, lda, x, incx)
+      import :: real32
+      implicit none
+      character(len=1), intent(in) :: uplo, trans, diag
+      integer, intent(in) :: n, lda, incx
+      real(real32), intent(in) :: a(lda, *)
+      real(real32), intent(inout) :: x(*)
+    end subroutine strsv
+
+    !> Compute C = alpha A A^T + beta C for one triangle of C, in single precision
+    subroutine ssyrk(uplo, trans, n, k, alpha, a, lda, beta, c, ldc)
+      import :: real32
+      implicit none
+      character(len=1), intent(in) :: uplo, trans
+      integer, intent(in) :: n, k, lda, ldc
+      real(real32), intent(in) :: alpha, beta, a(lda, *)
+      real(real32), intent(inout) :: c(ldc, *)
+    end subroutine ssyrk
+
+    !> Compute B <- alpha A^-1 B or alpha B A^-1 for a triangular A, in single precision
+    subroutine strsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+      import :: real32
+      implicit none
+      character(len=1), intent(in) :: side, uplo, transa, diag
+      integer, intent(in) :: m, n, lda, ldb
+      real(real32), intent(in) :: alpha, a(lda, *)
+      real(real32), intent(inout) :: b(ldb, *)
+    end subroutine strsm
+
+    !> Compute the Cholesky factor of a symmetric positive definite A, in single precision
     subroutine spotrf(uplo, n, a, lda, info)
       import :: real32
       implicit none
@@ -68,7 +108,7 @@ module hc_lapack
       integer, intent(out) :: ipiv(*), iter, info
     end subroutine dsgesv
 
-    !> Solution of A X = B of least norm, of least squares where there is none (singular values)
+    !> Compute the solution of A X = B of least norm, of least squares where there is none (singular values)
     subroutine dgelss(m, n, nrhs, a, lda, b, ldb, s, rcond, rank, work, lwork, info)
       import :: wp
       implicit none
@@ -82,7 +122,7 @@ module hc_lapack
 
 contains
 
-  !> Have LAPACK take its buffers now: OpenBLAS waits for ever for those that it cannot have.
+  !> Let LAPACK allocate its buffers now: without memory for them OpenBLAS waits for ever.
   subroutine prepare_lapack(error)
     !> Allocated if there is no memory for them
     type(error_t), allocatable, intent(out) :: error

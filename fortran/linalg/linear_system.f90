@@ -1,12 +1,12 @@
 !> A linear system on a set of active nodes, with linear constraints.
 !>
-!> Wanted are the unknowns on the active nodes (the others stay as they are),
+!> Find the unknowns on the active nodes (the others stay as they are),
 !>
 !>     A x - B m = rhs   on the active nodes,     C^T x = as at the start,
 !>
 !> where m are the multipliers, which act along B; where A is symmetric C is B. In contact x are the tractions, m the
-!> rigid motions and C^T x the resultants. Vectors over all nodes are what products and preconditioners take; between
-!> them only the active nodes are kept. A vector M B (C^T M B)^-1 y added to x changes C^T x by y.
+!> rigid motions and C^T x the resultants. Products and preconditioners take vectors over all nodes; between
+!> them vectors have the active nodes only. A vector M B (C^T M B)^-1 y added to x changes C^T x by y.
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_linear_system
@@ -18,14 +18,14 @@ module hc_linear_system
   private
 
   public :: solution_accurate, iterations_used_up, solution_broke_off
-  public :: linear_system_t, precondition_constraints, fulfil, invert_gram
+  public :: linear_system_t, precondition_constraints, satisfy_constraints, invert_gram
 
   !> Why a linear solver stopped, from best to worst: the residual is within its bound; all iterations allowed were made;
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
   integer, parameter :: solution_accurate = 1, iterations_used_up = 2, solution_broke_off = 3
 
   !> A symmetric positive definite operator with a preconditioner, on fields that
-  !> are kept as vectors over all nodes.
+  !> are vectors over all nodes.
   type, abstract :: linear_system_t
     !> Space of the vectors
     type(field_space_t) :: space
@@ -37,6 +37,7 @@ module hc_linear_system
   end type linear_system_t
 
   abstract interface
+    !> Apply a linear map to a vector.
     subroutine linear_map(self, x, y, error)
       import :: linear_system_t, wp, error_t
       class(linear_system_t), intent(inout) :: self
@@ -54,7 +55,7 @@ module hc_linear_system
 
 contains
 
-  !> M B, the constraint vectors after the preconditioner, zero off the active nodes.
+  !> Compute M B, the constraint vectors after the preconditioner, zero off the active nodes.
   subroutine precondition_constraints(system, active, constraint, mb, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
@@ -80,10 +81,10 @@ contains
     end do
   end subroutine precondition_constraints
 
-  !> x <- x + M B (C^T M B)^-1 missing: make C^T x what it should be; mostly C is B.
+  !> Correct x <- x + M B (C^T M B)^-1 missing, so that C^T x has its prescribed value; mostly C is B.
   !>
   !> M B is about the traction that a rigid motion of the active nodes causes.
-  subroutine fulfil(rows, mb, missing, x, independent, space)
+  subroutine satisfy_constraints(rows, mb, missing, x, independent, space)
     !> C and M B
     real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> What C^T x lacks
@@ -99,9 +100,9 @@ contains
 
     call invert_gram(rows, mb, inverse, independent, space)
     if (independent) call space%add_columns(mb, [(dot_product(inverse(m, :), missing), m=1, size(missing))], x)
-  end subroutine fulfil
+  end subroutine satisfy_constraints
 
-  !> (C^T M B)^-1, zero if the constraints depend on each other.
+  !> Compute (C^T M B)^-1, zero if the constraints depend on each other.
   subroutine invert_gram(rows, mb, inverse, independent, space)
     !> C and M B
     real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)

@@ -1,8 +1,10 @@
 !> Conjugate gradients on a set of active nodes, with linear constraints (hc_linear_system).
 !>
-!> The constraints B^T x are held exactly by projecting the preconditioned residual,
+!> The projection of the preconditioned residual satisfies the constraints on B^T x exactly,
 !>
 !>     z <- M r - M B (B^T M B)^-1 B^T M r.
+!>
+!> (M. R. Hestenes and E. Stiefel, J. Res. Natl. Bur. Stand. 49, 1952, 409-436).
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_cg
@@ -20,20 +22,21 @@ module hc_projected_cg
 
 contains
 
-  !> Preconditioned conjugate gradients with projection on the constraints.
+  !> Solve by preconditioned conjugate gradients with projection on the constraints.
   subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, &
                           multiplier, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
     logical, intent(in) :: active(:)
-    !> Constraint vectors B (n, number of constraints, may be 0), zero off the active nodes, and M B
-    real(wp), intent(in), contiguous :: constraint(:, :), mb(:, :)
-    !> Right-hand side (n)
-    real(wp), intent(in) :: rhs(:)
-    !> Unknowns (n), on entry a start that fulfils the constraints
+    !> Constraint vectors B (n, number of constraints, may be 0), zero off the active nodes, and M B; freed, once there are
+    !> copies of their active part
+    real(wp), allocatable, intent(inout) :: constraint(:, :), mb(:, :)
+    !> Right-hand side (n), freed likewise
+    real(wp), allocatable, intent(inout) :: rhs(:)
+    !> Unknowns (n), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
-    !> Product A x (n), everywhere, kept up to date
+    !> Product A x (n), everywhere, on entry and on return
     real(wp), intent(inout), contiguous :: ax(:)
     !> The largest residual that is allowed on an active node
     real(wp), intent(in) :: tolerance
@@ -68,13 +71,14 @@ contains
     associate (n => nodes%n_active)
       allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
     end associate
-    allocate (onto(size(x)), from(size(x)))
-    call space%fill(from, 0.0_wp)
     call nodes%pack_columns(constraint, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack(x, x_active)
     call nodes%pack(ax, ax_active)
     call nodes%pack(rhs, rhs_active)
+    deallocate (constraint, mb, rhs)
+    allocate (onto(size(x)), from(size(x)))
+    call space%fill(from, 0.0_wp)
     call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0
     largest = 0.0_wp
@@ -89,8 +93,8 @@ contains
     do
       ! The share of the constraints is taken out of the residual before it is
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
-      ! What is left is normal to M B, which keeps the projected preconditioner
-      ! symmetric even if the given M B is not quite what its name says.
+      ! The rest is normal to M B, so that the projected preconditioner is
+      ! symmetric even if the given M B is only about M times B.
       call constrained_residual(b, multiplier, rhs_active, ax_active, r, residual, space)
       if (size(multiplier) > 0) then
         multiplier = multiplier - matmul(space%dots(m_b, r), inverse)
@@ -145,7 +149,7 @@ contains
     if (present(drift)) drift = epsilon(1.0_wp)*largest
   end subroutine projected_cg
 
-  !> r = rhs - A x + B m and its largest element.
+  !> Compute r = rhs - A x + B m and its largest element.
   subroutine constrained_residual(b, multiplier, rhs, ax, r, largest, space)
     !> Constraint vectors and multipliers
     real(wp), intent(in), contiguous :: b(:, :)

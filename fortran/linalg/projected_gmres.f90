@@ -1,9 +1,11 @@
 !> GMRES on a set of active nodes, with linear constraints (hc_linear_system), for a matrix that is not symmetric.
 !>
-!> The constraints C^T x, whose multipliers act along other vectors B, are held exactly by projecting the
-!> preconditioned residual,
+!> The projection of the preconditioned residual satisfies the constraints on C^T x exactly, whose multipliers act along
+!> other vectors B,
 !>
 !>     z <- M r - M B (C^T M B)^-1 C^T M r.
+!>
+!> (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986, 856-869).
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_gmres
@@ -19,20 +21,21 @@ module hc_projected_gmres
 
 contains
 
-  !> GMRES, preconditioned from the right, with the constraints C^T x held exactly.
+  !> Solve by GMRES, preconditioned from the right, with the constraints C^T x satisfied exactly.
   subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
                              multiplier, independent, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
     !> Nodes that carry unknowns (n)
     logical, intent(in) :: active(:)
-    !> B, along which the multipliers act, M B, and C of the constraints (n, number of constraints), zero off the active nodes
-    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
-    !> Weight of each residual (n)
+    !> B, along which the multipliers act, M B, and C of the constraints (n, number of constraints), zero off the active nodes;
+    !> freed, once there are copies of their active part
+    real(wp), allocatable, intent(inout) :: columns(:, :), mb(:, :), rows(:, :)
+    !> Weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), intent(in) :: weight(:)
-    !> Right-hand side (n)
-    real(wp), intent(in) :: rhs(:)
-    !> Unknowns (n), on entry a start that fulfils the constraints
+    !> Right-hand side (n), freed likewise
+    real(wp), allocatable, intent(inout) :: rhs(:)
+    !> Unknowns (n), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
     !> Product A x (n), everywhere
     real(wp), intent(inout), contiguous :: ax(:)
@@ -68,7 +71,7 @@ contains
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier), max_iterations), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
-    integer :: i, k, stat
+    integer :: i, k, part, stat
     type(field_space_t) :: space
 
     iterations = 0
@@ -80,14 +83,21 @@ contains
     call nodes%pack_columns(columns, b)
     call nodes%pack_columns(mb, m_b)
     call nodes%pack_columns(rows, c_rows)
+    deallocate (columns, mb, rows)
     call invert_gram(c_rows, m_b, inverse, independent, space)
     if (.not. independent) return
     associate (n => nodes%n_active)
       allocate (basis(1)%v(n), w(n), packed(n))
     end associate
-    allocate (onto(size(x)), from(size(x)), source=0.0_wp)
-    call nodes%pack(weight, w)
+    allocate (onto(size(x)), from(size(x)))
+    part = size(x)/size(weight)
+    do i = 1, size(weight)
+      call space%fill(from((i - 1)*part + 1:i*part), weight(i))
+    end do
+    call nodes%pack(from, w)
+    call space%fill(from, 0.0_wp)
     call nodes%pack(rhs, basis(1)%v)
+    deallocate (rhs)
     call nodes%pack(ax, packed)
     basis(1)%v = basis(1)%v - packed
     call space%add_columns(b, multiplier, basis(1)%v)

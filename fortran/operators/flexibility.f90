@@ -51,7 +51,7 @@ module hc_flexibility
   end type flexibility_t
 
   abstract interface
-    !> displacement(:, :, o) = sum over i of block(onto(o), from(i)) * traction(:, :, i)
+    !> Compute displacement(:, :, o) = sum over i of block(onto(o), from(i)) * traction(:, :, i)
     subroutine apply(self, from, traction, onto, displacement, error)
       import :: flexibility_t, wp, error_t
       class(flexibility_t), intent(inout) :: self
@@ -90,7 +90,7 @@ contains
     end if
   end subroutine check_operator
 
-  !> The six blocks of the operator at one distance of nodes.
+  !> Compute the six blocks of the operator at one distance of nodes.
   pure function blocks(pair, kernel) result(block)
     !> Elastic constants
     type(elastic_pair_t), intent(in) :: pair
@@ -107,6 +107,7 @@ contains
              pair%lambda_2*kernel(k_y)]
   end function blocks
 
+  !> Refuse arrays that do not fit the window and the components.
   subroutine check(self, from, traction, onto, displacement, error)
     class(flexibility_t), intent(in) :: self
     !> Components that act, and that are wanted
@@ -122,6 +123,7 @@ contains
     end if
   end subroutine check
 
+  !> Add one product to the count.
   subroutine count_application(self, from, onto)
     class(flexibility_t), intent(inout) :: self
     !> Components that acted, and that were wanted

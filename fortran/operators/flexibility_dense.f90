@@ -1,7 +1,9 @@
 !> Flexibility operator by direct summation, and its single coefficients, for LAPACK.
 !>
-!> A coefficient depends on the distance of two nodes only, so those of all distances in the window are all
-!> that is kept; the matrix of an area is filled from them where it is needed.
+!> A coefficient depends on the distance of two nodes only, so that those of all distances in the window are stored;
+!> the matrix of an area is filled from them on demand.
+!>
+!> Equations: docs/theory/discretisation.md, (D4).
 module hc_flexibility_dense
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -9,7 +11,8 @@ module hc_flexibility_dense
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, check_operator, normal, along_y, n_block, blocks, block_index
+  use hc_flexibility_fft, only: fft_memory
+  use hc_flexibility, only: flexibility_t, check_operator, normal, along_x, along_y, n_block, blocks, block_index
   implicit none
   private
 
@@ -32,7 +35,7 @@ module hc_flexibility_dense
 
 contains
 
-  !> The coefficients of the operator over a window.
+  !> Compute the coefficients of the operator over a window.
   subroutine new_dense_flexibility(operator, lattice, pair, error)
     !> Operator to be set up
     type(dense_flexibility_t), intent(out) :: operator
@@ -76,33 +79,44 @@ contains
       end do
     end do
     !$omp end parallel do
+    associate (xx => abs(block_index(along_x, along_x)), yy => abs(block_index(along_y, along_y)))
+      operator%influence(0, [xx, yy]) = operator%influence(0, [xx, yy]) + pair%tangential_layer
+    end associate
   end subroutine new_dense_flexibility
 
-  !> Bytes that the influence coefficients and the matrix of a contact take, factorized.
-  pure integer(selected_int_kind(18)) function dense_memory(extent, n_contact, normal_only)
+  !> Count the bytes that the influence coefficients and the matrix of a contact take, factorized.
+  pure integer(selected_int_kind(18)) function dense_memory(extent, n_contact, normal_only, unlike)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Nodes in contact
     integer, intent(in) :: n_contact
     !> Contact without friction
     logical, intent(in) :: normal_only
+    !> The materials are unlike; absent: they are
+    logical, intent(in), optional :: unlike
     integer, parameter :: long = selected_int_kind(18)
     !> What BLAS packs matrices into: 2 to 15 MB, as it was built and for what processor
     integer(long), parameter :: buffers = 8500000
-    integer(long) :: n
+    !> Vectors of a node in contact with friction: rows and columns of its unknowns, 2.5 as a rule, and ten directions of GMRES
+    integer(long), parameter :: vectors = 1200
+    integer(long) :: n, n_window, n_first
 
     n = n_contact
-    dense_memory = buffers + 8*n_block*4*int(extent(1), long)*extent(2)
+    n_window = int(extent(1), long)*extent(2)
+    dense_memory = buffers + 8*n_block*4*n_window
     if (normal_only) then
-      ! the first guess is where undeformed bodies would overlap, twice the contact and more; half of the matrix is touched
-      dense_memory = dense_memory + 8*min(15*n/7, int(extent(1), long)*extent(2))**2/2
+      ! areas on the way are larger than the contact; half of the matrix is touched
+      n_first = min(7*n/4, n_window)
+      dense_memory = dense_memory + 8*n_first**2/2
     else
-      ! beside the matrix its factors of single precision; mostly some nodes slip, which have two unknowns
-      dense_memory = dense_memory + (8 + 4)*(14*n/5)**2
+      ! the first guess is larger than the contact
+      n_first = min(7*n/5, n_window)
+      ! in single precision; then the complement of the sliding nodes and its factor, often of half the nodes
+      dense_memory = dense_memory + fft_memory(extent, .false., 1, unlike) + 4*n_first**2/2 + 2*n**2 + vectors*n
     end if
   end function dense_memory
 
-  !> Displacements along the normal by a unit pressure on one node [m/Pa].
+  !> Compute the displacements along the normal by a unit pressure on one node [m/Pa].
   pure function normal_influence(self, onto, from) result(displacement)
     class(dense_flexibility_t), intent(in) :: self
     !> Nodes that move, in the order of a window
@@ -114,7 +128,7 @@ contains
     displacement = self%influence(self%position(onto) - self%position(from), block_index(normal, normal))
   end function normal_influence
 
-  !> Displacements by the tractions on one node.
+  !> Compute the displacements by the tractions on one node.
   pure subroutine response(self, onto, from, traction, displacement)
     class(dense_flexibility_t), intent(in) :: self
     !> Nodes that move, in the order of a window
@@ -140,6 +154,7 @@ contains
     end do
   end subroutine response
 
+  !> Multiply by direct summation.
   subroutine dense_apply(self, from, traction, onto, displacement, error)
     class(dense_flexibility_t), intent(inout) :: self
     integer, intent(in) :: from(:)

@@ -1,4 +1,6 @@
 !> Flexibility operator as a zero-padded convolution by FFT.
+!>
+!> Equations: docs/theory/discretisation.md, (D4).
 module hc_flexibility_fft
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -6,7 +8,7 @@ module hc_flexibility_fft
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, check_operator, n_block, first_odd_block, blocks, block_index
+  use hc_flexibility, only: flexibility_t, check_operator, normal, n_block, first_odd_block, blocks, block_index
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
   use hc_fft_layout, only: convolution_memory, transform_memory
@@ -39,7 +41,7 @@ module hc_flexibility_fft
 
 contains
 
-  !> Plans and spectra of the operator over a window.
+  !> Make plans and spectra of the operator over a window.
   subroutine new_fft_flexibility(operator, lattice, pair, error, normal_only, space, kernel, cache)
     !> Operator to be set up
     type(fft_flexibility_t), intent(out) :: operator
@@ -49,19 +51,20 @@ contains
     type(elastic_pair_t), intent(in) :: pair
     !> Allocated on failure: a lattice or constants of no use, not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Only the action of the pressure on the gap will be asked for
+    !> The operator is applied to the pressure alone, for the gap alone
     logical, intent(in), optional :: normal_only
     !> Space of the fields; absent: as many threads as OpenMP would take
     type(field_space_t), intent(in), optional :: space
-    !> With `normal_only`: the kernel, as far as it is at hand
+    !> With `normal_only`: the kernel, as far as it has been computed
     type(normal_kernel_t), intent(inout), optional :: kernel
-    !> Spectra that are kept
+    !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     type(lattice_blocks_t) :: source
     type(normal_kernel_t) :: made
     type(kernel_key_t) :: key
     type(field_space_t) :: shared
+    integer :: n_kernel
     logical :: only_normal, found
 
     call check_operator(lattice, pair, error)
@@ -73,13 +76,15 @@ contains
     operator%lattice = lattice
     operator%pair = pair
     operator%n_component = merge(1, 3, only_normal)
-    call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
-                         merge(1, n_block, only_normal), operator%n_component, shared, error, &
-                         first_odd=first_odd_block)
+    n_kernel = merge(1, n_block, only_normal)
+    ! the odd blocks of like materials vanish
+    if (.not. abs(pair%lambda_2) > 0.0_wp) n_kernel = min(n_kernel, first_odd_block - 1)
+    call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), n_kernel, &
+                         operator%n_component, shared, error, first_odd=first_odd_block)
     if (allocated(error)) return
     operator%convolution%factor = pair%lambda_1*lattice%spacing()
     key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, pair)
-    call operator%convolution%take_spectra(found, error, cache, key)
+    call operator%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
     if (only_normal .and. present(kernel)) then
       call kernel%cover(lattice, shared)
@@ -93,23 +98,27 @@ contains
       source%pair = pair%scaled()
       call operator%convolution%transform_kernels(source, error)
     end if
-    if (.not. allocated(error)) call operator%convolution%share_spectra(cache, key)
+    if (.not. allocated(error)) call operator%convolution%store_spectra(cache, key)
   end subroutine new_fft_flexibility
 
-  !> Bytes that the operator takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads)
+  !> Count the bytes that the operator takes, for a window of the given size.
+  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
-    !> Only the action of the pressure on the gap will be asked for
+    !> The operator is applied to the pressure alone, for the gap alone
     logical, intent(in) :: normal_only
     !> Threads to use
     integer, intent(in) :: threads
+    !> The materials are unlike: the odd blocks do not vanish; absent: they are
+    logical, intent(in), optional :: unlike
+    integer :: n_kernel
 
-    fft_memory = convolution_memory(extent, good_size(2*extent - 1), merge(1, n_block, normal_only), &
-                                    merge(1, 3, normal_only), threads)
+    n_kernel = merge(1, n_block, normal_only)
+    if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, first_odd_block - 1), unlike)
+    fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, merge(1, 3, normal_only), threads)
   end function fft_memory
 
-  !> Bytes that are needed besides while the full operator is set up.
+  !> Count the additional bytes while the full operator is set up.
   pure integer(selected_int_kind(18)) function fft_setup_memory(extent)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -117,6 +126,7 @@ contains
     fft_setup_memory = transform_memory(extent, good_size(2*extent - 1), n_block)
   end function fft_setup_memory
 
+  !> Evaluate the blocks of the operator along a row of offsets.
   pure subroutine lattice_block_row(self, j, k)
     class(lattice_blocks_t), intent(in) :: self
     integer, intent(in) :: j
@@ -132,6 +142,7 @@ contains
     end do
   end subroutine lattice_block_row
 
+  !> Multiply by the convolution, and add the stretch of tangential springs.
   subroutine fft_apply(self, from, traction, onto, displacement, error)
     class(fft_flexibility_t), intent(inout) :: self
     integer, intent(in) :: from(:)
@@ -139,6 +150,7 @@ contains
     integer, intent(in) :: onto(:)
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     type(error_t), allocatable, intent(out) :: error
+    integer :: i, o
 
     call self%check(from, traction, onto, displacement, error)
     if (allocated(error)) return
@@ -147,6 +159,14 @@ contains
       return
     end if
     call self%convolution%convolve(block_index(onto, from), traction, displacement)
+    if (self%pair%tangential_layer > 0.0_wp) then
+      do i = 1, size(from)
+        do o = 1, size(onto)
+          if (from(i) == normal .or. onto(o) /= from(i)) cycle
+          displacement(:, :, o) = displacement(:, :, o) + self%pair%tangential_layer*traction(:, :, i)
+        end do
+      end do
+    end if
     call self%count(from, onto)
   end subroutine fft_apply
 

@@ -26,7 +26,7 @@ module hc_lattice_symbol
 
 contains
 
-  !> Symbols of K1, K_xx and K_xy at one frequency of a periodic grid [m].
+  !> Compute the symbols of K1, K_xx and K_xy at one frequency of a periodic grid [m].
   pure function kernel_symbols(basis, length, frequency) result(symbol)
     !> Basis vectors as columns [m]
     real(wp), intent(in) :: basis(2, 2)
@@ -54,7 +54,7 @@ contains
     end if
   end function kernel_symbols
 
-  !> Symbols of K1 at many frequencies of a periodic grid [m].
+  !> Compute the symbols of K1 at many frequencies of a periodic grid [m].
   !>
   !> The signs of the sines cancel in the product of all three, so that the sum over aliases is one
   !> over polynomials and a root; where a phase vanishes the limits are those of `kernel_symbols`.
@@ -111,7 +111,7 @@ contains
     end do
   end subroutine normal_symbols
 
-  !> Does a phase vanish, or is the frequency its own opposite?
+  !> Return whether a phase vanishes, or the frequency is its own opposite.
   pure logical function is_special(length, low)
     !> Grid, and frequency of the smallest modulus
     integer, intent(in) :: length(2), low(2)
@@ -120,7 +120,7 @@ contains
                  .or. low(1)*length(2) == low(2)*length(1)
   end function is_special
 
-  !> Sines and cosines of half the phases of all frequencies, taken from (-pi, pi].
+  !> Compute the sines and cosines of half the phases of all frequencies, taken from (-pi, pi].
   pure subroutine half_angles(n, sine, cosine)
     !> Length
     integer, intent(in) :: n
@@ -163,7 +163,7 @@ contains
     end do
   end function alias_sum
 
-  !> sinc(half) from the sine of the phase before it was shifted by shift*pi.
+  !> Compute sinc(half) from the sine of the phase before it was shifted by shift*pi.
   elemental real(wp) function sinc_ratio(sine, half, shift)
     !> Sine of half the unshifted phase
     real(wp), intent(in) :: sine

@@ -9,14 +9,15 @@
 !> because no traction acts outside. Any linear continuation E thus gives a symmetric
 !> preconditioner E^T K^-1 E >= (K_CC)^-1, the better the closer E comes to the
 !> minimum; zero outside is the plainest. Beyond the edge of a loaded region the
-!> surface falls off like the root of the distance, and less the longer
-!> the waves along the edge are. Here each ring of nodes around the active ones takes the
-!> mean of its neighbours in the ring before, smoothed along the ring, and falls off like
+!> surface falls off like the root of the distance, and long waves along the edge fall off less.
+!> Here each ring of nodes around the active ones takes the
+!> mean of its neighbors in the ring before, smoothed along the ring, and falls off like
 !> 1 - sqrt(ring/(rings + 1)).
 !>
 !> Equations: docs/theory/preconditioner.md, (P2), (P3).
 module hc_preconditioner_extension
   use hc_precision, only: wp, sp
+  use hc_options, only: preconditioner_options_t
   use hc_lattice, only: neighbors
   use hc_field_space, only: field_space_t
   implicit none
@@ -24,15 +25,8 @@ module hc_preconditioner_extension
 
   public :: edge_extension_t, new_edge_extension
 
-  !> Rings: this times a power of the number of active nodes over that of the edge nodes (the width of
-  !> the contact), and at most so many.
-  real(wp), parameter :: ring_factor = 0.7_wp, ring_power = 0.8_wp
-  integer, parameter :: most_rings = 16
   !> Marks of nodes without a ring, and of what lies around the window.
   integer, parameter :: free = huge(0), outside = huge(0) - 1
-  !> Times that a ring is smoothed.
-  integer, parameter :: smoothings = 2
-
   !> Nodes in the rings from which on threads share the work.
   integer, parameter :: worth_sharing = 8192
 
@@ -45,8 +39,10 @@ module hc_preconditioner_extension
     integer, allocatable :: inner(:, :), n_inner(:)
     !> Neighbours in the same ring and the node itself, as places in the list (7, n), and how many they are
     integer, allocatable :: beside(:, :), n_beside(:)
-    !> Fall from ring to ring over the number of neighbours in the ring before
+    !> Fall from ring to ring over the number of neighbors in the ring before
     real(sp), allocatable :: fall(:)
+    !> Times that a ring is smoothed
+    integer :: smoothings = 0
     !> Space of the rings
     type(field_space_t) :: space
   contains
@@ -58,14 +54,16 @@ module hc_preconditioner_extension
 
 contains
 
-  !> Rings around the active nodes.
-  subroutine new_edge_extension(self, active, space)
+  !> Find the rings around the active nodes.
+  subroutine new_edge_extension(self, active, space, options)
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, n_row)
-    logical, intent(in) :: active(:, :)
+    logical, intent(in), contiguous :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    !> Tuning numbers
+    type(preconditioner_options_t), intent(in) :: options
 
     !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
     !> those of the rings, `free` elsewhere and `outside` around
@@ -76,10 +74,13 @@ contains
     n_col = size(active, 1)
     width = n_col + 2
     step = neighbors(1, :) + width*neighbors(2, :)
-    call mark_window(active, space, mark, n_active)
+    call mark_window(active, space, mark)
+    n_active = space%count(active)
     call find_edge(mark, step, shape(active), space, frontier)
     n_ring = 0
-    if (size(frontier) > 0) n_ring = min(most_rings, int(ring_factor*(real(n_active, wp)/size(frontier))**ring_power))
+    if (size(frontier) > 0) then
+      n_ring = min(options%max_rings, int(options%ring_factor*(real(n_active, wp)/size(frontier))**options%ring_power))
+    end if
     allocate (node(0), self%ring(1))
     self%ring(1) = 1
     do r = 1, n_ring
@@ -92,6 +93,7 @@ contains
 
     n = size(node)
     n_ring = size(self%ring) - 1
+    self%smoothings = options%smoothings
     if (n >= worth_sharing) self%space = space
     allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%inner(6, n), self%beside(7, n))
     !$omp parallel num_threads(self%space%threads) private(r, k)
@@ -110,7 +112,7 @@ contains
 
   contains
 
-    !> Place in the window of a place in the marks.
+    !> Return the place in the window of a place in the marks.
     elemental integer function in_window(place)
       integer, intent(in) :: place
       integer :: row
@@ -120,42 +122,40 @@ contains
 
   end subroutine new_edge_extension
 
-  !> Marks of all nodes before there are rings.
-  subroutine mark_window(active, space, mark, n_active)
+  !> Mark all nodes before there are rings.
+  subroutine mark_window(active, space, mark)
+    !> Active nodes (n_col, n_row)
     logical, intent(in) :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    !> Marks of the nodes, with those around the window
     integer, allocatable, intent(out) :: mark(:)
-    !> Number of active nodes
-    integer, intent(out) :: n_active
     integer :: row, width, start
 
     width = size(active, 1) + 2
     allocate (mark(width*(size(active, 2) + 2)))
     mark(:width) = outside
     mark(size(mark) - width + 1:) = outside
-    n_active = 0
-    !$omp parallel do schedule(static) num_threads(space%threads) private(start) reduction(+: n_active)
+    !$omp parallel do schedule(static) num_threads(space%threads) private(start)
     do row = 1, size(active, 2)
       start = row*width + 1
       mark(start) = outside
       mark(start + 1:start + width - 2) = merge(0, free, active(:, row))
       mark(start + width - 1) = outside
-      n_active = n_active + count(active(:, row))
     end do
     !$omp end parallel do
   end subroutine mark_window
 
-  !> Height of the continuation in a ring.
+  !> Compute the height of the continuation in a ring.
   pure real(wp) function profile(ring, n_ring)
     !> Ring, and number of rings
     integer, intent(in) :: ring, n_ring
     profile = 1.0_wp - sqrt(real(ring, wp)/(n_ring + 1))
   end function profile
 
-  !> Active nodes with a neighbour that is not; a node at the rim of the window has none there.
+  !> Find the active nodes with a neighbor that is not; a node at the rim of the window has none there.
   subroutine find_edge(mark, step, extent, space, edge)
-    !> Marks of all nodes, and steps to the neighbours of a node
+    !> Marks of all nodes, and steps to the neighbors of a node
     integer, intent(in) :: mark(:), step(6)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -195,9 +195,9 @@ contains
     end do
   end subroutine find_edge
 
-  !> Nodes next to a ring that have no ring yet.
+  !> Find the nodes next to a ring that have no ring yet.
   pure subroutine next_ring(ring, step, mark, listed, next)
-    !> Nodes of the ring before, and steps to the neighbours of a node
+    !> Nodes of the ring before, and steps to the neighbors of a node
     integer, intent(in) :: ring(:), step(:)
     !> Marks of all nodes; those of the new ring get their place in the list
     integer, intent(inout) :: mark(:)
@@ -222,9 +222,9 @@ contains
     next = found(:n)
   end subroutine next_ring
 
-  !> Neighbours of a node in the ring before and in its own.
+  !> List the neighbors of a node in the ring before and in its own.
   pure subroutine list_neighbors(node, step, mark, own, after, inner, beside, n_inner, n_beside)
-    !> The node, and steps to its neighbours
+    !> The node, and steps to its neighbors
     integer, intent(in) :: node, step(6)
     !> Marks of all nodes
     integer, intent(in) :: mark(:)
@@ -242,7 +242,7 @@ contains
     do k = 1, size(step)
       near = node + step(k)
       if (mark(near) < own) then
-        ! no neighbour is further in than the ring before
+        ! no neighbor is further in than the ring before
         n_inner = n_inner + 1
         inner(n_inner) = near
       else if (mark(near) < after) then
@@ -270,7 +270,7 @@ contains
           value(k) = self%fall(k)*sum_of(field, self%inner(:self%n_inner(k), k))
         end do
         !$omp end do
-        do s = 1, smoothings
+        do s = 1, self%smoothings
           !$omp do schedule(static)
           do k = first, last
             smooth(k) = sum_of(value, self%beside(:self%n_beside(k), k))/self%n_beside(k)
@@ -288,7 +288,7 @@ contains
     !$omp end parallel
   end subroutine extend
 
-  !> The transpose of `extend`; what is left on the rings has no meaning.
+  !> Apply the transpose of `extend`; the values on the rings have no meaning afterwards.
   subroutine fold(self, field)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
@@ -306,7 +306,7 @@ contains
           value(k) = field(self%node(k))
         end do
         !$omp end do
-        do s = 1, smoothings
+        do s = 1, self%smoothings
           !$omp do schedule(static)
           do k = first, last
             share(k) = value(k)/self%n_beside(k)
@@ -318,7 +318,7 @@ contains
           end do
           !$omp end do
         end do
-        ! several nodes add to the same neighbour, always in the same order
+        ! several nodes add to the same neighbor, always in the same order
         !$omp single
         do k = first, last
           do i = 1, self%n_inner(k)

@@ -3,6 +3,8 @@
 !> On the equilateral lattice it has twelve symmetries: only offsets with
 !> 0 <= j <= i are evaluated. Over the spacing the kernel is the same at the same
 !> indices of any lattice, so that one table serves a whole hierarchy of lattices.
+!>
+!> Equations: docs/theory/elasticity.md, (E5) to (E13).
 module hc_pressure_kernel
   use hc_precision, only: wp
   use hc_lattice, only: lattice_t
@@ -21,14 +23,14 @@ module hc_pressure_kernel
     !> K1 at offsets (i, j) with i j >= 0, and at (i, -j), over the spacing
     real(wp), allocatable :: same(:, :), opposite(:, :)
   contains
-    !> Make the table, unless it serves already
+    !> Tabulate the kernel, unless the table covers the window
     procedure :: cover
     procedure :: row => kernel_row
   end type normal_kernel_t
 
 contains
 
-  !> Table for a window; the one that is there has to be of the same lattice, or of one that is coarser or finer.
+  !> Tabulate the kernel for a window; a table that exists is of the same lattice, or of a coarser or finer one.
   subroutine cover(self, lattice, space)
     class(normal_kernel_t), intent(inout) :: self
     !> Lattice and window
@@ -67,6 +69,7 @@ contains
     end do
   end subroutine cover
 
+  !> Take a row of offsets from the table.
   pure subroutine kernel_row(self, j, k)
     class(normal_kernel_t), intent(in) :: self
     integer, intent(in) :: j

@@ -1,12 +1,11 @@
-!> Fourier preconditioner: the inverse of the lattice symbol on a small periodic grid.
+!> The preconditioners of pressure and shear traction: the inverse symbol on the nodes in contact.
 !>
-!> The grid is that of the window, or the next of a fast length, instead of twice
-!> as large, so that one application costs about a quarter of a product. It is symmetric
-!> and positive definite, also when it is restricted to a set of nodes.
+!> Displacements are continued beyond the edge of the contact (preconditioner_extension) and multiplied by the inverse
+!> symbol (inverse_symbol); the tractions beyond the edge are added to those inside by the transpose of the continuation.
 !>
-!> For shear tractions there is a second one, of a body whose every node has a soft spring: which one suits a slipping node
-!> depends on the compliance D of its spring.
-!> The elastic compliance of a traction is the greater the longer its waves are: from that of a
+!> For shear tractions there is a second inverse symbol, of a body whose every node has a soft spring: which one suits a
+!> slipping node depends on the compliance D of its spring.
+!> The elastic compliance of a traction grows with the length of its waves: from that of a
 !> single node, t_h, for the shortest ones to that of the whole contact. A spring that is
 !> softer than all of them leaves 1/D, one that is stiffer than all of them leaves the inverse symbol.
 !> In between short waves see the spring and long ones the elastic body: there the
@@ -14,255 +13,318 @@
 !>
 !>     M = sqrt(chi_1) T^-1 sqrt(chi_1) + sqrt(chi_2) (T + D_soft)^-1 sqrt(chi_2) + chi_3/D,     sum of chi = 1.
 !>
-!> Equations: docs/theory/preconditioner.md, (P1), (P4) to (P6).
+!> Equations: docs/theory/preconditioner.md, (P2) to (P6).
 module hc_symbol_preconditioner
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
+  use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_fftw, only: good_size
-  use hc_convolution_single, only: convolution_t, new_convolution
-  use hc_fft_layout_single, only: convolution_memory
-  use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_preconditioner_extension, only: edge_extension_t
-  use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
+  use hc_active_set, only: active_set_t, new_active_set
+  use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol, node_compliance
+  use hc_preconditioner, only: preconditioner_t
+  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
   implicit none
   private
 
-  public :: symbol_preconditioner_t, new_symbol_preconditioner, preconditioner_memory
-  public :: node_compliance, blend, soft
+  public :: pressure_preconditioner_t, shear_preconditioner_t, new_symbol_preconditioner, blend
 
-  !> A transform in single precision moves half of the bytes, and is counted as half of one.
-  real(wp), parameter, public :: single_cost = 0.5_wp
-
-  !> Compliances, over that of a node, up to which a spring counts as stiff, where it counts as soft, and
-  !> from where on nothing else counts.
-  real(wp), parameter :: stiff = 0.5_wp, soft = 8.0_wp, loose = 64.0_wp
-
-  !> Blocks (onto, from) of the symmetric inverse.
-  integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
-  !> Kernels of the tangential inverse; those on soft springs come after them.
-  integer, parameter :: n_tangential = 3
-
-  !> Approximate inverse of the normal or of the tangential flexibility.
-  type :: symbol_preconditioner_t
-    type(convolution_t), private :: convolution
-    !> Displacement per traction that the single precision numbers are scaled with [m/Pa]
-    real(wp) :: unit = 1.0_wp
-    !> Of the tangential flexibility
-    logical, private :: tangential = .false.
-    !> Fields in single precision
-    real(sp), allocatable, private :: given(:, :, :), wanted(:, :, :)
-    !> Cost of one application in applications of the full flexibility operator
-    real(wp) :: cost = 0.0_wp
-  contains
-    !> Traction that causes a given displacement, approximately
-    procedure :: apply
-    !> The same in single precision, displacements and tractions in any units of ratio `unit`
-    procedure :: apply_single
+  !> Inverse symbol with its continuation beyond the contact.
+  type, extends(preconditioner_t), abstract :: symbol_preconditioner_t
+    private
+    type(inverse_symbol_t) :: inverse
+    type(preconditioner_options_t) :: options
+    !> Columns and rows of the window
+    integer :: extent(2) = 0
+    !> Space of the fields
+    type(field_space_t) :: space
+    !> Continuation of displacements beyond the contact; none before there are active nodes
+    type(edge_extension_t), allocatable :: edge
   end type symbol_preconditioner_t
+
+  !> Approximate inverse of the normal flexibility.
+  type, extends(symbol_preconditioner_t) :: pressure_preconditioner_t
+  contains
+    procedure :: set_active => set_contact
+    procedure :: apply => apply_to_pressure
+    procedure :: apply_single => apply_to_pressure_single
+    procedure :: clear => clear_contact
+  end type pressure_preconditioner_t
+
+  !> Approximate inverse of the tangential flexibility with the springs of slipping nodes.
+  type, extends(symbol_preconditioner_t) :: shear_preconditioner_t
+    private
+    !> Elastic compliance t_h of a node [m/Pa]
+    real(wp) :: elastic_compliance = 0.0_wp
+    !> Compliance D along t, and direction e
+    real(wp), pointer, contiguous :: compliance(:) => null(), direction(:, :) => null()
+    !> Weights sqrt(chi) of each node in the inverse symbols without and with soft springs; is one of them not zero?
+    real(wp), allocatable :: weight(:, :)
+    logical :: used(2) = .true.
+    !> Active nodes, and their runs
+    logical, allocatable :: active(:)
+    type(active_set_t) :: nodes
+    !> Components along x and y
+    real(sp), allocatable :: displacement(:), traction(:)
+  contains
+    procedure :: set_active => set_sheared
+    procedure :: apply => apply_to_shear
+    procedure :: clear => clear_sheared
+  end type shear_preconditioner_t
 
 contains
 
-  !> Plans and inverse symbol over a window.
-  subroutine new_symbol_preconditioner(self, lattice, pair, space, error, tangential, cache)
+  !> Set up a preconditioner over a window: of the pressure or of the shear traction, by the type of `self`.
+  subroutine new_symbol_preconditioner(self, lattice, pair, space, options, error, cache)
     !> Preconditioner to be set up
-    type(symbol_preconditioner_t), intent(out) :: self
+    class(symbol_preconditioner_t), intent(out) :: self
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    !> Tuning numbers
+    type(preconditioner_options_t), intent(in) :: options
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> For shear tractions instead of the pressure
-    logical, intent(in), optional :: tangential
-    !> Spectra that are kept
+    !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
+    type(preconditioner_options_t) :: usual
+    type(kernel_cache_t), pointer :: shared
 
-    type(kernel_key_t) :: key
-    integer, allocatable :: f(:, :)
-    integer :: length(2), b, i, n_component
-    real(wp) :: scale, k(3), matrix(3), spring, basis(2, 2), gamma
-    real(wp), allocatable :: symbol(:)
-    logical :: found
-
-    if (present(tangential)) self%tangential = tangential
-    n_component = merge(2, 1, self%tangential)
-    length = good_size(lattice%extent)
-    call new_convolution(self%convolution, lattice%extent, length, merge(2*n_tangential, 1, self%tangential), n_component, &
-                         space, error)
-    if (allocated(error)) return
-    self%unit = pair%lambda_1*lattice%spacing()
-    self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
-    key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, pair)
-    call self%convolution%take_spectra(found, error, cache, key)
-    if (found .or. allocated(error)) return
-    ! all in units of lambda_1 and the spacing
-    basis = lattice%unit_basis()
-    gamma = pair%gamma()
-    spring = soft*node_ratio(pair)
-    scale = 1.0_wp/product(real(length, wp))
-    !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, k, matrix, symbol)
-    do b = 1, self%convolution%n_block
-      f = self%convolution%frequencies(b)
-      if (.not. self%tangential) then
-        allocate (symbol(size(f, 2)))
-        ! beyond length/2 there is mere filling
-        f(1, :) = min(f(1, :), length(1)/2)
-        call normal_symbols(basis, length, f, symbol)
-        self%convolution%spectrum(:, b, 1) = real(scale/symbol, sp)
-        deallocate (symbol)
-      else
-        do i = 1, size(f, 2)
-          if (f(1, i) > length(1)/2) cycle
-          k = kernel_symbols(basis, length, f(:, i))
-          ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
-          matrix = [k(symbol_1) + gamma*k(symbol_xx), gamma*k(symbol_xy), k(symbol_1) + gamma*(k(symbol_1) - k(symbol_xx))]
-          self%convolution%spectrum(i, b, :n_tangential) = real(scale*inverse(matrix), sp)
-          matrix([1, 3]) = matrix([1, 3]) + spring
-          self%convolution%spectrum(i, b, n_tangential + 1:) = real(scale*inverse(matrix), sp)
-        end do
-      end if
-    end do
-    !$omp end parallel do
-    call self%convolution%share_spectra(cache, key)
+    select type (self)
+    type is (shear_preconditioner_t)
+      shared => null()
+      ! the key of a spectrum does not have the compliance of the springs
+      if (present(cache) .and. abs(options%soft_spring - usual%soft_spring) <= 0.0_wp) shared => cache
+      call new_inverse_symbol(self%inverse, lattice, pair, space, error, options%soft_spring, shared)
+      self%elastic_compliance = node_compliance(lattice, pair)
+    class default
+      call new_inverse_symbol(self%inverse, lattice, pair, space, error, cache=cache)
+    end select
+    self%unit = self%inverse%unit
+    self%extent = lattice%extent
+    self%space = space
+    self%options = options
   end subroutine new_symbol_preconditioner
 
-  !> Inverse of a symmetric matrix.
-  pure function inverse(matrix)
-    !> Elements xx, xy and yy
-    real(wp), intent(in) :: matrix(3)
-    real(wp) :: inverse(3)
-    inverse = [matrix(3), -matrix(2), matrix(1)]/(matrix(1)*matrix(3) - matrix(2)**2)
-  end function inverse
+  !> Set the nodes in contact, and their springs.
+  subroutine set_contact(self, active, compliance, direction)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    logical, intent(in), contiguous :: active(:)
+    real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
-  !> Bytes that the preconditioner takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, threads, tangential)
-    !> Number of columns and rows of the window
-    integer, intent(in) :: extent(2)
-    !> Threads to use
-    integer, intent(in) :: threads
-    !> For shear tractions instead of the pressure
-    logical, intent(in) :: tangential
-    integer, parameter :: long = selected_int_kind(18)
-
-    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), &
-                                               merge(2, 1, tangential), threads)
-    ! fields in single precision; those of the tangential one belong to the shear system
-    if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
-  end function preconditioner_memory
-
-  subroutine apply(self, displacement, traction, edge)
-    class(symbol_preconditioner_t), intent(inout) :: self
-    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2) [m]
-    real(wp), intent(in), contiguous :: displacement(:, :, :)
-    !> Pressure, or shear tractions (n_col, n_row, 1 or 2) [Pa]
-    real(wp), intent(out), contiguous :: traction(:, :, :)
-    !> Continuation beyond the nodes where displacements are given
-    type(edge_extension_t), intent(in), optional :: edge
-    real(sp), allocatable :: given(:, :, :), wanted(:, :, :)
-    integer :: row, m
-
-    ! out of `self`, which the product changes
-    call move_alloc(self%given, given)
-    call move_alloc(self%wanted, wanted)
-    if (.not. allocated(given)) then
-      allocate (given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
-      allocate (wanted, mold=given)
-    end if
-    associate (space => self%convolution%space)
-      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
-      do m = 1, size(given, 3)
-        do row = 1, size(given, 2)
-          given(:, row, m) = real(displacement(:, row, m)/self%unit, sp)
-        end do
-      end do
-      !$omp end parallel do
-      call self%apply_single(given, wanted, edge)
-      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
-      do m = 1, size(wanted, 3)
-        do row = 1, size(wanted, 2)
-          traction(:, row, m) = wanted(:, row, m)
-        end do
-      end do
-      !$omp end parallel do
+    associate (direction => direction)
+      if (.not. allocated(self%edge)) allocate (self%edge)
+      call new_edge_extension(self%edge, reshape(active, self%extent), self%space, self%options)
     end associate
-    call move_alloc(given, self%given)
-    call move_alloc(wanted, self%wanted)
-  end subroutine apply
+    if (present(compliance)) call self%inverse%set_springs(reshape(compliance, self%extent), reshape(active, self%extent))
+  end subroutine set_contact
 
-  subroutine apply_single(self, displacement, traction, edge, on_springs)
-    class(symbol_preconditioner_t), intent(inout) :: self
-    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
-    real(sp), intent(inout), contiguous, target :: displacement(:, :, :)
-    !> Pressure, or shear tractions (n_col, n_row, 1 or 2)
-    real(sp), intent(out), contiguous, target :: traction(:, :, :)
-    !> Continuation beyond the nodes where displacements are given
-    type(edge_extension_t), intent(in), optional :: edge
-    !> Displacements of nodes on soft springs; absent: without springs
-    logical, intent(in), optional :: on_springs
-    real(sp), pointer, contiguous :: field(:)
-    integer :: m, block(2, 2)
+  !> Estimate the pressure that causes a closing of the gap.
+  subroutine apply_to_pressure(self, displacement, traction, work)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: displacement(:)
+    real(wp), intent(out), contiguous, target :: traction(:)
+    real(wp), intent(inout) :: work
 
-    if (present(edge)) then
-      do m = 1, size(displacement, 3)
-        field(1:size(displacement, 1)*size(displacement, 2)) => displacement(:, :, m)
-        call edge%extend(field)
+    call self%inverse%apply(displacement, traction, self%edge)
+    work = work + self%inverse%cost
+  end subroutine apply_to_pressure
+
+  !> Estimate it in single precision.
+  subroutine apply_to_pressure_single(self, displacement, traction, work)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    real(sp), intent(inout), contiguous, target :: displacement(:)
+    real(sp), intent(out), contiguous, target :: traction(:)
+    real(wp), intent(inout) :: work
+
+    call self%inverse%apply_single(displacement, traction, self%edge)
+    work = work + self%inverse%cost
+  end subroutine apply_to_pressure_single
+
+  !> Forget the nodes in contact.
+  subroutine clear_contact(self)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    if (allocated(self%edge)) deallocate (self%edge)
+  end subroutine clear_contact
+
+  !> Set the nodes in contact; weigh the inverse symbols by the compliances.
+  subroutine set_sheared(self, active, compliance, direction)
+    class(shear_preconditioner_t), intent(inout) :: self
+    logical, intent(in), contiguous :: active(:)
+    real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
+    integer :: i, k
+    logical :: known, used(2)
+
+    self%compliance => compliance
+    self%direction => direction
+    known = allocated(self%active)
+    if (known) known = count(self%active .neqv. active) == 0
+    if (.not. known) then
+      self%active = active
+      if (.not. allocated(self%edge)) allocate (self%edge)
+      call new_edge_extension(self%edge, reshape(active, self%extent), self%space, self%options)
+      call new_active_set(self%nodes, active, self%space)
+    end if
+    if (.not. allocated(self%weight)) then
+      allocate (self%weight(size(active), 2), self%displacement(2*size(active)), self%traction(2*size(active)))
+    end if
+    used = .false.
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i) reduction(.or.: used)
+    do k = 1, size(self%nodes%first)
+      do i = self%nodes%first(k), self%nodes%last(k)
+        self%weight(i, :) = blend(self%options, compliance(i)/self%elastic_compliance)
+        used = used .or. self%weight(i, :) > 0.0_wp
       end do
-    end if
-    if (self%tangential) then
-      block = tangential_block
-      if (present(on_springs)) block = block + merge(n_tangential, 0, on_springs)
-      call self%convolution%convolve(block, displacement, traction)
-    else
-      call self%convolution%convolve(normal_block, displacement, traction)
-    end if
-    if (.not. present(edge)) return
-    do m = 1, size(displacement, 3)
-      field(1:size(displacement, 1)*size(displacement, 2)) => traction(:, :, m)
-      call edge%fold(field)
     end do
-  end subroutine apply_single
+    !$omp end parallel do
+    self%used = used
+  end subroutine set_sheared
 
-  !> Elastic compliance t_h = 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa].
-  pure real(wp) function node_compliance(lattice, pair)
-    !> Lattice
-    type(lattice_t), intent(in) :: lattice
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+  !> Estimate the shear traction, in the frames of the nodes, that causes a displacement there.
+  subroutine apply_to_shear(self, displacement, traction, work)
+    class(shear_preconditioner_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: displacement(:)
+    real(wp), intent(out), contiguous, target :: traction(:)
+    real(wp), intent(inout) :: work
+    integer :: m
 
-    node_compliance = node_ratio(pair)*pair%lambda_1*lattice%spacing()
-  end function node_compliance
+    call apply_springs(self%nodes, self%space%threads, self%weight, self%compliance, displacement, traction)
+    do m = 1, size(self%used)
+      if (.not. self%used(m)) cycle
+      call to_plane(self%nodes, self%space%threads, self%direction, self%weight(:, m), self%unit, displacement, &
+                    self%displacement)
+      if (m == 1) call self%inverse%apply_single(self%displacement, self%traction, self%edge)
+      ! displacements on soft springs are not continued beyond the contact
+      if (m == 2) call self%inverse%apply_single(self%displacement, self%traction, on_springs=.true.)
+      work = work + self%inverse%cost
+      call add_in_frames(self%nodes, self%space%threads, self%direction, self%weight(:, m), self%traction, traction)
+    end do
+  end subroutine apply_to_shear
 
-  !> t_h over lambda_1 and the spacing.
-  pure real(wp) function node_ratio(pair)
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
+  ! The arguments of the following procedures are no pointers, so that the compiler can exclude aliases.
 
-    node_ratio = 2.0_wp + pair%gamma()
-  end function node_ratio
+  !> Apply the part chi_3/D along t.
+  subroutine apply_springs(nodes, threads, weight, compliance, displacement, traction)
+    !> Active nodes
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: threads
+    !> Weights of both inverse symbols (n, 2), compliance D (n)
+    real(wp), intent(in), contiguous :: weight(:, :), compliance(:)
+    !> Displacement and traction, in the frames (2 n)
+    real(wp), intent(in), contiguous :: displacement(:)
+    real(wp), intent(inout), contiguous :: traction(:)
+    real(wp) :: left
+    integer :: n, k, i
 
-  !> sqrt(chi) of the inverse symbols without and with soft springs; the rest of the squares belongs to 1/D.
-  pure function blend(ratio) result(weight)
+    n = size(compliance)
+    !$omp parallel do schedule(static) num_threads(threads) private(i, left)
+    do k = 1, size(nodes%first)
+      do i = nodes%first(k), nodes%last(k)
+        left = 1.0_wp - sum(weight(i, :)**2)
+        traction(i) = 0.0_wp
+        if (compliance(i) > 0.0_wp) traction(i) = left/compliance(i)*displacement(i)
+        traction(n + i) = 0.0_wp
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine apply_springs
+
+  !> Weight a displacement and turn it to x and y, zero off the active nodes: its continuation beyond the contact is made afresh.
+  subroutine to_plane(nodes, threads, direction, weight, unit, frame, plane)
+    !> Active nodes
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: threads
+    !> Direction e (2, n), weight (n), and unit of the displacement
+    real(wp), intent(in), contiguous :: direction(:, :), weight(:)
+    real(wp), intent(in) :: unit
+    !> Displacement in the frames, and along x and y (2 n)
+    real(wp), intent(in), contiguous :: frame(:)
+    real(sp), intent(out), contiguous :: plane(:)
+    real(wp) :: t, e
+    integer :: n, k, i
+
+    n = size(weight)
+    !$omp parallel num_threads(threads) private(i, t, e)
+    !$omp do schedule(static)
+    do i = 1, size(plane)
+      plane(i) = 0.0_sp
+    end do
+    !$omp end do
+    !$omp do schedule(static)
+    do k = 1, size(nodes%first)
+      do i = nodes%first(k), nodes%last(k)
+        t = weight(i)/unit*frame(i)
+        e = weight(i)/unit*frame(n + i)
+        plane(i) = real(-direction(2, i)*t + direction(1, i)*e, sp)
+        plane(n + i) = real(direction(1, i)*t + direction(2, i)*e, sp)
+      end do
+    end do
+    !$omp end do
+    !$omp end parallel
+  end subroutine to_plane
+
+  !> Add a weighted traction along x and y to one in the frames.
+  subroutine add_in_frames(nodes, threads, direction, weight, plane, frame)
+    !> Active nodes
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: threads
+    !> Direction e (2, n) and weight (n)
+    real(wp), intent(in), contiguous :: direction(:, :), weight(:)
+    !> Traction along x and y, and in the frames (2 n)
+    real(sp), intent(in), contiguous :: plane(:)
+    real(wp), intent(inout), contiguous :: frame(:)
+    real(wp) :: t, e
+    integer :: n, k, i
+
+    n = size(weight)
+    !$omp parallel do schedule(static) num_threads(threads) private(i, t, e)
+    do k = 1, size(nodes%first)
+      do i = nodes%first(k), nodes%last(k)
+        t = -direction(2, i)*plane(i) + direction(1, i)*plane(n + i)
+        e = direction(1, i)*plane(i) + direction(2, i)*plane(n + i)
+        frame(i) = frame(i) + weight(i)*t
+        frame(n + i) = frame(n + i) + weight(i)*e
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine add_in_frames
+
+  !> Forget the active nodes, and free what was stored for them.
+  subroutine clear_sheared(self)
+    class(shear_preconditioner_t), intent(inout) :: self
+
+    self%compliance => null()
+    self%direction => null()
+    if (allocated(self%edge)) deallocate (self%edge)
+    if (allocated(self%active)) deallocate (self%active, self%weight, self%displacement, self%traction)
+  end subroutine clear_sheared
+
+  !> Compute sqrt(chi) of the inverse symbols without and with soft springs; the rest of the squares belongs to 1/D.
+  pure function blend(options, ratio) result(weight)
+    !> Tuning numbers
+    type(preconditioner_options_t), intent(in) :: options
     !> Compliance of the spring over that of the node
     real(wp), intent(in) :: ratio
     real(wp) :: weight(2)
     real(wp) :: share
 
-    if (ratio <= stiff) then
-      weight = [1.0_wp, 0.0_wp]
-    else if (ratio < soft) then
-      share = log(ratio/stiff)/log(soft/stiff)
-      weight = sqrt([1.0_wp - share, share])
-    else if (ratio < loose) then
-      weight = [0.0_wp, sqrt(log(loose/ratio)/log(loose/soft))]
-    else
-      weight = 0.0_wp
-    end if
+    associate (stiff => options%stiff_spring, soft => options%soft_spring, loose => options%loose_spring)
+      if (ratio <= stiff) then
+        weight = [1.0_wp, 0.0_wp]
+      else if (ratio < soft) then
+        share = log(ratio/stiff)/log(soft/stiff)
+        weight = sqrt([1.0_wp - share, share])
+      else if (ratio < loose) then
+        weight = [0.0_wp, sqrt(log(loose/ratio)/log(loose/soft))]
+      else
+        weight = 0.0_wp
+      end if
+    end associate
   end function blend
 
 end module hc_symbol_preconditioner

@@ -1,22 +1,25 @@
-!> A path through a load history in load steps that are chosen on the way.
+!> A path through a load history in adaptive load steps.
 !>
 !> Each load step is solved as a whole and in two halves, on two paths that never meet; the one in halves is the
 !> solution. A segment of the history leads from the loads and motions at its beginning straight to a target:
 !>
-!>     call path%begin(state, largest_contact_area)
+!>     call path%initialize(state, largest_contact_area)
 !>     do segment = 1, n
 !>       do
 !>         call path%advance(solver, target(segment), step_tolerance, tolerance, max_sweeps, max_cuts, error)
 !>         if (allocated(error) .or. .not. path%state%converged .or. path%fraction >= 1) exit
 !>       end do
 !>     end do
+!>
+!> Equations: docs/theory/step_control.md, (S1) to (S4).
 module hc_adaptive_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, force_control, n_motion, rim_reached, separated
   use hc_contact_solver, only: friction_solver_t
-  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
-  use hc_load_path, only: advance
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_zone_edge, only: zone_edge_t
+  use hc_load_path, only: advance, join_steps
   use hc_step_control, only: step_attempt_t, step_control_t, failed, limited, rejected
   use hc_step_error, only: compare_halves, shear_free, step_change_t
   implicit none
@@ -24,14 +27,16 @@ module hc_adaptive_path
 
   public :: adaptive_path_t
 
-  !> The two paths, and what chooses their load steps.
+  !> The two paths, and the control of their load steps.
   type :: adaptive_path_t
-    !> End of the last load step; its slip is that of both halves
+    !> End of the last load step; its slip is that of both halves, and its R_t is of this slip
     type(contact_state_t) :: state
     !> Part of the present segment that is done
     real(wp) :: fraction = 1.0_wp
     !> Bound on the error of the stick area by the size of all load steps [m^2]
     real(wp) :: stick_area_error = 0.0_wp
+    !> The same of the shear tractions, over what friction can carry
+    real(wp) :: traction_error = 0.0_wp
     !> What the halves of the last load step changed
     type(step_change_t) :: change
     !> Attempts at the last load step that were rejected
@@ -47,8 +52,8 @@ module hc_adaptive_path
     !> Loads and motions at the beginning of the segment
     real(wp), private :: load(n_motion) = 0.0_wp, motion(n_motion) = 0.0_wp
   contains
-    !> Begin a load history
-    procedure :: begin
+    !> Start a load history
+    procedure :: initialize
     !> Advance by one load step
     procedure :: advance => advance_step
     procedure, private :: solve_attempt, solve_part
@@ -56,8 +61,8 @@ module hc_adaptive_path
 
 contains
 
-  !> Begin a load history.
-  subroutine begin(self, state, area)
+  !> Start a load history.
+  subroutine initialize(self, state, area)
     class(adaptive_path_t), intent(out) :: self
     !> Where it begins; new_friction_state gives the state before the first load
     type(contact_state_t), intent(in) :: state
@@ -67,7 +72,7 @@ contains
     self%state = state
     self%whole = state
     self%area = area
-  end subroutine begin
+  end subroutine initialize
 
   !> Advance by one load step towards the end of a segment; after its end a new one begins.
   subroutine advance_step(self, solver, target, step_tolerance, tolerance, max_sweeps, max_cuts, error, largest)
@@ -101,11 +106,12 @@ contains
       call raise(error, status%invalid_input, 'tolerance and largest size of load steps: numbers above 0 expected')
       return
     end if
+    self%control%options = solver%problem%options%steps
     if (self%fraction >= 1.0_wp) then
       self%fraction = 0.0_wp
       self%load = self%state%load
       self%motion = self%state%motion
-      call self%control%begin_segment()
+      call self%control%start_segment()
     end if
     self%area = max(self%area, solver%problem%lattice%cell_area())
 
@@ -115,7 +121,7 @@ contains
       call self%solve_attempt(solver, target, attempt, tolerance, max_sweeps, max_cuts, whole, halves, one_path, error)
       if (allocated(error)) return
       work = work + halves%operator_applications
-      call self%control%judge(attempt, halves%converged, self%change, step_tolerance, verdict)
+      call self%control%decide(attempt, halves%converged, self%change, step_tolerance, verdict)
       if (halves%stopped == rim_reached) verdict = failed
       if (verdict /= rejected) exit
     end do
@@ -129,11 +135,13 @@ contains
     self%fraction = attempt%end
     call self%control%accept(attempt, self%change, step_tolerance, verdict)
     associate (problem => solver%problem)
-      call new_contact_edges(edges, problem%lattice, halves%pressure, halves%gap, halves%zone /= separated, problem%candidate)
+      call new_contact_edges(edges, problem%lattice, halves%pressure, halves%gap, halves%zone /= separated, problem%candidate, &
+                             problem%options%edges)
     end associate
     edge = edges%contact_edge()
     self%area = max(self%area, edge%area)
     self%stick_area_error = min(self%control%bound(self%change)*self%area, edge%area)
+    self%traction_error = self%control%traction_bound(step_tolerance)
   end subroutine advance_step
 
   !> Solve a load step as a whole and in halves, and compare them.
@@ -164,10 +172,13 @@ contains
     halves = whole
     if (.not. whole%converged) return
     self%change = step_change_t()
-    one_path = self%one_path .and. shear_free(self%state) .and. shear_free(whole)
+    associate (space => solver%problem%space, options => self%control%options)
+      if (self%one_path) one_path = shear_free(self%state, space, options)
+      if (one_path) one_path = shear_free(whole, space, options)
+    end associate
     if (one_path) return
     work = whole%operator_applications
-    call self%solve_part(solver, self%state, target, 0.5_wp*(attempt%begin + attempt%end), tolerance, max_sweeps, max_cuts, &
+    call self%solve_part(solver, self%state, target, 0.5_wp*(attempt%start + attempt%end), tolerance, max_sweeps, max_cuts, &
                          half, error)
     if (allocated(error)) return
     work = work + half%operator_applications
@@ -179,15 +190,10 @@ contains
     end if
     halves%operator_applications = work
     if (.not. halves%converged) return
-    where (spread(halves%zone /= separated, 3, 2))
-      halves%slip_increment = half%slip_increment + halves%slip_increment
-    else where
-      halves%slip_increment = 0.0_wp
-    end where
-    halves%cuts = half%cuts + halves%cuts
+    call join_steps(solver%problem, half, halves)
     associate (problem => solver%problem)
       call compare_halves(problem%lattice, problem%candidate, problem%friction, whole, half, halves, self%whole, self%state, &
-                          self%area, self%change)
+                          self%area, self%change, problem%space, problem%options)
     end associate
   end subroutine solve_attempt
 

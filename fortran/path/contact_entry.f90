@@ -1,4 +1,4 @@
-!> Where nodes stood when their gap closed.
+!> Relative displacement of nodes at the moment when their gap closed.
 !>
 !> Backward Euler lets the slip of a node that enters the contact during a step count from s^n,
 !> its relative displacement at the beginning of the step, as if it had not moved freely until
@@ -18,6 +18,7 @@ module hc_contact_entry
   use hc_contact_state, only: contact_state_t, load_target_t, normal, force_control
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
+  use hc_few_nodes, only: solve_step
   implicit none
   private
 
@@ -40,7 +41,7 @@ module hc_contact_entry
 
 contains
 
-  !> A load step in which slip counts from the entry state.
+  !> Solve a load step in which slip counts from the entry state.
   !>
   !> The residuals of the result, and whether it converged, are those with the entry state that follows from the result itself.
   subroutine solve_with_entry(solver, start, target, tolerance, max_sweeps, state, error)
@@ -64,7 +65,7 @@ contains
     real(wp), allocatable :: entry(:, :, :), correction(:, :, :), before(:, :, :), previous(:, :, :)
     real(wp), allocatable :: changes(:, :), corrections(:, :)
     real(wp) :: accuracy, work
-    integer :: i, n, kept, sweeps
+    integer :: i, n, stored, sweeps
     logical :: again
 
     options = solver%problem%options%entry
@@ -78,15 +79,15 @@ contains
     from = start
     work = 0.0_wp
     sweeps = 0
-    kept = -1
+    stored = -1
     again = .false.
     do i = 1, options%max_corrections
-      call solver%solve_step(from, start%relative_displacement + entry, target, accuracy, max_sweeps, state, error)
+      call solve_step(solver, from, start%relative_displacement + entry, target, accuracy, max_sweeps, state, error)
       if (allocated(error)) return
       work = work + state%operator_applications
       sweeps = sweeps + state%sweeps
       if (.not. state%converged) then
-        ! an inaccurate solution may lead astray: once more from the beginning
+        ! an inaccurate solution may have spoilt the extrapolation: begin once more
         if (again) exit
         again = .true.
         accuracy = options%last_tolerance*tolerance
@@ -94,20 +95,20 @@ contains
         cycle
       end if
       correction = entry_displacement(solver%problem, start, state) - entry
-      call judge(solver%problem, start%relative_displacement + entry + correction, target, tolerance, state)
+      call find_residuals(solver%problem, start%relative_displacement + entry + correction, target, tolerance, state)
       if (state%converged) exit
       if (i == options%max_corrections) exit
       accuracy = max(min(accuracy, options%relative_tolerance*state%residual_tangential), options%last_tolerance*tolerance)
-      kept = min(kept + 1, options%depth)
-      if (kept > 0) then
-        changes(:, 2:kept) = changes(:, 1:kept - 1)
-        corrections(:, 2:kept) = corrections(:, 1:kept - 1)
+      stored = min(stored + 1, options%depth)
+      if (stored > 0) then
+        changes(:, 2:stored) = changes(:, 1:stored - 1)
+        corrections(:, 2:stored) = corrections(:, 1:stored - 1)
         changes(:, 1) = reshape(entry - before, [n])
         corrections(:, 1) = reshape(correction - previous, [n])
       end if
       before = entry
       previous = correction
-      entry = entry + correction - reshape(extrapolated(changes(:, :kept), corrections(:, :kept), reshape(correction, [n]), &
+      entry = entry + correction - reshape(extrapolated(changes(:, :stored), corrections(:, :stored), reshape(correction, [n]), &
                                                         options%dependent_corrections), shape(entry))
       ! nodes that have left again take nothing along
       where (spread(state%pressure <= 0.0_wp, 3, 2)) entry = 0.0_wp
@@ -117,7 +118,7 @@ contains
     state%sweeps = sweeps
   end subroutine solve_with_entry
 
-  !> Will nodes enter the contact?
+  !> Return whether nodes will enter the contact.
   pure logical function grows(start, target)
     type(contact_state_t), intent(in) :: start
     type(load_target_t), intent(in) :: target
@@ -129,8 +130,8 @@ contains
     end if
   end function grows
 
-  !> Slip, zones and residuals of a solution with another reference displacement; nothing is multiplied.
-  subroutine judge(problem, reference, target, tolerance, state)
+  !> Compute slip, zones and residuals of a solution with another reference displacement, without a product.
+  subroutine find_residuals(problem, reference, target, tolerance, state)
     type(friction_problem_t), intent(in) :: problem
     !> Displacement that slip counts from (n_col, n_row, 2) [m]
     real(wp), intent(in) :: reference(:, :, :)
@@ -142,10 +143,10 @@ contains
     allocate (displacement(size(reference, 1), size(reference, 2), 3))
     displacement(:, :, 1) = state%gap - problem%initial_gap + state%motion(normal)
     displacement(:, :, 2:) = state%relative_displacement + problem%rigid_displacement(state%motion)
-    call problem%conclude(target, tolerance, reference, displacement, state)
-  end subroutine judge
+    call problem%complete_state(target, tolerance, reference, displacement, state)
+  end subroutine find_residuals
 
-  !> What Anderson's extrapolation takes from a corrected entry state: (changes + corrections) y, where
+  !> Compute what Anderson's extrapolation takes from a corrected entry state: (changes + corrections) y, where
   !> y makes |corrections y - correction| least. Combinations that depend on newer ones are left out.
   pure function extrapolated(changes, corrections, correction, dependent) result(less)
     !> Changes of the entry state and of its correction, the newest first
@@ -180,7 +181,7 @@ contains
     end do
   end function extrapolated
 
-  !> s_e - s^n of the nodes that entered the contact during a step, zero elsewhere (n_col, n_row, 2) [m].
+  !> Compute s_e - s^n of the nodes that entered the contact during a step, zero elsewhere (n_col, n_row, 2) [m].
   function entry_displacement(problem, before, after) result(displacement)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
@@ -261,7 +262,7 @@ contains
 
   contains
 
-    !> Motion of a node outside, and how far its gap closed.
+    !> Return the motion of a node outside, and how far its gap closed.
     type(carried_t) function seen_from(col, row, lattice_gap)
       integer, intent(in) :: col, row
       real(wp), intent(in) :: lattice_gap
@@ -271,7 +272,7 @@ contains
       seen_from%lattice_gap = lattice_gap
     end function seen_from
 
-    !> Part C of D that grows with d^(3/2), from how D grows between the first two nodes outside.
+    !> Find the part C of D that grows with d^(3/2), from how D grows between the first two nodes outside.
     !>
     !> Least squares over a few nodes along the edge: D_2 = m_2/m_1 (D_1 - C) + m'_2/m'_1 C.
     subroutine find_curved_parts()
@@ -330,7 +331,7 @@ contains
 
   end function entry_displacement
 
-  !> Is there such a node in the window?
+  !> Return whether the window has such a node.
   pure logical function inside(field, col, row)
     real(wp), intent(in) :: field(:, :)
     integer, intent(in) :: col, row
@@ -338,7 +339,7 @@ contains
     inside = col >= 1 .and. col <= size(field, 1) .and. row >= 1 .and. row <= size(field, 2)
   end function inside
 
-  !> What a gap measures of the distance from an edge that slips, and from one that sticks.
+  !> Return what a gap measures of the distance from an edge that slips, and from one that sticks.
   pure function measures(gap, lattice_gap)
     real(wp), intent(in) :: gap, lattice_gap
     real(wp) :: measures(2)
@@ -347,7 +348,7 @@ contains
     measures(2) = gap
   end function measures
 
-  !> The largest value at a node and its neighbors.
+  !> Return the largest value at a node and its neighbors.
   pure function widened(field) result(largest)
     real(wp), intent(in) :: field(:, :)
     real(wp) :: largest(size(field, 1), size(field, 2))
@@ -359,7 +360,7 @@ contains
     end do
   end function widened
 
-  !> Sum of the values at a node and its neighbors.
+  !> Sum the values at a node and its neighbors.
   pure function with_neighbors(field) result(total)
     real(wp), intent(in) :: field(:, :)
     real(wp) :: total(size(field, 1), size(field, 2))
@@ -371,7 +372,7 @@ contains
     end do
   end function with_neighbors
 
-  !> Column and row of the nodes of a set, the largest gap first (heap sort).
+  !> Sort the nodes of a set by their gap, the largest first: columns and rows (heap sort).
   pure function by_falling_gap(set, gap) result(node)
     logical, intent(in) :: set(:, :)
     real(wp), intent(in) :: gap(:, :)
@@ -419,7 +420,7 @@ contains
       node(:, i) = moved
     end subroutine sink
 
-    !> Has the first node the smaller gap? Equal ones stay in the order of the lattice.
+    !> Return whether the first node has the smaller gap; equal ones stay in the order of the lattice.
     pure logical function below(a, b)
       integer, intent(in) :: a(2), b(2)
 

@@ -13,15 +13,16 @@
 module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached
+  use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached, stick
   use hc_contact_residuals, only: tangential_residual
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_entry, only: solve_with_entry
+  use hc_few_nodes, only: solve_step
   implicit none
   private
 
-  public :: advance
+  public :: advance, join_steps
 
 contains
 
@@ -52,7 +53,7 @@ contains
     type(contact_state_t), target :: now
     type(contact_state_t), pointer :: from
     real(wp), allocatable :: reference(:, :, :), slipped(:, :, :)
-    logical :: from_entry, at_once
+    logical :: from_entry, at_once, pressed
     real(wp) :: done, part, work
     integer :: cuts, sweeps
 
@@ -66,9 +67,9 @@ contains
     if (allocated(error)) return
     from_entry = .false.
     if (present(interpolated)) from_entry = interpolated
-    at_once = static .or. .not. (from_entry .or. any(state%pressure > 0.0_wp))
-    if (at_once) allocate (reference, source=state%relative_displacement)
-    if (static) reference = 0.0_wp
+    pressed = solver%problem%space%max(state%pressure) > 0.0_wp
+    at_once = static .or. .not. (from_entry .or. pressed)
+    if (static) allocate (reference, source=0.0_wp*state%relative_displacement)
     if (from_entry) then
       allocate (slipped, source=0.0_wp*state%relative_displacement)
     else
@@ -82,14 +83,18 @@ contains
     sweeps = 0
     do
       associate (goal => between(state, target, done + part))
-        if (at_once) then
-          call solver%solve_step(from, reference, goal, tolerance, max_sweeps, next, error)
+        if (static) then
+          call solve_step(solver, from, reference, goal, tolerance, max_sweeps, next, error)
+        else if (at_once) then
+          call solve_step(solver, from, state%relative_displacement, goal, tolerance, max_sweeps, next, error)
         else if (from_entry) then
           call solve_with_entry(solver, from, goal, tolerance, max_sweeps, next, error)
         else
-          call solver%solve_step(from, from%relative_displacement, goal, tolerance, max_sweeps, next, error)
+          call solve_step(solver, from, from%relative_displacement, goal, tolerance, max_sweeps, next, error)
         end if
       end associate
+      ! it is one of the whole step, and no second attempt begins with it
+      if (allocated(solver%guess)) deallocate (solver%guess)
       if (allocated(error)) return
       work = work + next%operator_applications
       sweeps = sweeps + next%sweeps
@@ -132,20 +137,42 @@ contains
       else
         next%slip_increment = next%relative_displacement - state%relative_displacement
       end if
-      where (spread(next%pressure <= 0.0_wp, 3, 2)) next%slip_increment = 0.0_wp
-      associate (problem => solver%problem)
-        next%residual_tangential = tangential_residual(next%traction, next%slip_increment, next%pressure, problem%friction, &
-                                                       problem%tangential_compliance, problem%space)
-      end associate
+      call find_slip_residual(solver%problem, next)
     end if
     if (next%converged .and. done < 1.0_wp) then
       next%converged = .false.
       next%stopped = rim_reached
-      call solver%problem%judge_loads(target, next)
+      call solver%problem%find_load_residuals(target, next)
     end if
   end subroutine advance
 
-  !> Add slip path and dissipated energy of a step, sum of A (-q . ds) [J], to those before.
+  !> Record two steps as one, which ends as the second: its slip is that of both, and R_t (R3) is of this slip.
+  subroutine join_steps(problem, first, last)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> End of the first step
+    type(contact_state_t), intent(in) :: first
+    !> End of the second step; then that of both
+    type(contact_state_t), intent(inout) :: last
+
+    last%slip_increment = first%slip_increment + last%slip_increment
+    last%cuts = first%cuts + last%cuts
+    call find_slip_residual(problem, last)
+  end subroutine join_steps
+
+  !> Compute R_t (R3) of a state whose slip is that of several parts, at the nodes in contact at their end.
+  subroutine find_slip_residual(problem, state)
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the end of the last part
+    type(contact_state_t), intent(inout) :: state
+
+    where (spread(state%pressure <= 0.0_wp, 3, 2)) state%slip_increment = 0.0_wp
+    state%residual_tangential = tangential_residual(state%traction, state%slip_increment, state%pressure, problem%friction, &
+                                                    problem%tangential_compliance, problem%space)
+  end subroutine find_slip_residual
+
+  !> Add slip path and dissipated energy of a step, sum of A (-q . ds) [J], to those before; where a node sticks ds is nothing
+  !> but rounding errors.
   subroutine add_slip(problem, before, static, state)
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step
@@ -154,23 +181,26 @@ contains
     logical, intent(in) :: static
     !> State at its end
     type(contact_state_t), intent(inout) :: state
-    real(wp) :: part(size(state%pressure, 2))
+    real(wp) :: part(size(state%pressure, 2)), spent(size(state%pressure, 1))
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(problem%space%threads)
+    !$omp parallel do schedule(static) num_threads(problem%space%threads) private(spent)
     do row = 1, size(part)
       associate (q => state%traction(:, row, :), ds => state%slip_increment(:, row, :))
         state%accumulated_slip(:, row) = norm2(ds, dim=2)
         if (.not. static) state%accumulated_slip(:, row) = before%accumulated_slip(:, row) + state%accumulated_slip(:, row)
-        part(row) = dot_product(q(:, 1), ds(:, 1)) + dot_product(q(:, 2), ds(:, 2))
+        spent = merge(0.0_wp, -(q(:, 1)*ds(:, 1) + q(:, 2)*ds(:, 2)), state%zone(:, row) == stick)
+        part(row) = sum(spent)
+        state%dissipation_density(:, row) = spent
+        if (.not. static) state%dissipation_density(:, row) = before%dissipation_density(:, row) + spent
       end associate
     end do
     !$omp end parallel do
-    state%dissipated_energy = -problem%lattice%cell_area()*sum(part)
+    state%dissipated_energy = problem%lattice%cell_area()*sum(part)
     if (.not. static) state%dissipated_energy = before%dissipated_energy + state%dissipated_energy
   end subroutine add_slip
 
-  !> Part of the way from a state to a target.
+  !> Return part of the way from a state to a target.
   pure type(load_target_t) function between(state, target, fraction)
     !> State at the beginning
     type(contact_state_t), intent(in) :: state

@@ -1,4 +1,4 @@
-!> How much of a solution depends on the size of the load steps, measured on two that differ in it.
+!> Dependence of a solution on the size of the load steps, measured on two that differ in it.
 !>
 !> One path goes through a load history in load steps, another beside it in steps of half the size; they never meet. Both
 !> are wrong by something of the first order in the size, so that what the halves change is what is still wrong with them.
@@ -6,26 +6,18 @@
 !> Equations: docs/theory/step_control.md, (S1).
 module hc_step_error
   use hc_precision, only: wp
+  use hc_options, only: options_t, step_options_t
   use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
   use hc_contact_state, only: contact_state_t, separated, slip, stick
   use hc_friction_law, only: friction_law_t
   use hc_contact_residuals, only: least_traction
-  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_zone_edge, only: zone_edge_t
   implicit none
   private
 
   public :: step_change_t, compare_halves, stick_edge_of, shear_free
-
-  !> Spacings by which single rings of nodes that enter move the edge of the stick area.
-  real(wp), parameter :: ring = 0.7_wp
-  !> Multiple of the share of the edge at which nodes entered or left along which it may have moved.
-  real(wp), parameter :: entering = 5.0_wp
-  !> Spacings in the radius of a contact below which the lattice alone says where it sticks.
-  real(wp), parameter :: small_radius = 3.0_wp
-  !> Largest gain.
-  real(wp), parameter :: most_gain = 10.0_wp
-  !> Shear tractions, over the largest pressure, that are rounding errors.
-  real(wp), parameter :: no_shear = 1.0e-12_wp
 
   !> What the halves of a load step change.
   type :: step_change_t
@@ -44,7 +36,8 @@ module hc_step_error
 contains
 
   !> Compare the two solutions at the end of a load step.
-  pure subroutine compare_halves(lattice, candidate, friction, whole, half, halves, whole_before, halves_before, area, change)
+  subroutine compare_halves(lattice, candidate, friction, whole, half, halves, whole_before, halves_before, area, change, &
+                            space, options)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Nodes that may come into contact (n_col, n_row)
@@ -59,61 +52,75 @@ contains
     real(wp), intent(in) :: area
     !> What the halves change
     type(step_change_t), intent(out) :: change
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> Tuning numbers; absent: the usual ones
+    type(options_t), intent(in), optional :: options
+    type(options_t) :: tuning
     type(contact_edges_t) :: edges
     type(zone_edge_t) :: contact, sticking
     real(wp) :: carried, scale, grown, loaded
     integer :: entered
 
-    associate (spacing => lattice%spacing())
-      call edges_of(lattice, candidate, halves, edges)
+    if (present(options)) tuning = options
+    associate (spacing => lattice%spacing(), steps => tuning%steps)
+      call edges_of(lattice, candidate, halves, tuning, edges)
       contact = edges%contact_edge()
       sticking = stick_edge_of(edges, friction, halves)
-      entered = count((halves%zone /= separated) .neqv. (halves_before%zone /= separated))
-      if (contact%radius() < small_radius*spacing) then
+      entered = space%count((halves%zone /= separated) .neqv. (halves_before%zone /= separated))
+      if (contact%radius() < steps%small_radius*spacing) then
         change%lattice = contact%area/area
-      else if (any(whole%zone == slip) .or. any(half%zone == slip) .or. any(halves%zone == slip)) then
-        change%lattice = ring*spacing*sticking%length()/area &
-                         *min(1.0_wp, entering*entered*spacing/max(contact%length(), spacing))
+      else if (space%count(whole%zone == slip .or. half%zone == slip .or. halves%zone == slip) > 0) then
+        change%lattice = steps%ring_shift*spacing*sticking%length()/area &
+                         *min(1.0_wp, steps%entering_factor*entered*spacing/max(contact%length(), spacing))
       end if
 
       if (friction%is_bounded()) then
-        carried = sum(bounds(friction, halves))
+        carried = space%sum(bounds(friction, halves))
       else
-        carried = max(sum(shear(halves)), least_traction*sum(halves%pressure))
+        carried = max(space%sum(shear(halves)), least_traction*space%sum(halves%pressure))
       end if
       scale = 0.0_wp
       if (carried > 0.0_wp) scale = min(1.0_wp, contact%area/area)/carried
-      change%traction = scale*sum(norm2(whole%traction - halves%traction, dim=3))
-      change%added = scale*sum(norm2(whole%traction - halves%traction - (whole_before%traction - halves_before%traction), dim=3))
+      change%traction = scale*space%sum(norm2(whole%traction - halves%traction, dim=3))
+      change%added = scale*space%sum(norm2(whole%traction - halves%traction &
+                                           - (whole_before%traction - halves_before%traction), dim=3))
     end associate
 
-    grown = abs(sticking%area - stick_area(lattice, candidate, friction, half))/area
-    loaded = scale*sum(norm2(half%traction - halves%traction, dim=3))
-    if (loaded > 0.0_wp) change%gain = min(max(1.0_wp, grown/loaded), most_gain)
-    change%stick = (sticking%area - stick_area(lattice, candidate, friction, whole))/area
+    grown = abs(sticking%area - stick_area(lattice, candidate, friction, half, tuning))/area
+    loaded = scale*space%sum(norm2(half%traction - halves%traction, dim=3))
+    if (loaded > 0.0_wp) change%gain = min(max(1.0_wp, grown/loaded), tuning%steps%most_gain)
+    change%stick = (sticking%area - stick_area(lattice, candidate, friction, whole, tuning))/area
   end subroutine compare_halves
 
-  !> A path of states without shear tractions has no history.
-  pure logical function shear_free(state)
+  !> Return whether states have no shear tractions: their path has no history.
+  logical function shear_free(state, space, options)
     !> State
     type(contact_state_t), intent(in) :: state
-    shear_free = maxval(shear(state)) <= no_shear*max(maxval(state%pressure), tiny(1.0_wp))
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> Tuning numbers
+    type(step_options_t), intent(in) :: options
+    shear_free = space%max(shear(state)) <= options%shear_rounding*max(space%max(state%pressure), tiny(1.0_wp))
   end function shear_free
 
-  !> The edges of a contact at the end of a load step.
-  pure subroutine edges_of(lattice, candidate, state, edges)
+  !> Find the edges of a contact at the end of a load step.
+  pure subroutine edges_of(lattice, candidate, state, options, edges)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
     !> State
     type(contact_state_t), intent(in) :: state
+    !> Tuning numbers
+    type(options_t), intent(in) :: options
     !> Its edges
     type(contact_edges_t), intent(out) :: edges
-    call new_contact_edges(edges, lattice, state%pressure, state%gap, state%zone /= separated, candidate)
+    call new_contact_edges(edges, lattice, state%pressure, state%gap, state%zone /= separated, candidate, &
+                           options%edges)
   end subroutine edges_of
 
-  !> The edge of the stick area of a state.
+  !> Find the edge of the stick area of a state.
   pure function stick_edge_of(edges, friction, state) result(edge)
     !> Edges of the contact
     type(contact_edges_t), intent(in) :: edges
@@ -123,15 +130,21 @@ contains
     type(contact_state_t), intent(in) :: state
     type(zone_edge_t) :: edge
     real(wp), allocatable :: reserve(:, :)
+    integer :: row
 
-    ! without slip the reserve is not looked at
+    ! without slip the reserve is of no use
     allocate (reserve, source=0.0_wp*state%pressure)
-    if (friction%is_bounded()) reserve = bounds(friction, state) - shear(state)
+    if (friction%is_bounded()) then
+      do row = 1, size(reserve, 2)
+        call friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), reserve(:, row))
+      end do
+      reserve = bounds(friction, state) - reserve
+    end if
     edge = edges%stick_edge(state%zone == stick, reserve)
   end function stick_edge_of
 
-  !> Stick area of a state [m^2].
-  pure real(wp) function stick_area(lattice, candidate, friction, state)
+  !> Compute the stick area of a state [m^2].
+  pure real(wp) function stick_area(lattice, candidate, friction, state, options)
     !> Lattice and window
     type(lattice_t), intent(in) :: lattice
     !> Nodes that may come into contact (n_col, n_row)
@@ -140,15 +153,17 @@ contains
     class(friction_law_t), intent(in) :: friction
     !> State
     type(contact_state_t), intent(in) :: state
+    !> Tuning numbers
+    type(options_t), intent(in) :: options
     type(contact_edges_t) :: edges
     type(zone_edge_t) :: edge
 
-    call edges_of(lattice, candidate, state, edges)
+    call edges_of(lattice, candidate, state, options, edges)
     edge = stick_edge_of(edges, friction, state)
     stick_area = edge%area
   end function stick_area
 
-  !> Largest traction that friction allows at each node [Pa].
+  !> Compute the largest traction that friction allows at each node [Pa].
   pure function bounds(friction, state) result(bound)
     !> Friction law
     class(friction_law_t), intent(in) :: friction
@@ -162,7 +177,7 @@ contains
     end do
   end function bounds
 
-  !> Magnitude of the shear tractions [Pa].
+  !> Compute the magnitude of the shear tractions [Pa].
   pure function shear(state)
     !> State
     type(contact_state_t), intent(in) :: state

@@ -1,7 +1,7 @@
 !> Closed solutions for Python: flat procedures for f2py, no mathematics.
 !>
 !> A contact is the list of its components, in their order. Results are not numbers where there is no solution.
-!> Nothing here keeps state, so that threads may call at will.
+!> The module has no state, so that several threads may call at a time.
 module hc_f2py_analytic
   use iso_c_binding, only: c_double, c_int
   use hc_error, only: error_t
@@ -22,7 +22,7 @@ module hc_f2py_analytic
 
 contains
 
-  !> Contact over an ellipse under a load or an approach.
+  !> Solve the contact over an ellipse under a load or an approach.
   subroutine hertz(effective_modulus, hessian, by_load, value, contact, code, message)
     !f2py threadsafe
     !> E* [Pa], second derivatives of the separation [1/m]
@@ -50,7 +50,7 @@ contains
     call report(error, code, message)
   end subroutine hertz
 
-  !> Second derivatives of the separation of crossed cylinders.
+  !> Compute the second derivatives of the separation of crossed cylinders.
   subroutine cylinders_hessian(radius_1, radius_2, angle, hessian)
     !> Radii [m], angle between the axes [rad]
     real(c_double), intent(in) :: radius_1, radius_2, angle
@@ -60,7 +60,7 @@ contains
     hessian = crossed_cylinders_hessian(radius_1, radius_2, angle)
   end subroutine cylinders_hessian
 
-  !> Ellipse from its components.
+  !> Set up an ellipse from its components.
   pure function ellipse_of(contact) result(ellipse)
     !> Those that `hertz` returns
     real(c_double), intent(in) :: contact(7)
@@ -69,7 +69,7 @@ contains
     ellipse = elliptic_contact_t(contact(1), contact(2), contact(3), contact(4), contact(5), contact(6), contact(7))
   end function ellipse_of
 
-  !> Points relative to an ellipse, as shares of its axes.
+  !> Return points relative to an ellipse, as shares of its axes.
   subroutine ellipse_local(contact, n, x, y, along, across)
     !f2py threadsafe
     !> Those that `hertz` returns
@@ -87,7 +87,7 @@ contains
     call ellipse%local(x, y, along, across)
   end subroutine ellipse_local
 
-  !> Pressure over an ellipse.
+  !> Compute the pressure over an ellipse.
   subroutine ellipse_pressure(contact, n, x, y, pressure)
     !f2py threadsafe
     !> Those that `hertz` returns
@@ -105,7 +105,7 @@ contains
     pressure = ellipse%pressure(x, y)
   end subroutine ellipse_pressure
 
-  !> Contact of spheres from its components.
+  !> Set up the contact of spheres from its components.
   pure function mindlin_of(contact) result(spheres)
     !> mu, P [N], a [m], S [1/Pa]
     real(c_double), intent(in) :: contact(4)
@@ -114,7 +114,7 @@ contains
     spheres = mindlin_t(contact(1), contact(2), contact(3), contact(4))
   end function mindlin_of
 
-  !> Load and shift at which spheres slide.
+  !> Return load and shift at which spheres slide.
   subroutine mindlin_sliding(contact, load, shift)
     !> mu, P [N], a [m], S [1/Pa]
     real(c_double), intent(in) :: contact(4)
@@ -128,7 +128,7 @@ contains
     shift = spheres%sliding_shift()
   end subroutine mindlin_sliding
 
-  !> Stick radius of spheres under a first tangential load.
+  !> Compute the stick radius of spheres under a first tangential load.
   subroutine mindlin_stick_radius(contact, n, load, radius)
     !f2py threadsafe
     !> mu, P [N], a [m], S [1/Pa]
@@ -146,7 +146,7 @@ contains
     radius = spheres%stick_radius(load)
   end subroutine mindlin_stick_radius
 
-  !> Rigid shift of spheres under a first tangential load.
+  !> Compute the rigid shift of spheres under a first tangential load.
   subroutine mindlin_shift(contact, n, load, shift)
     !f2py threadsafe
     !> mu, P [N], a [m], S [1/Pa]
@@ -164,7 +164,7 @@ contains
     shift = spheres%shift(load)
   end subroutine mindlin_shift
 
-  !> Tangential load on spheres under a first shift.
+  !> Compute the tangential load on spheres under a first shift.
   subroutine mindlin_load(contact, n, shift, load)
     !f2py threadsafe
     !> mu, P [N], a [m], S [1/Pa]
@@ -182,7 +182,7 @@ contains
     load = spheres%load(shift)
   end subroutine mindlin_load
 
-  !> Shear traction between spheres under a first tangential load.
+  !> Compute the shear traction between spheres under a first tangential load.
   subroutine mindlin_traction(contact, n, r, load, traction)
     !f2py threadsafe
     !> mu, P [N], a [m], S [1/Pa]
@@ -202,7 +202,7 @@ contains
     traction = spheres%traction(r, load)
   end subroutine mindlin_traction
 
-  !> Rigid shift of spheres on the way back.
+  !> Compute the rigid shift of spheres on the way back.
   subroutine mindlin_shift_unloading(contact, n, load, peak, shift)
     !f2py threadsafe
     !> mu, P [N], a [m], S [1/Pa]
@@ -222,7 +222,7 @@ contains
     shift = spheres%shift_unloading(load, peak)
   end subroutine mindlin_shift_unloading
 
-  !> Shear traction between spheres on the way back.
+  !> Compute the shear traction between spheres on the way back.
   subroutine mindlin_traction_unloading(contact, n, r, load, peak, traction)
     !f2py threadsafe
     !> mu, P [N], a [m], S [1/Pa]
@@ -242,7 +242,7 @@ contains
     traction = spheres%traction_unloading(r, load, peak)
   end subroutine mindlin_traction_unloading
 
-  !> Energy dissipated by spheres in a cycle.
+  !> Compute the energy dissipated by spheres in a cycle.
   subroutine mindlin_energy(contact, peak, energy)
     !> mu, P [N], a [m], S [1/Pa]
     real(c_double), intent(in) :: contact(4)
@@ -257,7 +257,7 @@ contains
     energy = spheres%energy_per_cycle(peak)
   end subroutine mindlin_energy
 
-  !> Turning points of a load history that a contact remembers.
+  !> Find the turning points of a load history that a contact remembers.
   subroutine masing_turns(n, loads, turns, n_turn)
     !> Number of loads
     integer(c_int), intent(in) :: n
@@ -271,7 +271,7 @@ contains
     call turning_points(loads, turns, n_turn)
   end subroutine masing_turns
 
-  !> Half the width of the stick strip between cylinders.
+  !> Compute half the width of the stick strip between cylinders.
   subroutine plane_stick_half_width(contact, load, half_width)
     !> mu, P' [N/m], b [m]
     real(c_double), intent(in) :: contact(3)
@@ -286,7 +286,7 @@ contains
     half_width = cylinders%stick_half_width(load)
   end subroutine plane_stick_half_width
 
-  !> Shear traction between cylinders under a first tangential load.
+  !> Compute the shear traction between cylinders under a first tangential load.
   subroutine plane_traction(contact, n, x, load, traction)
     !f2py threadsafe
     !> mu, P' [N/m], b [m]
@@ -306,7 +306,7 @@ contains
     traction = cylinders%traction(x, load)
   end subroutine plane_traction
 
-  !> Torque at which spheres slide.
+  !> Compute the torque at which spheres slide.
   subroutine lubkin_sliding_torque(contact, torque)
     !f2py threadsafe
     !> mu, P [N], a [m], S_t [1/Pa]
@@ -320,7 +320,7 @@ contains
     torque = spheres%sliding_torque()
   end subroutine lubkin_sliding_torque
 
-  !> Twist of spheres by their stick radius.
+  !> Compute the twist of spheres by their stick radius.
   subroutine lubkin_twist(contact, stick_radius, twist)
     !f2py threadsafe
     !> mu, P [N], a [m], S_t [1/Pa]
@@ -336,7 +336,7 @@ contains
     twist = spheres%twist(stick_radius)
   end subroutine lubkin_twist
 
-  !> Torque on spheres by their stick radius.
+  !> Compute the torque on spheres by their stick radius.
   subroutine lubkin_torque(contact, stick_radius, torque)
     !f2py threadsafe
     !> mu, P [N], a [m], S_t [1/Pa]
@@ -352,7 +352,7 @@ contains
     torque = spheres%torque(stick_radius)
   end subroutine lubkin_torque
 
-  !> Stick radius of spheres under a first torque.
+  !> Compute the stick radius of spheres under a first torque.
   subroutine lubkin_stick_radius(contact, torque, stick_radius)
     !f2py threadsafe
     !> mu, P [N], a [m], S_t [1/Pa]
@@ -368,7 +368,7 @@ contains
     stick_radius = spheres%stick_radius(torque)
   end subroutine lubkin_stick_radius
 
-  !> Constants of indentation without slip.
+  !> Compute the constants of indentation without slip.
   subroutine no_slip(beta, kappa, chi)
     !f2py threadsafe
     !> Dundurs' constant
@@ -379,7 +379,7 @@ contains
     call no_slip_constants(beta, kappa, chi)
   end subroutine no_slip
 
-  !> Stick ratio of spheres pressed monotonically where shear does not move the pressure.
+  !> Compute the stick ratio of spheres pressed monotonically where shear does not move the pressure.
   subroutine goodman(beta, friction_coefficient, stick_ratio)
     !f2py threadsafe
     !> Dundurs' constant, coefficient of friction
@@ -390,7 +390,7 @@ contains
     stick_ratio = goodman_stick_ratio(beta, friction_coefficient)
   end subroutine goodman
 
-  !> Stick ratio of cylinders pressed monotonically where shear does not move the pressure.
+  !> Compute the stick ratio of cylinders pressed monotonically where shear does not move the pressure.
   subroutine goodman_plane(beta, friction_coefficient, stick_ratio)
     !f2py threadsafe
     !> Dundurs' constant, coefficient of friction

@@ -1,24 +1,28 @@
 !> Axisymmetric contacts for Python: flat procedures for f2py, no mathematics.
 !>
-!> A body is the list of its components, in their order. Nothing here keeps state, so that threads may call at will.
+!> A body is the list of its components, in their order. The module has no state, so that several threads may call at a time.
 module hc_f2py_axisymmetric
   use iso_c_binding, only: c_double, c_int
-  use hc_axisymmetric, only: power_law_t, rounded_punch_t, flat_punch_t
+  use hc_axisymmetric, only: axisymmetric_t, power_law_t, rounded_punch_t, flat_punch_t
   implicit none
   private
 
-  public :: power_law, power_law_pressure, rounded_punch, rounded_punch_pressure
+  public :: contact_of_body, pressure_of_body
   public :: flat_punch_stiffness, flat_punch_pressure
 
+  !> Bodies, the other one is a rounded punch.
+  integer, parameter :: of_power_law = 0
   !> What a contact is driven by.
   integer, parameter :: by_load = 0, by_approach = 1
 
 contains
 
-  !> Contact with a power law under a load, an approach or with a contact radius.
-  subroutine power_law(body, given, value, contact)
+  !> Solve the contact under a load, an approach or with a contact radius.
+  subroutine contact_of_body(kind, body, given, value, contact)
     !f2py threadsafe
-    !> E* [Pa], C [m^(1-n)], n
+    !> `of_power_law`, else a rounded punch
+    integer(c_int), intent(in) :: kind
+    !> E* [Pa], C [m^(1-n)], n; or E* [Pa], b [m], R [m]
     real(c_double), intent(in) :: body(3)
     !> What is given: `by_load`, `by_approach`, else the contact radius
     integer(c_int), intent(in) :: given
@@ -26,21 +30,20 @@ contains
     real(c_double), intent(in) :: value
     !> Contact radius, approach, load, largest pressure
     real(c_double), intent(out) :: contact(4)
-
-    type(power_law_t) :: shape
+    class(axisymmetric_t), allocatable :: indenter
     real(c_double) :: radius
 
-    shape = power_law_t(body(1), body(2), body(3))
+    call set_indenter(kind, body, indenter)
     radius = value
-    if (given == by_load) radius = shape%contact_radius(normal_load=value)
-    if (given == by_approach) radius = shape%contact_radius(approach=value)
-    contact = [radius, shape%approach(radius), shape%load(radius), shape%max_pressure(radius)]
-  end subroutine power_law
+    if (given == by_load) radius = indenter%contact_radius(normal_load=value)
+    if (given == by_approach) radius = indenter%contact_radius(approach=value)
+    contact = [radius, indenter%approach(radius), indenter%load(radius), indenter%max_pressure(radius)]
+  end subroutine contact_of_body
 
-  !> Pressure of a power law.
-  subroutine power_law_pressure(body, n, r, radius, pressure)
+  !> Compute the pressure of a contact.
+  subroutine pressure_of_body(body, n, r, radius, kind, pressure)
     !f2py threadsafe
-    !> E* [Pa], C [m^(1-n)], n
+    !> E* [Pa], C [m^(1-n)], n; or E* [Pa], b [m], R [m]
     real(c_double), intent(in) :: body(3)
     !> Number of points
     integer(c_int), intent(in) :: n
@@ -48,71 +51,43 @@ contains
     real(c_double), intent(in) :: r(n)
     !> Contact radius [m]
     real(c_double), intent(in) :: radius
+    !> `of_power_law`, else a rounded punch
+    integer(c_int), intent(in) :: kind
     !> Pressure [Pa]
     real(c_double), intent(out) :: pressure(n)
+    class(axisymmetric_t), allocatable :: indenter
 
-    type(power_law_t) :: shape
+    call set_indenter(kind, body, indenter)
+    pressure = indenter%pressure(radius, r)
+  end subroutine pressure_of_body
 
-    shape = power_law_t(body(1), body(2), body(3))
-    pressure = shape%pressure(radius, r)
-  end subroutine power_law_pressure
-
-  !> Contact with a rounded punch under a load, an approach or with a contact radius.
-  subroutine rounded_punch(body, given, value, contact)
-    !f2py threadsafe
-    !> E* [Pa], b [m], R [m]
+  !> Set up a body of a kind from its components.
+  subroutine set_indenter(kind, body, indenter)
+    integer(c_int), intent(in) :: kind
     real(c_double), intent(in) :: body(3)
-    !> What is given: `by_load`, `by_approach`, else the contact radius
-    integer(c_int), intent(in) :: given
-    !> Load [N], approach or contact radius [m]
-    real(c_double), intent(in) :: value
-    !> Contact radius, approach, load, largest pressure
-    real(c_double), intent(out) :: contact(4)
+    class(axisymmetric_t), allocatable, intent(out) :: indenter
 
-    type(rounded_punch_t) :: shape
-    real(c_double) :: radius
+    if (kind == of_power_law) then
+      allocate (indenter, source=power_law_t(body(1), body(2), body(3)))
+    else
+      allocate (indenter, source=rounded_punch_t(body(1), body(2), body(3)))
+    end if
+  end subroutine set_indenter
 
-    shape = rounded_punch_t(body(1), body(2), body(3))
-    radius = value
-    if (given == by_load) radius = shape%contact_radius(normal_load=value)
-    if (given == by_approach) radius = shape%contact_radius(approach=value)
-    contact = [radius, shape%approach(radius), shape%load(radius), shape%max_pressure(radius)]
-  end subroutine rounded_punch
-
-  !> Pressure of a rounded punch.
-  subroutine rounded_punch_pressure(body, n, r, radius, pressure)
-    !f2py threadsafe
-    !> E* [Pa], b [m], R [m]
-    real(c_double), intent(in) :: body(3)
-    !> Number of points
-    integer(c_int), intent(in) :: n
-    !> Distance from the axis [m]
-    real(c_double), intent(in) :: r(n)
-    !> Contact radius [m]
-    real(c_double), intent(in) :: radius
-    !> Pressure [Pa]
-    real(c_double), intent(out) :: pressure(n)
-
-    type(rounded_punch_t) :: shape
-
-    shape = rounded_punch_t(body(1), body(2), body(3))
-    pressure = shape%pressure(radius, r)
-  end subroutine rounded_punch_pressure
-
-  !> Load per approach of a flat punch.
+  !> Compute the load per approach of a flat punch.
   subroutine flat_punch_stiffness(body, stiffness)
     !> E* [Pa], a [m]
     real(c_double), intent(in) :: body(2)
     !> Stiffness [N/m]
     real(c_double), intent(out) :: stiffness
 
-    type(flat_punch_t) :: shape
+    type(flat_punch_t) :: indenter
 
-    shape = flat_punch_t(body(1), body(2))
-    stiffness = shape%stiffness()
+    indenter = flat_punch_t(body(1), body(2))
+    stiffness = indenter%stiffness()
   end subroutine flat_punch_stiffness
 
-  !> Pressure of a flat punch.
+  !> Compute the pressure of a flat punch.
   subroutine flat_punch_pressure(body, n, r, load, pressure)
     !f2py threadsafe
     !> E* [Pa], a [m]
@@ -126,10 +101,10 @@ contains
     !> Pressure [Pa]
     real(c_double), intent(out) :: pressure(n)
 
-    type(flat_punch_t) :: shape
+    type(flat_punch_t) :: indenter
 
-    shape = flat_punch_t(body(1), body(2))
-    pressure = shape%pressure(load, r)
+    indenter = flat_punch_t(body(1), body(2))
+    pressure = indenter%pressure(load, r)
   end subroutine flat_punch_pressure
 
 end module hc_f2py_axisymmetric

@@ -1,26 +1,26 @@
-!> The spectra that all problems share, for Python: flat procedures for f2py.
+!> Cache of the spectra of kernels for Python: flat procedures for f2py.
 module hc_f2py_cache
   use iso_c_binding, only: c_int, c_int64_t
   use hc_f2py_handles, only: kernel_cache
   implicit none
   private
 
-  public :: limit_kernels, use_kernel_folder, kernel_statistics, kernel_complaint
+  public :: limit_kernels, use_kernel_folder, kernel_statistics, kernel_message
 
 contains
 
-  !> Keep so many bytes of spectra in memory at most.
+  !> Limit the bytes of spectra in memory.
   subroutine limit_kernels(bound)
-    !> Bytes; 0: nothing is kept
+    !> Bytes; 0: no cache in memory
     integer(c_int64_t), intent(in) :: bound
 
     if (.not. associated(kernel_cache)) allocate (kernel_cache)
     call kernel_cache%limit(bound)
   end subroutine limit_kernels
 
-  !> Keep spectra in a folder, too.
+  !> Store spectra in a folder, too.
   subroutine use_kernel_folder(folder, maker, word, room, shared)
-    !> The folder, which is there; empty: none
+    !> Existing folder; empty: none
     character(len=*), intent(in) :: folder
     !> Program and machine
     character(len=*), intent(in) :: maker
@@ -35,18 +35,18 @@ contains
     call kernel_cache%use_folder(folder, maker, word, room, shared /= 0)
   end subroutine use_kernel_folder
 
-  !> What is kept.
+  !> Return counts of the cache.
   subroutine kernel_statistics(numbers)
     !> Bytes in memory; spectra found in memory, found in the folder, not found
     integer(c_int64_t), intent(out) :: numbers(4)
 
     numbers = 0
     if (.not. associated(kernel_cache)) return
-    numbers = [kernel_cache%held, kernel_cache%found, kernel_cache%read, kernel_cache%missed]
+    numbers = [kernel_cache%stored, kernel_cache%found, kernel_cache%read, kernel_cache%missed]
   end subroutine kernel_statistics
 
-  !> What was wrong with the folder since this was last asked.
-  subroutine kernel_complaint(complaint)
+  !> Return the fault of the folder since the last call.
+  subroutine kernel_message(complaint)
     !> Sentences, one a line; empty: nothing
     character(len=2048), intent(out) :: complaint
 
@@ -54,8 +54,8 @@ contains
 
     complaint = ''
     if (.not. associated(kernel_cache)) return
-    call kernel_cache%take_complaint(sentences)
+    call kernel_cache%fetch_message(sentences)
     complaint = sentences
-  end subroutine kernel_complaint
+  end subroutine kernel_message
 
 end module hc_f2py_cache

@@ -7,36 +7,38 @@ module hc_f2py_friction
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
-    kernel_cache
+    normal_law_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_motion
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_load, n_motion
+  use hc_friction_law, only: friction_law_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_solver, only: friction_solver_t
   use hc_subwindow_solver, only: windowed_friction_t, new_windowed_friction, windowed_friction_memory
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_field_space, only: space_over
   use hc_flexibility_dense, only: dense_memory
-  use hc_load_path, only: advance
+  use hc_load_path, only: advance, join_steps
   implicit none
   private
 
-  public :: create_frictional_contact, advance_friction, relative_displacement, friction_memory_needed
+  public :: create_frictional_contact, set_guess, advance_friction, record_steps, relative_displacement, friction_memory_needed
 
   !> The method of explicit matrices and LAPACK; any other number means FFT.
   integer, parameter :: direct = 0
-  !> Bytes of its fields over the nodes; matrices are asked for where they are made
+  !> Bytes of its fields over the nodes; matrices are checked where they are allocated
   integer(c_int64_t), parameter :: dense_fields = 500
-  !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path
-  integer, parameter :: n_field = 9
-  !> Numbers of a state: loads, motions, dissipated energy
-  integer, parameter :: n_number = 2*n_motion + 1
-  !> Fields in which it is found where nodes stood when their gap closed
+  !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path,
+  !> dissipated energy by area
+  integer, parameter :: n_field = 10
+  !> Numbers of a state: loads, motions with the bulk strain, dissipated energy
+  integer, parameter :: n_number = n_load + n_motion + 1
+  !> Fields that the entry of nodes takes
   integer, parameter :: entry_fields = 45
 
 contains
 
-  !> Bytes that a problem takes while a step is solved.
-  subroutine friction_memory_needed(method, extent, n_contact, n_force, coupled, n_threads, bytes)
+  !> Count the bytes that a problem takes while a step is solved.
+  subroutine friction_memory_needed(method, extent, n_contact, n_force, coupled, unlike, n_threads, bytes)
     !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Number of columns and rows of the window
@@ -45,23 +47,24 @@ contains
     integer(c_int), intent(in) :: n_contact
     !> Loads that are prescribed, the normal one among them
     integer(c_int), intent(in) :: n_force
-    !> Not zero: pressure and shear move each other
-    integer(c_int), intent(in) :: coupled
+    !> Not zero: pressure and shear move each other; the materials are unlike
+    integer(c_int), intent(in) :: coupled, unlike
     !> Threads
     integer(c_int), intent(in) :: n_threads
     !> Bytes
     integer(c_int64_t), intent(out) :: bytes
 
     if (method == direct) then
-      bytes = dense_memory(extent, n_contact, normal_only=.false.)
+      bytes = dense_memory(extent, n_contact, normal_only=.false., unlike=unlike /= 0)
     else
-      bytes = windowed_friction_memory(extent, n_contact, n_force, coupled /= 0, n_threads)
+      bytes = windowed_friction_memory(extent, n_contact, n_force, coupled /= 0, n_threads, unlike /= 0)
     end if
   end subroutine friction_memory_needed
 
-  !> A contact problem with friction.
+  !> Create a contact problem with friction.
   subroutine create_frictional_contact(method, basis, first, extent, origin, lambda, n_node, initial_gap, candidate, &
-                                       coefficient, goodman, n_threads, handle, code, message)
+                                       n_coefficient, coefficient, law, interface, goodman, n_threads, handle, code, &
+                                       message)
     !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Basis vectors as columns [m]
@@ -78,8 +81,12 @@ contains
     real(c_double), intent(in) :: initial_gap(n_node)
     !> Not zero where a node may come into contact
     integer(c_int), intent(in) :: candidate(n_node)
-    !> Coefficient of friction; infinite or huge: no slip
-    real(c_double), intent(in) :: coefficient
+    !> Coefficient of friction, one or that of each node, infinite or huge: no slip; numbers of the law: `friction_of`
+    integer(c_int), intent(in) :: n_coefficient
+    real(c_double), intent(in) :: coefficient(n_coefficient), law(4)
+    !> Coefficient [Pa/m^m] and exponent m of the normal compliance, both 0: bodies do not penetrate; tangential stiffness
+    !> [Pa/m], 0: no springs
+    real(c_double), intent(in) :: interface(3)
     !> Not zero: shear tractions do not move the pressure
     integer(c_int), intent(in) :: goodman
     !> Threads to use; 0: as many as OpenMP would take
@@ -91,6 +98,7 @@ contains
     character(len=512), intent(out) :: message
     type(slot_t), pointer :: slot
     type(error_t), allocatable :: error
+    class(friction_law_t), allocatable :: friction
     type(friction_problem_t) :: problem
     type(windowed_friction_t), pointer :: fft
     type(direct_friction_t), pointer :: dense
@@ -103,12 +111,14 @@ contains
       slot%space = space_over(extent, n_threads)
       bytes = dense_fields*product(int(extent, c_int64_t))
       ! of the largest contact there can be, with all loads prescribed
-      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_motion, goodman == 0, slot%space%threads)
+      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_load, goodman == 0, slot%space%threads, &
+                                                                abs(lambda(2)) > 0.0_c_double)
       call secure(slot, bytes, n_threads, error)
     end if
     if (.not. allocated(error)) then
-      call new_friction_problem(problem, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
-                                reshape(candidate /= 0, extent), friction_of(coefficient), goodman /= 0, error)
+      call friction_of(coefficient, law, int(n_node), friction)
+      call new_friction_problem(problem, slot%lattice, pair_of(lambda, interface), reshape(initial_gap, extent), &
+                                reshape(candidate /= 0, extent), friction, goodman /= 0, error, normal_law_of(interface))
     end if
     if (.not. allocated(error)) then
       if (method == direct) then
@@ -125,6 +135,38 @@ contains
     call report(error, code, message)
   end subroutine create_frictional_contact
 
+  !> Tractions and motions that the next step is likely to end with: it starts from them, and forgets them.
+  subroutine set_guess(handle, n_node, traction, motion, code, message)
+    !> Handle of the problem
+    integer(c_int64_t), intent(in) :: handle
+    !> Number of nodes of the window
+    integer(c_int), intent(in) :: n_node
+    !> Pressure, traction along x and along y [Pa]
+    real(c_double), intent(in) :: traction(n_node, 3)
+    !> Approach, shifts [m], twist [rad] and bulk strain
+    real(c_double), intent(in) :: motion(7)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(slot_t), pointer :: slot
+    class(friction_solver_t), pointer :: solver
+    type(error_t), allocatable :: error
+
+    call enter(handle, n_node, slot, error)
+    if (.not. allocated(error)) then
+      call with_friction(slot, solver, error)
+      if (.not. allocated(error)) then
+        if (allocated(solver%guess)) deallocate (solver%guess)
+        allocate (solver%guess)
+        solver%guess%pressure = reshape(traction(:, 1), slot%lattice%extent)
+        solver%guess%traction = reshape(traction(:, 2:3), [slot%lattice%extent, 2])
+        solver%guess%motion = motion
+      end if
+      call leave(slot)
+    end if
+    call report(error, code, message)
+  end subroutine set_guess
+
   !> Advance a state to given loads or motions.
   subroutine advance_friction(handle, control, target, static, interpolated, tolerance, max_sweeps, max_cuts, n_node, &
                               fields, numbers, new_fields, zone, new_numbers, residuals, sweeps, cuts, &
@@ -134,8 +176,8 @@ contains
     integer(c_int64_t), intent(in) :: handle
     !> z, x, y, twist: 1: the load is given, 2: the motion
     integer(c_int), intent(in) :: control(4)
-    !> Loads [N], [N m] or motions [m], [rad]
-    real(c_double), intent(in) :: target(4)
+    !> Loads [N], [N m] or motions [m], [rad]; bulk strain
+    real(c_double), intent(in) :: target(7)
     !> Not zero: the load is applied to the undeformed bodies at once
     integer(c_int), intent(in) :: static
     !> Not zero: the slip of a node that enters counts from where it stood when its gap closed
@@ -147,11 +189,11 @@ contains
     !> Number of nodes of the window
     integer(c_int), intent(in) :: n_node
     !> The state to go on from
-    real(c_double), intent(in) :: fields(n_node, 9), numbers(9)
+    real(c_double), intent(in) :: fields(n_node, 10), numbers(12)
     !> The new state
-    real(c_double), intent(out) :: new_fields(n_node, 9)
+    real(c_double), intent(out) :: new_fields(n_node, 10)
     integer(c_int), intent(out) :: zone(n_node)
-    real(c_double), intent(out) :: new_numbers(9)
+    real(c_double), intent(out) :: new_numbers(12)
     !> R_n, R_t, R_P, R_Q, R_M
     real(c_double), intent(out) :: residuals(5)
     !> Active sets that were tried, times that the step was halved
@@ -177,6 +219,7 @@ contains
         call unpack_state(slot%lattice, fields, numbers, state)
         call advance(solver, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
                      next, error, interpolated /= 0)
+        if (allocated(solver%guess)) deallocate (solver%guess)
       end if
       call leave(slot)
     end if
@@ -196,7 +239,45 @@ contains
     call report(error, code, message)
   end subroutine advance_friction
 
-  !> Relative displacement that follows from tractions and rigid motions.
+  !> Compute slip and residual of two steps that are recorded as one.
+  subroutine record_steps(handle, n_node, first, last, slip, residual, code, message)
+    !f2py threadsafe
+    !> Handle of the problem
+    integer(c_int64_t), intent(in) :: handle
+    !> Number of nodes of the window
+    integer(c_int), intent(in) :: n_node
+    !> Fields at the end of the first and of the second step
+    real(c_double), intent(in) :: first(n_node, 10), last(n_node, 10)
+    !> Slip of both along x and y [m], at the nodes in contact at the end
+    real(c_double), intent(out) :: slip(n_node, 2)
+    !> R_t of this slip
+    real(c_double), intent(out) :: residual
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(slot_t), pointer :: slot
+    class(friction_solver_t), pointer :: solver
+    type(error_t), allocatable :: error
+    type(contact_state_t) :: half, state
+
+    slip = 0.0_c_double
+    residual = 0.0_c_double
+    call enter(handle, n_node, slot, error)
+    if (.not. allocated(error)) then
+      call with_friction(slot, solver, error)
+      if (.not. allocated(error)) then
+        call unpack_state(slot%lattice, first, spread(0.0_c_double, 1, n_number), half)
+        call unpack_state(slot%lattice, last, spread(0.0_c_double, 1, n_number), state)
+        call join_steps(solver%problem, half, state)
+        slip = reshape(state%slip_increment, [n_node, 2])
+        residual = state%residual_tangential
+      end if
+      call leave(slot)
+    end if
+    call report(error, code, message)
+  end subroutine record_steps
+
+  !> Compute the relative displacement that follows from tractions and rigid motions.
   subroutine relative_displacement(handle, n_node, traction, motion, displacement, code, message)
     !f2py threadsafe
     !> Handle of the problem
@@ -205,8 +286,8 @@ contains
     integer(c_int), intent(in) :: n_node
     !> Pressure, traction along x and along y [Pa]
     real(c_double), intent(in) :: traction(n_node, 3)
-    !> Approach, shifts [m] and twist [rad]
-    real(c_double), intent(in) :: motion(4)
+    !> Approach, shifts [m], twist [rad] and bulk strain
+    real(c_double), intent(in) :: motion(7)
     !> w - approach, s_x and s_y [m]
     real(c_double), intent(out) :: displacement(n_node, 3)
     !> Status and its message
@@ -234,7 +315,7 @@ contains
     call report(error, code, message)
   end subroutine relative_displacement
 
-  !> The solver of a slot, if it is one with friction.
+  !> Return the solver of a slot, if it is one with friction.
   subroutine with_friction(slot, solver, error)
     type(slot_t), intent(in) :: slot
     class(friction_solver_t), pointer, intent(out) :: solver
@@ -253,7 +334,7 @@ contains
     end if
   end subroutine with_friction
 
-  !> A state from its arrays.
+  !> Unpack a state from its arrays.
   subroutine unpack_state(lattice, fields, numbers, state)
     type(lattice_t), intent(in) :: lattice
     real(c_double), intent(in) :: fields(:, :), numbers(:)
@@ -265,13 +346,14 @@ contains
     state%gap = reshape(fields(:, 4), lattice%extent)
     state%relative_displacement = reshape(fields(:, 5:6), [lattice%extent, 2])
     state%slip_increment = reshape(fields(:, 7:8), [lattice%extent, 2])
-    state%accumulated_slip = reshape(fields(:, n_field), lattice%extent)
-    state%load = numbers(:n_motion)
-    state%motion = numbers(n_motion + 1:2*n_motion)
+    state%accumulated_slip = reshape(fields(:, 9), lattice%extent)
+    state%dissipation_density = reshape(fields(:, n_field), lattice%extent)
+    state%load(:n_load) = numbers(:n_load)
+    state%motion = numbers(n_load + 1:n_load + n_motion)
     state%dissipated_energy = numbers(n_number)
   end subroutine unpack_state
 
-  !> The arrays of a state.
+  !> Pack a state into its arrays.
   subroutine pack_state(state, fields, numbers)
     type(contact_state_t), intent(in) :: state
     real(c_double), intent(out) :: fields(:, :), numbers(:)
@@ -283,8 +365,9 @@ contains
     fields(:, 4) = reshape(state%gap, [n])
     fields(:, 5:6) = reshape(state%relative_displacement, [n, 2])
     fields(:, 7:8) = reshape(state%slip_increment, [n, 2])
-    fields(:, n_field) = reshape(state%accumulated_slip, [n])
-    numbers = [state%load, state%motion, state%dissipated_energy]
+    fields(:, 9) = reshape(state%accumulated_slip, [n])
+    fields(:, n_field) = reshape(state%dissipation_density, [n])
+    numbers = [state%load(:n_load), state%motion, state%dissipated_energy]
   end subroutine pack_state
 
 end module hc_f2py_friction

@@ -1,11 +1,11 @@
-!> The table of objects that Python holds handles of.
+!> Table of the objects to which Python has handles.
 !>
 !> A handle is a slot number with a generation count, so that a stale handle is
-!> an error and never another object. A handle at work in one thread is refused
-!> in another. The spectra that all objects share are here, too. This is the one place with module state; it is not part of the
-!> Fortran library.
+!> an error and never another object. A handle in use by one thread is refused
+!> in another. The cache of spectra is here, too. No other module has state; this one is not part of the Fortran library.
 module hc_f2py_handles
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_error, only: error_t, status, raise
   use hc_lock, only: lock, unlock, handle_table
   use hc_memory, only: require_memory
@@ -13,24 +13,30 @@ module hc_f2py_handles
   use hc_field_space, only: field_space_t, most_threads
   use hc_flexibility, only: flexibility_t
   use hc_elastic_pair, only: elastic_pair_t
+  use hc_friction_law, only: friction_law_t
   use hc_coulomb, only: coulomb_t
+  use hc_nodal_coulomb, only: nodal_coulomb_t
+  use hc_orthotropic_coulomb, only: orthotropic_coulomb_t
+  use hc_normal_law, only: normal_law_t, unilateral_t
+  use hc_power_interface, only: power_interface_t
   use hc_contact_solver, only: contact_solver_t
   use hc_spectrum_cache, only: kernel_cache_t
   implicit none
   private
 
-  public :: slot_t, kernel_cache, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of
+  public :: slot_t, kernel_cache, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
+            normal_law_of
 
-  !> Objects that may exist at a time.
+  !> Largest number of objects.
   integer, parameter :: n_slot = 4096
 
-  !> What a handle stands for.
+  !> Object of a handle.
   type :: slot_t
     !> Odd while the slot is in use
     integer(c_int64_t) :: generation = 0
-    !> At work in some thread
+    !> In use by some thread
     logical :: busy = .false.
-    !> Bytes that work on it may take
+    !> Bytes that a call may take
     integer(c_int64_t) :: working = 0
     type(lattice_t) :: lattice
     type(field_space_t) :: space
@@ -45,7 +51,7 @@ module hc_f2py_handles
 
 contains
 
-  !> Free what a handle stands for; a stale handle is ignored.
+  !> Free the object of a handle; a stale handle is ignored.
   subroutine free_slot(handle)
     !> Handle of an operator or a problem
     integer(c_int64_t), intent(in) :: handle
@@ -54,7 +60,7 @@ contains
     if (handle < 0) return
     associate (slot => slots(int(modulo(handle, int(n_slot, c_int64_t))) + 1))
       call lock(handle_table)
-      ! one that is at work, or being freed, in another thread stays that thread's
+      ! an object that another thread uses, or frees, stays with that thread
       mine = slot%generation == handle/n_slot .and. .not. slot%busy
       if (mine) slot%busy = .true.
       call unlock(handle_table)
@@ -68,10 +74,13 @@ contains
     end associate
   end subroutine free_slot
 
-  !> A free slot of the table, and its handle. An odd generation marks a slot in use.
+  !> Take a free slot of the table, and return its handle. An odd generation marks a slot in use.
   subroutine take_slot(slot, handle, error)
+    !> Slot of the table
     type(slot_t), pointer, intent(out) :: slot
+    !> Handle of an operator or a problem
     integer(c_int64_t), intent(out) :: handle
+    !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     integer :: i, free
 
@@ -94,32 +103,38 @@ contains
     handle = slot%generation*n_slot + free - 1
   end subroutine take_slot
 
-  !> Refuse a problem for which there is no memory; say what solving it may take.
+  !> Refuse a problem for which there is no memory; record the bytes that its solution may take.
   subroutine secure(slot, bytes, n_threads, error)
+    !> Slot of the table
     type(slot_t), intent(inout) :: slot
     !> Memory of the problem, that of solving it included
     integer(c_int64_t), intent(in) :: bytes
     !> Threads to use; 0: as many as OpenMP would take
     integer(c_int), intent(in) :: n_threads
+    !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    ! such a number is refused by what is set up next
+    ! the constructors refuse such a number
     if (n_threads < 0 .or. n_threads > most_threads) then
       slot%space = field_space_t()
       return
     end if
-    ! a fifth at least, mostly a quarter, are operators and fields that are there from the beginning on
+    ! a fifth at least, mostly a quarter, are operators and fields of the problem itself
     slot%working = 4*bytes/5
     call require_memory(bytes, error, slot%space%threads)
   end subroutine secure
 
-  !> Look a handle up and mark it as at work.
+  !> Look a handle up and mark its object as in use.
   subroutine enter(handle, n_node, slot, error, more)
+    !> Handle of an operator or a problem
     integer(c_int64_t), intent(in) :: handle
+    !> Number of nodes of the arrays
     integer(c_int), intent(in) :: n_node
+    !> Slot of the table
     type(slot_t), pointer, intent(out) :: slot
+    !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> Bytes that the work takes beyond what solving does
+    !> Bytes that the call takes beyond those of a solution
     integer(c_int64_t), intent(in), optional :: more
     integer(c_int64_t) :: bytes
     logical :: stale, busy
@@ -152,8 +167,11 @@ contains
 
   !> Refuse arrays that do not fit the window of a slot.
   pure subroutine check_size(slot, n_node, error)
+    !> Slot of the table
     type(slot_t), intent(in) :: slot
+    !> Number of nodes of the arrays
     integer(c_int), intent(in) :: n_node
+    !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
     if (slot%lattice%size() /= n_node) then
@@ -161,8 +179,9 @@ contains
     end if
   end subroutine check_size
 
-  !> Mark a handle as free for work.
+  !> Mark the object of a handle as free.
   subroutine leave(slot)
+    !> Slot of the table
     type(slot_t), pointer, intent(in) :: slot
 
     call lock(handle_table)
@@ -170,24 +189,77 @@ contains
     call unlock(handle_table)
   end subroutine leave
 
-  !> Elastic constants from a vector.
-  pure type(elastic_pair_t) function pair_of(lambda)
+  !> Set up elastic constants from a vector; with them the tangential springs of an interface.
+  pure type(elastic_pair_t) function pair_of(lambda, interface)
+    !> lambda_1, lambda_2, lambda_5 [1/Pa]
     real(c_double), intent(in) :: lambda(3)
+    !> Coefficient [Pa/m^m] and exponent m of the normal compliance, tangential stiffness [Pa/m]
+    real(c_double), intent(in), optional :: interface(3)
     pair_of = elastic_pair_t(lambda(1), lambda(2), lambda(3))
+    if (.not. present(interface)) return
+    if (abs(interface(3)) > 0.0_c_double .or. .not. ieee_is_finite(interface(3))) pair_of%tangential_layer = 1/interface(3)
   end function pair_of
 
-  !> A law of friction from its coefficient; an infinite or huge one: no slip.
-  pure type(coulomb_t) function friction_of(coefficient) result(friction)
-    real(c_double), intent(in) :: coefficient
+  !> Make a law of friction from its numbers.
+  subroutine friction_of(coefficient, law, n_node, friction)
+    !> Coefficient of friction, one or that of each node; one that is infinite or huge: no slip
+    real(c_double), intent(in) :: coefficient(:)
+    !> Bound of the shear traction, infinite or huge: none [Pa]; power of the pressure; ratio of the coefficients along and across,
+    !> of which `coefficient` is the geometric mean, and angle of the direction along from x [rad]
+    real(c_double), intent(in) :: law(4)
+    !> Number of nodes of the window
+    integer, intent(in) :: n_node
+    !> The law
+    class(friction_law_t), allocatable, intent(out) :: friction
+    type(coulomb_t) :: coulomb
+    type(nodal_coulomb_t) :: nodal
+    type(orthotropic_coulomb_t) :: ellipse
+    real(c_double), parameter :: half = 0.5_c_double*huge(1.0_c_double), unbounded = 1.0e100_c_double
+    logical :: plain, isotropic
 
-    friction%no_slip = coefficient > 0.5_c_double*huge(1.0_c_double)
-    if (.not. friction%no_slip) friction%coefficient = coefficient
-  end function friction_of
+    isotropic = abs(law(3) - 1) <= 0
+    plain = size(coefficient) == 1 .and. law(1) > half .and. abs(law(2) - 1) <= 0 .and. isotropic
+    if (plain) then
+      coulomb%no_slip = coefficient(1) > half
+      if (.not. coulomb%no_slip) coulomb%coefficient = coefficient(1)
+      allocate (friction, source=coulomb)
+    else
+      nodal%coefficient = coefficient
+      if (size(coefficient) == 1) nodal%coefficient = spread(min(coefficient(1), unbounded), 1, n_node)
+      nodal%shear_limit = law(1)
+      nodal%power = law(2)
+      if (isotropic) then
+        allocate (friction, source=nodal)
+      else
+        ! no structure constructor: gfortran 12 frees the components of a parent in it twice
+        ellipse%nodal_coulomb_t = nodal
+        ellipse%ratio = law(3)
+        ellipse%angle = law(4)
+        allocate (friction, source=ellipse)
+      end if
+    end if
+  end subroutine friction_of
 
-  !> An error as a code and a message.
+  !> Make a law of contact from coefficient and exponent of a normal compliance; both 0: bodies do not penetrate.
+  pure function normal_law_of(interface) result(law)
+    !> Coefficient [Pa/m^m] and exponent m of the normal compliance, tangential stiffness [Pa/m]
+    real(c_double), intent(in) :: interface(3)
+    class(normal_law_t), allocatable :: law
+
+    if (all(abs(interface(:2)) <= 0.0_c_double)) then
+      allocate (unilateral_t :: law)
+    else
+      allocate (law, source=power_interface_t(interface(1), interface(2)))
+    end if
+  end function normal_law_of
+
+  !> Return an error as a code and a message.
   pure subroutine report(error, code, message)
+    !> Allocated on failure
     type(error_t), allocatable, intent(in) :: error
+    !> Status
     integer(c_int), intent(out) :: code
+    !> Message of the error
     character(len=*), intent(out) :: message
 
     code = status%ok

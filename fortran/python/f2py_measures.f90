@@ -1,30 +1,34 @@
-!> What measures a solution, for Python: flat procedures for f2py, no mathematics.
+!> Measures of a solution for Python: flat procedures for f2py, no mathematics.
 !>
-!> Fields have the shape (n_col, n_row), and zones are integers: not zero at nodes of the zone. Nothing here keeps state,
-!> so that threads may call at will.
+!> Fields have the shape (n_col, n_row), and zones are integers: not zero at nodes of the zone. The module has no state,
+!> so that several threads may call at a time.
 module hc_f2py_measures
   use iso_c_binding, only: c_double, c_int
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: report, pair_of, friction_of
+  use hc_f2py_handles, only: report, pair_of, friction_of, normal_law_of
+  use hc_elastic_pair, only: material_t, find_bulk_strain
+  use hc_field_space, only: field_space_t
   use hc_lattice, only: lattice_t, new_lattice
   use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   use hc_zone_estimators, only: boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, &
     edge_ellipse, circle_fit_t, ellipse_t
-  use hc_contact_edges, only: contact_edges_t, new_contact_edges, zone_edge_t, cut_triangles
+  use hc_friction_law, only: friction_law_t
   use hc_contact_state, only: contact_state_t
-  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
-  use hc_discretization_error, only: limits_of_error
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, measure_state, state_measures_t
+  use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
+  use hc_load_cycles, only: turning_points, find_cycles, loop_area
   implicit none
   private
 
   public :: zone_boundary, circle_of_zone, radius_of_area, radius_of_pressure, center_of_pressure, ellipse_of_zone
-  public :: ellipse_of_pressure, count_cut_triangles, edge_of_zone, pressure_squares
-  public :: field_between_nodes, pressure_between_nodes, nodes_next_to, errors_of_limits
-  public :: nodal_residuals, energy_of_state, extent_of_zone
+  public :: ellipse_of_pressure, turns_of_history, cycles_of_history
+  public :: field_between_nodes, pressure_between_nodes, nodes_next_to, errors_of_limits, unresolved_slip_zones
+  public :: nodal_residuals, measures_of_state
+  public :: strain_of_bulk
 
 contains
 
-  !> Nodes of a zone that have a neighbor outside it.
+  !> Find the nodes of a zone that have a neighbor outside it.
   subroutine zone_boundary(n_col, n_row, zone, rim)
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -35,7 +39,7 @@ contains
     rim = merge(1, 0, boundary(zone /= 0))
   end subroutine zone_boundary
 
-  !> Circle through the boundary nodes of a zone.
+  !> Fit a circle through the boundary nodes of a zone.
   subroutine circle_of_zone(n_col, n_row, x, y, zone, spacing, center, numbers, n_boundary)
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -56,7 +60,7 @@ contains
     n_boundary = fit%count
   end subroutine circle_of_zone
 
-  !> Radius of the circle with as much area as some cells.
+  !> Compute the radius of the circle with as much area as some cells.
   subroutine radius_of_area(n_node, cell_area, radius)
     !> Number of nodes
     integer(c_int), intent(in) :: n_node
@@ -67,7 +71,7 @@ contains
     radius = area_radius(n_node, cell_area)
   end subroutine radius_of_area
 
-  !> Radius at which the pressure vanishes.
+  !> Find the radius at which the pressure vanishes.
   subroutine radius_of_pressure(n_col, n_row, x, y, pressure, spacing, center, radius)
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -80,7 +84,7 @@ contains
     radius = edge_radius(x, y, pressure, spacing, center)
   end subroutine radius_of_pressure
 
-  !> Centroid of a pressure.
+  !> Compute the centroid of a pressure.
   subroutine center_of_pressure(n_col, n_row, x, y, pressure, center)
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -91,7 +95,7 @@ contains
     center = pressure_center(x, y, pressure)
   end subroutine center_of_pressure
 
-  !> Ellipse with the second moments of a zone.
+  !> Find the ellipse with the second moments of a zone.
   subroutine ellipse_of_zone(n_col, n_row, x, y, zone, numbers)
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -104,7 +108,7 @@ contains
     numbers = numbers_of(moment_ellipse(x, y, zone /= 0))
   end subroutine ellipse_of_zone
 
-  !> Ellipse on which the pressure vanishes.
+  !> Find the ellipse on which the pressure vanishes.
   subroutine ellipse_of_pressure(n_col, n_row, x, y, pressure, spacing, numbers, code, message)
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -125,102 +129,7 @@ contains
     call report(error, code, message)
   end subroutine ellipse_of_pressure
 
-  !> Number of triangles that the edge of a zone cuts.
-  subroutine count_cut_triangles(n_col, n_row, zone, n_cut)
-    !> Number of columns and rows
-    integer(c_int), intent(in) :: n_col, n_row
-    !> Zone
-    integer(c_int), intent(in) :: zone(n_col, n_row)
-    !> Number of triangles
-    integer(c_int), intent(out) :: n_cut
-    n_cut = cut_triangles(zone /= 0)
-  end subroutine count_cut_triangles
-
-  !> Edge of the contact area, or of the part of it that sticks.
-  subroutine edge_of_zone(n_col, n_row, basis, start, pressure, gap, contact, candidate, of_stick, stick, reserve, &
-                          n_cut, numbers, segments, n_segment, code, message)
-    !f2py threadsafe
-    !> Number of columns and rows
-    integer(c_int), intent(in) :: n_col, n_row
-    !> Basis vectors as columns, position of the first node [m]
-    real(c_double), intent(in) :: basis(2, 2), start(2)
-    !> Pressure [Pa] and gap [m]
-    real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row)
-    !> Nodes in contact, nodes that can touch
-    integer(c_int), intent(in) :: contact(n_col, n_row), candidate(n_col, n_row)
-    !> Not zero: the edge of the stick area
-    integer(c_int), intent(in) :: of_stick
-    !> Nodes that stick, reserve of friction [Pa]; not looked at for the edge of the contact
-    integer(c_int), intent(in) :: stick(n_col, n_row)
-    real(c_double), intent(in) :: reserve(n_col, n_row)
-    !> Triangles that the edge cuts
-    integer(c_int), intent(in) :: n_cut
-    !> Area [m^2], radius of the disc with that area and length of the edge [m]
-    real(c_double), intent(out) :: numbers(3)
-    !> Pieces of the edge: x and y, first and last point [m]
-    real(c_double), intent(out) :: segments(2, 2, n_cut)
-    !> Number of pieces
-    integer(c_int), intent(out) :: n_segment
-    !> Status and its message
-    integer(c_int), intent(out) :: code
-    character(len=512), intent(out) :: message
-    type(error_t), allocatable :: error
-    type(lattice_t) :: lattice
-    type(contact_edges_t) :: edges
-    type(zone_edge_t) :: edge
-
-    numbers = 0.0_c_double
-    segments = 0.0_c_double
-    n_segment = 0
-    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
-    if (.not. allocated(error)) then
-      call new_contact_edges(edges, lattice, pressure, gap, contact /= 0, candidate /= 0)
-      if (of_stick /= 0) then
-        edge = edges%stick_edge(stick /= 0, reserve)
-      else
-        edge = edges%contact_edge()
-      end if
-      numbers = [edge%area, edge%radius(), edge%length()]
-      n_segment = size(edge%segments, 3)
-      if (n_segment > n_cut) then
-        call raise(error, status%invalid_input, 'the edge cuts more triangles than were counted')
-      else
-        segments(:, :, :n_segment) = edge%segments
-      end if
-    end if
-    call report(error, code, message)
-  end subroutine edge_of_zone
-
-  !> Squares of the pressure near the edge of the contact, good to interpolate.
-  subroutine pressure_squares(n_col, n_row, basis, pressure, gap, contact, candidate, squares, code, message)
-    !f2py threadsafe
-    !> Number of columns and rows
-    integer(c_int), intent(in) :: n_col, n_row
-    !> Basis vectors as columns [m]
-    real(c_double), intent(in) :: basis(2, 2)
-    !> Pressure [Pa] and gap [m]
-    real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row)
-    !> Nodes in contact, nodes that can touch
-    integer(c_int), intent(in) :: contact(n_col, n_row), candidate(n_col, n_row)
-    !> Squares; NaN away from the edge [Pa^2]
-    real(c_double), intent(out) :: squares(n_col, n_row)
-    !> Status and its message
-    integer(c_int), intent(out) :: code
-    character(len=512), intent(out) :: message
-    type(error_t), allocatable :: error
-    type(lattice_t) :: lattice
-    type(contact_edges_t) :: edges
-
-    squares = 0.0_c_double
-    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
-    if (.not. allocated(error)) then
-      call new_contact_edges(edges, lattice, pressure, gap, contact /= 0, candidate /= 0)
-      squares = edges%squares()
-    end if
-    call report(error, code, message)
-  end subroutine pressure_squares
-
-  !> A field at points, linear on the triangles.
+  !> Interpolate a field at points, linearly on the triangles.
   subroutine field_between_nodes(n_col, n_row, basis, start, values, outside, n, x, y, found, code, message)
     !f2py threadsafe
     !> Number of columns and rows
@@ -248,7 +157,7 @@ contains
     call report(error, code, message)
   end subroutine field_between_nodes
 
-  !> The pressure at points, like a square root at the edge of the contact.
+  !> Interpolate the pressure at points, like a square root at the edge of the contact.
   subroutine pressure_between_nodes(n_col, n_row, basis, start, pressure, squares, n, x, y, found, code, message)
     !f2py threadsafe
     !> Number of columns and rows
@@ -276,7 +185,7 @@ contains
     call report(error, code, message)
   end subroutine pressure_between_nodes
 
-  !> The nodes next to points.
+  !> Find the nodes next to points.
   subroutine nodes_next_to(basis, start, extent, n, x, y, col, row, inside, code, message)
     !f2py threadsafe
     !> Basis vectors as columns, position of the first node [m]
@@ -314,14 +223,18 @@ contains
     call report(error, code, message)
   end subroutine nodes_next_to
 
-  !> How far values on the finest lattice are from their limit.
-  subroutine errors_of_limits(n_lattice, n_value, spacings, values, errors, code, message)
+  !> Estimate how far values on the finest lattice are from their limit.
+  subroutine errors_of_limits(n_lattice, n_value, spacings, values, rough, unresolved, errors, code, message)
     !> Number of lattices and of quantities
     integer(c_int), intent(in) :: n_lattice, n_value
     !> Spacings, in units of the first
     real(c_double), intent(in) :: spacings(n_lattice)
     !> Quantities on each of the lattices
     real(c_double), intent(in) :: values(n_lattice, n_value)
+    !> Not zero: of the quantities that a few nodes at the edge of a zone decide
+    integer(c_int), intent(in) :: rough(n_value)
+    !> Not zero: of those that depend on a slip zone narrower than the lattice resolves
+    integer(c_int), intent(in) :: unresolved(n_value)
     !> Errors of those on the first
     real(c_double), intent(out) :: errors(n_value)
     !> Status and its message
@@ -329,24 +242,50 @@ contains
     character(len=512), intent(out) :: message
     type(error_t), allocatable :: error
 
-    call limits_of_error(spacings, values, errors, error)
+    call limits_of_error(spacings, values, errors, error, rough /= 0, unresolved /= 0)
     call report(error, code, message)
   end subroutine errors_of_limits
 
-  !> Residuals of the contact conditions at the nodes.
-  subroutine nodal_residuals(n_col, n_row, basis, lambda, coefficient, tangential, pressure, gap, vectors, residual, code, message)
+  !> Return whether the slip zones of load steps are narrower than the lattice resolves.
+  subroutine unresolved_slip_zones(n, spacing, contact_area, stick_area, max_traction, max_pressure, unresolved, code, message)
+    !> Number of load steps
+    integer(c_int), intent(in) :: n
+    !> Spacing [m]
+    real(c_double), intent(in) :: spacing
+    !> Areas to the edge between the nodes [m2]
+    real(c_double), intent(in) :: contact_area(n), stick_area(n)
+    !> Largest shear tractions and pressures [Pa]
+    real(c_double), intent(in) :: max_traction(n), max_pressure(n)
+    !> 1: narrower; else 0
+    integer(c_int), intent(out) :: unresolved(n)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+
+    unresolved = merge(1, 0, is_slip_zone_unresolved(spacing, contact_area, stick_area, max_traction, max_pressure))
+    call report(error, code, message)
+  end subroutine unresolved_slip_zones
+
+  !> Compute the residuals of the contact conditions at the nodes.
+  subroutine nodal_residuals(n_col, n_row, basis, lambda, n_coefficient, coefficient, law, interface, tangential, &
+                             pressure, gap, vectors, residual, code, message)
     !f2py threadsafe
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
     !> Basis vectors as columns [m]; lambda_1, lambda_2, lambda_5 [1/Pa]
     real(c_double), intent(in) :: basis(2, 2), lambda(3)
-    !> Coefficient of friction; infinite or huge: no slip
-    real(c_double), intent(in) :: coefficient
+    !> Coefficient of friction, one or that of each node, infinite or huge: no slip; numbers of the law: `friction_of`
+    integer(c_int), intent(in) :: n_coefficient
+    real(c_double), intent(in) :: coefficient(n_coefficient), law(4)
+    !> Coefficient [Pa/m^m] and exponent m of the normal compliance, both 0: bodies do not penetrate; tangential stiffness
+    !> [Pa/m], 0: no springs
+    real(c_double), intent(in) :: interface(3)
     !> Not zero: of the friction conditions; else of those along the normal
     integer(c_int), intent(in) :: tangential
     !> Pressure [Pa] and gap [m]
     real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row)
-    !> Traction along x and y [Pa], slip of the step along x and y [m]; not looked at for those along the normal
+    !> Traction along x and y [Pa], slip of the step along x and y [m]; of no use for those along the normal
     real(c_double), intent(in) :: vectors(n_col, n_row, 4)
     !> Residuals
     real(c_double), intent(out) :: residual(n_col, n_row)
@@ -355,6 +294,7 @@ contains
     character(len=512), intent(out) :: message
     type(error_t), allocatable :: error
     type(lattice_t) :: lattice
+    class(friction_law_t), allocatable :: friction
     type(contact_state_t) :: state
 
     residual = 0.0_c_double
@@ -364,44 +304,54 @@ contains
       if (tangential /= 0) then
         allocate (state%traction, source=vectors(:, :, 1:2))
         allocate (state%slip_increment, source=vectors(:, :, 3:4))
-        residual = nodal_tangential_residual(lattice, pair_of(lambda), friction_of(coefficient), state)
+        call friction_of(coefficient, law, lattice%size(), friction)
+        residual = nodal_tangential_residual(lattice, pair_of(lambda, interface), friction, state, field_space_t())
       else
         allocate (state%gap, source=gap)
-        residual = nodal_normal_residual(lattice, pair_of(lambda), state)
+        residual = nodal_normal_residual(lattice, pair_of(lambda), normal_law_of(interface), state, field_space_t())
       end if
     end if
     call report(error, code, message)
   end subroutine nodal_residuals
 
-  !> Elastic energy of a state.
-  subroutine energy_of_state(n_col, n_row, basis, start, pressure, gap, initial_gap, zone, motion, frictional, vectors, &
-                             energy, code, message)
+  !> Measure what a load history records of a state, in the order of variables.py.
+  subroutine measures_of_state(n_col, n_row, basis, first, origin, n_coefficient, coefficient, law, frictional, pressure, &
+                               gap, initial_gap, zone, candidate, motion, vectors, numbers, code, message)
     !f2py threadsafe
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
-    !> Basis vectors as columns, position of the first node [m]
-    real(c_double), intent(in) :: basis(2, 2), start(2)
-    !> Pressure [Pa], gap and gap before loading [m]
-    real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row), initial_gap(n_col, n_row)
-    !> Not zero in contact
-    integer(c_int), intent(in) :: zone(n_col, n_row)
-    !> Approach, shifts [m] and twist [rad]
-    real(c_double), intent(in) :: motion(4)
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> Smallest column and row index
+    integer(c_int), intent(in) :: first(2)
+    !> Position of node (0, 0) [m]
+    real(c_double), intent(in) :: origin(2)
+    !> Coefficient of friction, one or that of each node, infinite or huge: no slip; numbers of the law: `friction_of`
+    integer(c_int), intent(in) :: n_coefficient
+    real(c_double), intent(in) :: coefficient(n_coefficient), law(4)
     !> Not zero: with friction
     integer(c_int), intent(in) :: frictional
-    !> Traction along x and y [Pa], relative displacement along x and y [m]; not looked at without friction
+    !> Pressure [Pa], gap and gap before loading [m]
+    real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row), initial_gap(n_col, n_row)
+    !> Zones; not zero where a node can touch
+    integer(c_int), intent(in) :: zone(n_col, n_row), candidate(n_col, n_row)
+    !> Approach, shifts [m], twist [rad] and bulk strain
+    real(c_double), intent(in) :: motion(7)
+    !> Traction along x and y [Pa], relative displacement along x and y [m]; of no use without friction
     real(c_double), intent(in) :: vectors(n_col, n_row, 4)
-    !> Energy [J]
-    real(c_double), intent(out) :: energy
+    !> Areas [m^2], radii and places [m], tractions [Pa], energy [J]
+    real(c_double), intent(out) :: numbers(21)
     !> Status and its message
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
     type(error_t), allocatable :: error
     type(lattice_t) :: lattice
+    class(friction_law_t), allocatable :: friction
     type(contact_state_t) :: state
+    type(state_measures_t) :: found
 
-    energy = 0.0_c_double
-    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
+    numbers = 0.0_c_double
+    call new_lattice(lattice, basis, first, [n_col, n_row], error, origin)
     if (.not. allocated(error)) then
       allocate (state%pressure, source=pressure)
       allocate (state%gap, source=gap)
@@ -411,25 +361,69 @@ contains
         allocate (state%traction, source=vectors(:, :, 1:2))
         allocate (state%relative_displacement, source=vectors(:, :, 3:4))
       end if
-      energy = elastic_energy(lattice, initial_gap, state)
+      call friction_of(coefficient, law, lattice%size(), friction)
+      found = measure_state(lattice, friction, initial_gap, candidate /= 0, state, field_space_t())
+      numbers = [found%contact%area, found%stick%area, found%contact%radius, found%contact%area_fit, &
+                 found%contact%radius_fit, found%contact%semi_major, found%contact%semi_minor, found%pressure_center, &
+                 found%stick%radius, found%stick%area_fit, found%stick%radius_fit, found%stick_center, found%stick_lower(1), &
+                 found%stick_upper(1), found%stick_lower(2), found%stick_upper(2), found%max_pressure, found%max_traction, &
+                 found%elastic_energy]
     end if
     call report(error, code, message)
-  end subroutine energy_of_state
+  end subroutine measures_of_state
 
-  !> Center and bounds of a zone.
-  subroutine extent_of_zone(n_col, n_row, x, y, zone, center, lower, upper)
-    !> Number of columns and rows
-    integer(c_int), intent(in) :: n_col, n_row
-    !> Coordinates [m]
-    real(c_double), intent(in) :: x(n_col, n_row), y(n_col, n_row)
-    !> Zone
-    integer(c_int), intent(in) :: zone(n_col, n_row)
-    !> Center of area, smallest and largest x and y; NaN if there are no nodes [m]
-    real(c_double), intent(out) :: center(2), lower(2), upper(2)
-    call zone_extent(x, y, zone /= 0, center, lower, upper)
-  end subroutine extent_of_zone
+  !> Compute the strain of a bulk stress.
+  subroutine strain_of_bulk(moduli, plane_strain, stress, whole_stress, strain)
+    !> Young's modulus [Pa] and Poisson's ratio
+    real(c_double), intent(in) :: moduli(2)
+    !> 0: free sides; 1, 2: no strain along x, along y
+    integer(c_int), intent(in) :: plane_strain
+    !> xx, yy, xy [Pa]
+    real(c_double), intent(in) :: stress(3)
+    !> The same with the stress of the direction without strain [Pa], and the strain
+    real(c_double), intent(out) :: whole_stress(3), strain(3)
+    whole_stress = stress
+    call find_bulk_strain(material_t(moduli(1), moduli(2)), plane_strain, whole_stress, strain)
+  end subroutine strain_of_bulk
 
-  !> An ellipse as numbers.
+  !> Find the steps at which a quantity turns back.
+  subroutine turns_of_history(n, values, turns)
+    !> Number of steps
+    integer(c_int), intent(in) :: n
+    !> Values of the steps
+    real(c_double), intent(in) :: values(n)
+    !> Not zero at the steps
+    integer(c_int), intent(out) :: turns(n)
+    turns = 0
+    turns(turning_points(values)) = 1
+  end subroutine turns_of_history
+
+  !> Find the cycles of a load over its motion.
+  subroutine cycles_of_history(n, motion, load, n_cycle, cycles, areas)
+    !> Number of steps
+    integer(c_int), intent(in) :: n
+    !> Values of the steps [m, N or rad, N m]
+    real(c_double), intent(in) :: motion(n), load(n)
+    !> Number of cycles
+    integer(c_int), intent(out) :: n_cycle
+    !> First and last step of each, counted from 1
+    integer(c_int), intent(out) :: cycles(2, n)
+    !> Area of its loop [J]
+    real(c_double), intent(out) :: areas(n)
+    integer, allocatable :: first(:), last(:)
+    integer :: k
+
+    cycles = 0
+    areas = 0.0_c_double
+    call find_cycles(motion, load, first, last)
+    n_cycle = size(first)
+    do k = 1, n_cycle
+      cycles(:, k) = [first(k), last(k)]
+      areas(k) = loop_area(motion(first(k):last(k)), load(first(k):last(k)))
+    end do
+  end subroutine cycles_of_history
+
+  !> Return an ellipse as numbers.
   pure function numbers_of(ellipse) result(numbers)
     type(ellipse_t), intent(in) :: ellipse
     real(c_double) :: numbers(5)

@@ -6,7 +6,8 @@ module hc_f2py_normal
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, kernel_cache
+  use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, normal_law_of, &
+    kernel_cache
   use hc_lattice, only: new_lattice, equilateral_basis
   use hc_elastic_pair, only: material_t, elastic_pair_t, new_elastic_pair
   use hc_flexibility, only: check_operator, along_x, along_y
@@ -27,12 +28,12 @@ module hc_f2py_normal
 
   !> The method of explicit matrices and LAPACK; any other number means FFT.
   integer, parameter :: direct = 0
-  !> Bytes of its fields over the nodes; matrices are asked for where they are made
+  !> Bytes of its fields over the nodes; matrices are checked where they are allocated
   integer(c_int64_t), parameter :: dense_fields = 500
 
 contains
 
-  !> Basis vectors of the equilateral lattice, as columns.
+  !> Return the basis vectors of the equilateral lattice, as columns.
   subroutine lattice_basis(spacing, basis)
     !> Length of a side [m]
     real(c_double), intent(in) :: spacing
@@ -41,7 +42,7 @@ contains
     basis = equilateral_basis(spacing)
   end subroutine lattice_basis
 
-  !> Compliance constants of two bodies.
+  !> Compute the compliance constants of two bodies.
   subroutine elastic_constants(young_modulus, poisson_ratio, rigid, lambda, code, message)
     !> Young's moduli [Pa]
     real(c_double), intent(in) :: young_modulus(2)
@@ -63,7 +64,7 @@ contains
     call report(error, code, message)
   end subroutine elastic_constants
 
-  !> Bytes that a frictionless problem, or an operator, takes.
+  !> Count the bytes that a frictionless problem, or an operator, takes.
   subroutine memory_needed(method, extent, n_contact, operator_only, n_threads, bytes)
     !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
@@ -89,7 +90,7 @@ contains
     end if
   end subroutine memory_needed
 
-  !> A flexibility operator over a window.
+  !> Create a flexibility operator over a window.
   subroutine create_operator(method, basis, extent, lambda, n_threads, handle, code, message)
     !> 0: direct summation, else FFT
     integer(c_int), intent(in) :: method
@@ -136,7 +137,7 @@ contains
     call report(error, code, message)
   end subroutine create_operator
 
-  !> Relative displacements of given tractions.
+  !> Compute the relative displacements of given tractions.
   subroutine apply_operator(handle, n_node, traction, displacement, code, message)
     !f2py threadsafe
     !> Handle of the operator
@@ -172,9 +173,9 @@ contains
     call report(error, code, message)
   end subroutine apply_operator
 
-  !> A frictionless contact problem.
-  subroutine create_normal_contact(method, basis, first, extent, lambda, n_node, initial_gap, candidate, n_threads, &
-                                   handle, code, message)
+  !> Create a frictionless contact problem.
+  subroutine create_normal_contact(method, basis, first, extent, lambda, n_node, initial_gap, candidate, interface, &
+                                   n_threads, handle, code, message)
     !> 0: direct (LAPACK), else FFT
     integer(c_int), intent(in) :: method
     !> Basis vectors as columns [m]
@@ -189,6 +190,9 @@ contains
     real(c_double), intent(in) :: initial_gap(n_node)
     !> Not zero where a node may come into contact
     integer(c_int), intent(in) :: candidate(n_node)
+    !> Coefficient [Pa/m^m] and exponent m of the normal compliance, both 0: bodies do not penetrate; tangential stiffness
+    !> [Pa/m], 0: no springs
+    real(c_double), intent(in) :: interface(3)
     !> Threads to use; 0: as many as OpenMP would take
     integer(c_int), intent(in) :: n_threads
     !> Handle of the problem
@@ -216,12 +220,13 @@ contains
         allocate (dense)
         slot%solver => dense
         call new_direct_contact(dense, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
-                                reshape(candidate /= 0, extent), error)
+                                reshape(candidate /= 0, extent), error, law=normal_law_of(interface))
       else
         allocate (fft)
         slot%solver => fft
         call new_normal_contact(fft, slot%lattice, pair_of(lambda), reshape(initial_gap, extent), &
-                                reshape(candidate /= 0, extent), error, n_threads, kernel_cache)
+                                reshape(candidate /= 0, extent), error, n_threads, kernel_cache, &
+                                law=normal_law_of(interface))
       end if
     end if
     if (allocated(error)) call free_slot(handle)
@@ -302,7 +307,7 @@ contains
     call report(error, code, message)
   end subroutine solve_normal_contact
 
-  !> Free what a handle stands for; a stale handle is ignored.
+  !> Free the object of a handle; a stale handle is ignored.
   subroutine free_handle(handle)
     !> Handle of an operator or a problem
     integer(c_int64_t), intent(in) :: handle

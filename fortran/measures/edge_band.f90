@@ -1,8 +1,11 @@
 !> The nodes about the edge of a zone, in one list, and operations on values at them.
 !>
 !> Values at the nodes of a band are vectors. Where only some of them are known, a mask goes with them.
+!>
+!> Theory: docs/theory/edges.md.
 module hc_edge_band
   use hc_precision, only: wp
+  use hc_options, only: edge_options_t
   use hc_lattice, only: equilateral_basis, neighbors
   use hc_zone_estimators, only: is_boundary
   implicit none
@@ -12,18 +15,15 @@ module hc_edge_band
 
   !> Number of neighbors of a node.
   integer, parameter :: n_beside = size(neighbors, 2)
-  !> Steps over which nodes next to the edge get a slope from nodes that have one.
-  integer, parameter :: far = 3
-  !> Nodes outside the window that places are looked up for.
-  integer, parameter :: margin = far + 2
-
   !> Nodes about an edge.
   type :: edge_band_t
     !> Number of nodes
     integer :: n = 0
+    !> Steps over which nodes next to the edge get values from nodes that have one
+    integer, private :: reach = 0
     !> Column and row of each in the window, counted from 1; they may lie outside it (2, n)
     integer, allocatable :: node(:, :)
-    !> Number in the list of each node of the window and `margin` nodes about it; 0: it is not in the band
+    !> Number in the list of each node of the window and `reach` + 2 nodes about it; 0: it is not in the band
     integer, allocatable :: place(:, :)
     !> Numbers in the list of the six neighbors; 0: they are not in the band (6, n)
     integer, allocatable :: beside(:, :)
@@ -44,7 +44,7 @@ module hc_edge_band
 
 contains
 
-  !> Position of the six neighbors, in spacings.
+  !> Return the positions of the six neighbors, in spacings.
   pure function to_neighbors() result(to)
     !> x and y of each (2, 6)
     real(wp) :: to(2, n_beside)
@@ -57,14 +57,18 @@ contains
     end associate
   end function to_neighbors
 
-  !> The band about the edge of a zone: nodes at most `far` + 1 steps from the boundary nodes.
-  pure subroutine new_edge_band(band, zone)
+  !> Find the band about the edge of a zone: nodes at most `reach` + 1 steps from the boundary nodes.
+  pure subroutine new_edge_band(band, zone, options)
     !> Band to be set up
     type(edge_band_t), intent(out) :: band
     !> Nodes of the zone (n_col, n_row)
     logical, intent(in) :: zone(:, :)
-    integer :: col, row, k, step, last
+    !> Tuning numbers
+    type(edge_options_t), intent(in) :: options
+    integer :: col, row, k, step, last, margin
 
+    band%reach = options%reach
+    margin = band%reach + 2
     allocate (band%place(1 - margin:size(zone, 1) + margin, 1 - margin:size(zone, 2) + margin), source=0)
     allocate (band%node(2, 2*sum(shape(zone))))
     do row = 1, size(zone, 2)
@@ -75,7 +79,7 @@ contains
       end do
     end do
     last = 0
-    do step = 1, far + 1
+    do step = 1, band%reach + 1
       associate (first => last + 1)
         last = band%n
         do k = first, last
@@ -126,7 +130,7 @@ contains
     band%place(node(1), node(2)) = band%n
   end subroutine append
 
-  !> Values of a field at the nodes of a band; 0 outside the window.
+  !> Return the values of a field at the nodes of a band; 0 outside the window.
   pure function values_of(self, field) result(values)
     class(edge_band_t), intent(in) :: self
     !> Field over the window (n_col, n_row)
@@ -142,7 +146,7 @@ contains
     end do
   end function values_of
 
-  !> Which nodes of a band are in a zone; those outside the window are not.
+  !> Return which nodes of a band are in a zone; those outside the window are not.
   pure function part_of(self, zone) result(part)
     class(edge_band_t), intent(in) :: self
     !> Nodes of the zone (n_col, n_row)
@@ -158,7 +162,7 @@ contains
     end do
   end function part_of
 
-  !> Nodes of a part of a band whose neighbors are in it, too.
+  !> Find the nodes of a part of a band whose neighbors are in it, too.
   pure function surrounded(self, part) result(whole)
     class(edge_band_t), intent(in) :: self
     !> Nodes of the part
@@ -172,7 +176,7 @@ contains
     end do
   end function surrounded
 
-  !> Nodes of a band that have a neighbor in a part of it.
+  !> Find the nodes of a band that have a neighbor in a part of it.
   pure function next_to(self, part) result(beside)
     class(edge_band_t), intent(in) :: self
     !> Nodes of the part
@@ -187,7 +191,7 @@ contains
     end do
   end function next_to
 
-  !> Gradient of values along x and y, per spacing: the mean slope along the three lines of nodes.
+  !> Compute the gradient of values along x and y, per spacing: the mean slope along the three lines of nodes.
   pure function gradient(self, values, part) result(slopes)
     class(edge_band_t), intent(in) :: self
     !> Values at the nodes
@@ -214,7 +218,7 @@ contains
     logical :: had(self%n), beside_has(n_beside)
     integer :: k, step
 
-    do step = 1, far
+    do step = 1, self%reach
       had = known
       do k = 1, self%n
         if (had(k)) cycle

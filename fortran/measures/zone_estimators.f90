@@ -7,6 +7,7 @@
 module hc_zone_estimators
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi
+  use hc_options, only: edge_options_t
   use hc_error, only: error_t, status, raise
   use hc_lapack, only: eliminate, least_squares
   use hc_lattice, only: neighbors
@@ -14,11 +15,9 @@ module hc_zone_estimators
   private
 
   public :: circle_fit_t, ellipse_t
-  public :: boundary, is_boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, edge_ellipse
+  public :: boundary, is_boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, edge_ellipse, &
+    ellipse_of_moments
 
-  !> Distances from the edge, in spacings, between which the pressure is fitted: the outermost nodes carry most of the
-  !> discretization error, and far inside the polynomial is no good approximation of other contacts.
-  real(wp), parameter :: outer_ring = 1.0_wp, inner_ring = 6.0_wp
   !> Cell area of the equilateral lattice over the square of the spacing.
   real(wp), parameter :: unit_cell = sqrt(0.75_wp)
 
@@ -46,7 +45,7 @@ module hc_zone_estimators
 
 contains
 
-  !> Nodes of a zone that have a neighbor outside it, or outside the window.
+  !> Find the nodes of a zone that have a neighbor outside it, or outside the window.
   pure function boundary(zone) result(rim)
     !> Nodes of the zone
     logical, intent(in) :: zone(:, :)
@@ -61,7 +60,7 @@ contains
     end do
   end function boundary
 
-  !> Does a node of a zone have a neighbor outside it, or outside the window?
+  !> Return whether a node of a zone has a neighbor outside it, or outside the window.
   pure logical function is_boundary(zone, col, row)
     !> Nodes of the zone
     logical, intent(in) :: zone(:, :)
@@ -76,7 +75,7 @@ contains
     end do
   end function is_boundary
 
-  !> Circle through the boundary nodes of a zone, equations (9.1)-(9.4).
+  !> Fit a circle through the boundary nodes of a zone, equations (9.1)-(9.4).
   pure type(circle_fit_t) function boundary_circle(x, y, zone, spacing, center) result(fit)
     !> Coordinates of the nodes [m]
     real(wp), intent(in) :: x(:, :), y(:, :)
@@ -99,7 +98,7 @@ contains
     fit%standard_deviation = sqrt(sum(radii**2)/fit%count)
   end function boundary_circle
 
-  !> Radius of the circle with as much area as the cells of some nodes [m].
+  !> Compute the radius of the circle with as much area as the cells of some nodes [m].
   elemental real(wp) function area_radius(n_node, cell_area)
     !> Number of nodes
     integer, intent(in) :: n_node
@@ -109,7 +108,7 @@ contains
     area_radius = sqrt(n_node*cell_area/pi)
   end function area_radius
 
-  !> Radius at which the pressure vanishes, to a fraction of the spacing [m]; NaN if there are too few nodes.
+  !> Find the radius at which the pressure vanishes, to a fraction of the spacing [m]; NaN if there are too few nodes.
   !>
   !> Near the edge p^2 is linear in r^2, since p grows like the square root of the distance. A straight line through the
   !> nodes with a_A - 6 l_e <= r <= a_A - l_e gives the zero; a_A is the area-equivalent radius.
@@ -122,13 +121,14 @@ contains
     real(wp), intent(in) :: spacing
     !> Center of the contact [m]
     real(wp), intent(in) :: center(2)
+    type(edge_options_t) :: options
     real(wp), allocatable :: distance(:), square(:)
     real(wp) :: around, inner, outer, slope, start
 
     edge_radius = ieee_value(1.0_wp, ieee_quiet_nan)
     around = area_radius(count(pressure > 0.0_wp), unit_cell*spacing**2)
-    inner = max(around - inner_ring*spacing, 0.0_wp)
-    outer = around - outer_ring*spacing
+    inner = max(around - options%inner_ring*spacing, 0.0_wp)
+    outer = around - options%outer_ring*spacing
     if (outer <= 0.0_wp) return
     associate (r2 => (x - center(1))**2 + (y - center(2))**2)
       associate (near => pressure > 0.0_wp .and. r2 >= inner**2 .and. r2 <= outer**2)
@@ -146,7 +146,7 @@ contains
     if (start > 0.0_wp) edge_radius = sqrt(-start/slope)*around
   end function edge_radius
 
-  !> Centroid of a pressure [m]; NaN if there is none.
+  !> Compute the centroid of a pressure [m]; NaN if there is none.
   pure function pressure_center(x, y, pressure) result(center)
     !> Coordinates of the nodes [m]
     real(wp), intent(in) :: x(:, :), y(:, :)
@@ -159,29 +159,41 @@ contains
     if (total > 0.0_wp) center = [sum(pressure*x), sum(pressure*y)]/total
   end function pressure_center
 
-  !> Ellipse with the second moments of the nodes of a zone: a uniform ellipse has the variance a^2/4 along a.
+  !> Find the ellipse with the second moments of the nodes of a zone: a uniform ellipse has the variance a^2/4 along a.
   pure type(ellipse_t) function moment_ellipse(x, y, zone) result(ellipse)
     !> Coordinates of the nodes [m]
     real(wp), intent(in) :: x(:, :), y(:, :)
     !> Nodes of the zone; not empty
     logical, intent(in) :: zone(:, :)
     real(wp), allocatable :: along(:), across(:)
-    real(wp) :: variance(2)
 
     allocate (along, source=pack(x, zone))
     allocate (across, source=pack(y, zone))
     associate (n => size(along))
       if (n == 0) return
-      ellipse%center = [sum(along), sum(across)]/n
-      along = along - ellipse%center(1)
-      across = across - ellipse%center(2)
-      call principal_axes(sum(along**2)/n, sum(along*across)/n, sum(across**2)/n, variance, ellipse%angle)
+      associate (center => [sum(along), sum(across)]/n)
+        along = along - center(1)
+        across = across - center(2)
+        ellipse = ellipse_of_moments(center, sum(along**2)/n, sum(along*across)/n, sum(across**2)/n)
+      end associate
     end associate
-    ellipse%semi_major = 2.0_wp*sqrt(max(variance(1), 0.0_wp))
-    ellipse%semi_minor = 2.0_wp*sqrt(max(variance(2), 0.0_wp))
   end function moment_ellipse
 
-  !> Ellipse on which the pressure vanishes, to a fraction of the spacing.
+  !> Find the ellipse with the second moments of an area, each over the area and about its center.
+  pure type(ellipse_t) function ellipse_of_moments(center, xx, xy, yy) result(ellipse)
+    !> Center of area [m]
+    real(wp), intent(in) :: center(2)
+    !> Moments [m^2]
+    real(wp), intent(in) :: xx, xy, yy
+    real(wp) :: variance(2)
+
+    ellipse%center = center
+    call principal_axes(xx, xy, yy, variance, ellipse%angle)
+    ellipse%semi_major = 2.0_wp*sqrt(max(variance(1), 0.0_wp))
+    ellipse%semi_minor = 2.0_wp*sqrt(max(variance(2), 0.0_wp))
+  end function ellipse_of_moments
+
+  !> Find the ellipse on which the pressure vanishes, to a fraction of the spacing.
   !>
   !> The square of the pressure is a quadratic polynomial near the edge. It is fitted to the nodes between 1 - 6 l_e/b
   !> and 1 - l_e/b of the way from the center to the moment ellipse with the minor semi-axis b.
@@ -196,6 +208,7 @@ contains
     type(ellipse_t), intent(out) :: ellipse
     !> Allocated if there are fewer than six nodes to fit, or the fit is no ellipse
     type(error_t), allocatable, intent(out) :: error
+    type(edge_options_t) :: options
     type(ellipse_t) :: around
     real(wp), allocatable :: u(:), v(:), square(:), terms(:, :)
     logical, allocatable :: near(:)
@@ -210,7 +223,7 @@ contains
       v = pack(y, pressure > 0.0_wp) - around%center(2)
       terms = reshape([turn(1, 1)*u + turn(1, 2)*v, turn(2, 1)*u + turn(2, 2)*v], [size(u), 2])
       associate (way => norm2(terms, dim=2), ring => spacing/around%semi_minor)
-        near = way >= 1.0_wp - inner_ring*ring .and. way <= 1.0_wp - outer_ring*ring
+        near = way >= 1.0_wp - options%inner_ring*ring .and. way <= 1.0_wp - options%outer_ring*ring
       end associate
     else
       allocate (near(0), terms(0, 2), square(0))
@@ -243,7 +256,7 @@ contains
     ellipse%center = around%center + middle(:, 1)
   end subroutine edge_ellipse
 
-  !> Eigenvalues of a symmetric matrix, the larger one first, and the direction of its axis in (-pi/2, pi/2] [rad].
+  !> Compute the eigenvalues of a symmetric matrix, the larger one first, and the direction of its axis in (-pi/2, pi/2] [rad].
   pure subroutine principal_axes(xx, xy, yy, values, angle)
     !> Elements of the matrix
     real(wp), intent(in) :: xx, xy, yy

@@ -1,0 +1,393 @@
+!> Laws of Coulomb's type: the tractions that they allow are a disc, or the ellipse that a stretch of the plane makes of one.
+!>
+!> Over a load step a node in contact either sticks, ds = 0 and |q| < b(p), or
+!> slips, |q| = b(p) and ds = -kappa q with kappa >= 0. Both are one equation,
+!>
+!>     q = P(q - r ds),
+!>
+!> with P the projection on the disc of radius b(p), for any r > 0. With
+!> d = q - r ds a node with |d| > b(p) slips along e = d/|d|; a step of Newton's
+!> method for it leaves one unknown, tau in q = b(p) e + tau t with t normal to e, and
+!>
+!>     t.ds + D tau = 0,     D = (|d| - b(p))/(r b(p)),
+!>
+!> where D tends to |ds|/b(p) (P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991, 353-375). The direction of
+!> slip is thus that of -ds, and it converges quadratically.
+!>
+!> Where the set is an ellipse, A^-1 q and A ds obey the law of the disc with the stretch A, because ds.q stays as it is; its
+!> direction e and compliance D become the normal n ~ A^-1 e of the ellipse and D/|A^-1 e|^2 across it.
+!>
+!> Passes over one row of nodes are written so that the compiler takes several nodes at a time: lengths of vectors are
+!> roots of sums of squares there, and pressures have to come in a unit of their own size.
+!>
+!> Equations: docs/theory/friction.md, (F3), (F6), (F15).
+module hc_disc_law
+  use hc_precision, only: wp
+  use hc_friction_law, only: friction_law_t
+  use hc_contact_state, only: separated, stick, slip
+  implicit none
+  private
+
+  public :: disc_law_t, linearize, on_cone, normal_to, magnitude, residual_row, zone_row, cone_row
+
+  !> Squares below this count as nothing
+  real(wp), parameter :: nothing = 1.0e-200_wp
+  !> Smallest bound of the traction that counts in D, relative to the largest
+  real(wp), parameter :: smallest_bound = 1.0e-12_wp
+
+  !> A law whose admissible tractions are a disc or an ellipse; its extensions say how large.
+  type, abstract, extends(friction_law_t) :: disc_law_t
+  contains
+    !> Compute the radius of the disc of each node
+    procedure(disc), deferred :: find_disc
+    !> Compute the largest radius over the largest pressure
+    procedure(disc_strength), deferred :: strength_of_disc
+    !> Return the squares of the smallest and of the largest stretch
+    procedure :: stretches
+    procedure :: strength, find_zones, project, violation
+    procedure :: linearize => linearize_row
+  end type disc_law_t
+
+  abstract interface
+    !> Compute the radius of the disc of each node as slope times a pressure; where there is pressure, that one is above zero.
+    pure subroutine disc(self, first, p, slope, pressed)
+      import :: disc_law_t, wp
+      class(disc_law_t), intent(in) :: self
+      !> Number of the first node
+      integer, intent(in) :: first
+      !> Pressure [Pa]
+      real(wp), intent(in), contiguous :: p(:)
+      !> Radius over `pressed`
+      real(wp), intent(out) :: slope
+      !> Pressure that the radius is proportional to (n) [Pa]
+      real(wp), intent(out), contiguous :: pressed(:)
+    end subroutine disc
+
+    !> Compute the largest radius of all nodes over the largest pressure; infinite without slip.
+    pure real(wp) function disc_strength(self, p_max)
+      import :: disc_law_t, wp
+      class(disc_law_t), intent(in) :: self
+      !> Largest pressure of all nodes [Pa]
+      real(wp), intent(in) :: p_max
+    end function disc_strength
+  end interface
+
+contains
+
+  !> Return the squares of the smallest and of the largest stretch of the plane by A; 1 for a disc.
+  pure function stretches(self)
+    class(disc_law_t), intent(in) :: self
+    real(wp) :: stretches(2)
+
+    associate (disc => self)
+      stretches = 1.0_wp
+    end associate
+  end function stretches
+
+  !> Compute the largest traction over the largest pressure: the longer semi-axis of an ellipse.
+  pure real(wp) function strength(self, p_max)
+    class(disc_law_t), intent(in) :: self
+    real(wp), intent(in) :: p_max
+    real(wp) :: squares(2)
+
+    squares = self%stretches()
+    strength = self%strength_of_disc(p_max)*sqrt(squares(2))
+  end function strength
+
+  !> Classify the nodes of a row.
+  pure subroutine find_zones(self, first, unit, r, p, qx, qy, dsx, dsy, zone)
+    class(disc_law_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: unit, r
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
+    integer, intent(out), contiguous :: zone(:)
+    real(wp) :: slope, pressed(size(p))
+
+    call self%find_disc(first, p, slope, pressed)
+    if (self%is_isotropic()) then
+      call zone_row(size(p), unit, slope, r, pressed, qx, qy, dsx, dsy, zone)
+    else
+      associate (a => self%stretch())
+        associate (q => squeezed(a, qx, qy), ds => stretched(a, dsx, dsy))
+          call zone_row(size(p), unit, slope, r, pressed, q(:, 1), q(:, 2), ds(:, 1), ds(:, 2), zone)
+        end associate
+      end associate
+    end if
+  end subroutine find_zones
+
+  !> Project the tractions of a row on the disc, in the metric of the stretched plane.
+  pure subroutine project(self, first, unit, p, qx, qy, cut_x, cut_y)
+    class(disc_law_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: unit
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:)
+    real(wp), intent(out), contiguous :: cut_x(:), cut_y(:)
+    real(wp) :: slope, pressed(size(p))
+
+    call self%find_disc(first, p, slope, pressed)
+    if (self%is_isotropic()) then
+      call cone_row(size(p), unit, slope, pressed, qx, qy, cut_x, cut_y)
+    else
+      associate (a => self%stretch())
+        associate (q => squeezed(a, qx, qy))
+          call cone_row(size(p), unit, slope, pressed, q(:, 1), q(:, 2), cut_x, cut_y)
+        end associate
+        associate (cut => stretched(a, cut_x, cut_y))
+          cut_x = cut(:, 1)
+          cut_y = cut(:, 2)
+        end associate
+      end associate
+    end if
+  end subroutine project
+
+  !> Measure |q - P(q - A^2 ds/d_t)|, P the projection in the metric A^-2, in which an ellipse is a disc.
+  pure subroutine violation(self, first, unit, stiffness, p, qx, qy, dsx, dsy, largest, worst)
+    class(disc_law_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: unit, stiffness
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
+    real(wp), intent(inout) :: largest, worst
+    real(wp), allocatable :: cut(:, :), trial(:, :)
+    real(wp) :: slope, pressed(size(p))
+
+    if (self%is_isotropic()) then
+      call self%find_disc(first, p, slope, pressed)
+      call residual_row(size(p), unit, slope, stiffness, pressed, qx, qy, dsx, dsy, largest, worst)
+    else
+      allocate (cut(size(p), 2))
+      associate (a => self%stretch())
+        trial = stretched(a, dsx, dsy)
+        trial = stretched(a, trial(:, 1), trial(:, 2))
+      end associate
+      trial = reshape([qx, qy], shape(trial)) - stiffness*trial
+      call self%project(first, unit, p, trial(:, 1), trial(:, 2), cut(:, 1), cut(:, 2))
+      largest = max(largest, maxval(unit**2*(qx**2 + qy**2), mask=p > 0.0_wp))
+      worst = max(worst, maxval(unit**2*((qx - cut(:, 1))**2 + (qy - cut(:, 2))**2), mask=p > 0.0_wp))
+    end if
+  end subroutine violation
+
+  !> Linearise the law at the nodes of a row, those in contact.
+  pure subroutine linearize_row(self, first, p_max, r, in_contact, p, qx, qy, dsx, dsy, zone, direction, compliance)
+    class(disc_law_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: p_max, r
+    logical, intent(in), contiguous :: in_contact(:)
+    real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
+    integer, intent(out), contiguous :: zone(:)
+    real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
+    real(wp) :: bound(size(p)), squares(2), largest, length
+    real(wp), allocatable :: normal(:, :)
+    integer :: i
+
+    call self%find_bounds(first, p, bound)
+    largest = huge(1.0_wp)
+    if (self%is_bounded()) largest = self%strength_of_disc(p_max)*max(p_max, 0.0_wp)
+    if (self%is_isotropic()) then
+      call linearize_disc(bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
+      return
+    end if
+    squares = self%stretches()
+    associate (a => self%stretch())
+      associate (q => squeezed(a, qx, qy), ds => stretched(a, dsx, dsy))
+        ! r A^2 is nowhere above r, or the classification would be no contraction
+        call linearize_disc(bound, largest, r*squares(1), in_contact, q(:, 1), q(:, 2), ds(:, 1), ds(:, 2), &
+                            zone, direction, compliance)
+      end associate
+      normal = squeezed(a, direction(1, :), direction(2, :))
+    end associate
+    do i = 1, size(p)
+      if (zone(i) /= slip) cycle
+      length = norm2(normal(i, :))
+      direction(:, i) = normal(i, :)/length
+      compliance(i) = compliance(i)/length**2
+    end do
+  end subroutine linearize_row
+
+  !> Linearise the law of the disc at the nodes of a row.
+  pure subroutine linearize_disc(bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
+    !> Radius of each node, and the largest of all nodes [Pa]; parameter r [Pa/m]
+    real(wp), intent(in) :: bound(:), largest, r
+    !> Nodes in contact; the others are separated
+    logical, intent(in) :: in_contact(:)
+    !> Traction and slip of the step
+    real(wp), intent(in) :: qx(:), qy(:), dsx(:), dsy(:)
+    !> separated, stick or slip
+    integer, intent(out) :: zone(:)
+    !> Direction e (2, n) and compliance D (n) of the nodes that slip
+    real(wp), intent(out) :: direction(:, :), compliance(:)
+    integer :: i
+
+    do i = 1, size(bound)
+      if (in_contact(i)) then
+        call linearize([qx(i), qy(i)], [dsx(i), dsy(i)], bound(i), largest, r, zone(i), direction(:, i), compliance(i))
+      else
+        zone(i) = separated
+        direction(:, i) = [1.0_wp, 0.0_wp]
+        compliance(i) = 0.0_wp
+      end if
+    end do
+  end subroutine linearize_disc
+
+  !> Classify a node in contact, and linearise the law if it slips.
+  pure subroutine linearize(traction, slip_increment, bound, largest_bound, r, zone, direction, compliance)
+    !> Traction q [Pa] and change of the relative displacement ds [m] of the last iterate
+    real(wp), intent(in) :: traction(2), slip_increment(2)
+    !> Radius b(p) at the node and its largest value anywhere [Pa]
+    real(wp), intent(in) :: bound, largest_bound
+    !> Parameter r [Pa/m]
+    real(wp), intent(in) :: r
+    !> stick or slip
+    integer, intent(out) :: zone
+    !> Direction e of the traction in slip; (1, 0) in stick
+    real(wp), intent(out) :: direction(2)
+    !> Compliance D across that direction [m/Pa]; 0 in stick
+    real(wp), intent(out) :: compliance
+    real(wp) :: d(2), length, least
+
+    d = traction - r*slip_increment
+    length = magnitude(d)
+    least = smallest_bound*largest_bound
+    if (least <= 0.0_wp) least = smallest_bound*length  ! no pressure at all
+    if (length <= bound) then
+      zone = stick
+      direction = [1.0_wp, 0.0_wp]
+      compliance = 0.0_wp
+    else
+      zone = slip
+      direction = d/length
+      compliance = (length - bound)/(r*max(bound, least))
+    end if
+  end subroutine linearize
+
+  !> Project a traction on the disc of radius b(p).
+  pure function on_cone(traction, bound) result(projected)
+    !> Traction [Pa]
+    real(wp), intent(in) :: traction(2)
+    !> Radius b(p) [Pa]
+    real(wp), intent(in) :: bound
+    real(wp) :: projected(2), length
+
+    projected = traction
+    length = magnitude(traction)
+    if (length > bound) projected = traction*(bound/length)
+  end function on_cone
+
+  !> Compute the length of a vector: by squares where they neither overflow nor vanish, which is much faster than `hypot`.
+  pure real(wp) function magnitude(vector)
+    !> The vector
+    real(wp), intent(in) :: vector(2)
+    real(wp), parameter :: least = 1.0e-140_wp, largest = 1.0e140_wp
+    real(wp) :: longer
+
+    longer = max(abs(vector(1)), abs(vector(2)))
+    if (longer > least .and. longer < largest) then
+      magnitude = sqrt(vector(1)**2 + vector(2)**2)
+    else
+      magnitude = hypot(vector(1), vector(2))
+    end if
+  end function magnitude
+
+  !> Return the unit vector t, a quarter turn ahead of e.
+  pure function normal_to(direction) result(t)
+    !> Unit vector e
+    real(wp), intent(in) :: direction(2)
+    real(wp) :: t(2)
+    t = [-direction(2), direction(1)]
+  end function normal_to
+
+  !> Measure what the tractions of a row lack of the law, |q - P(q - ds/d_t)|, squared.
+  pure subroutine residual_row(n, unit, slope, stiffness, p, qx, qy, dsx, dsy, largest, worst)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of pressure; slope of the radius; inverse of d_t [Pa/m]
+    real(wp), intent(in) :: unit, slope, stiffness
+    !> Pressure, traction and slip of the step
+    real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
+    !> Squares of the largest traction and of what is lacking most, in the unit of pressure: those of the rows before,
+    !> and now of this one too
+    real(wp), intent(inout) :: largest, worst
+    real(wp) :: x, y, trial_x, trial_y, length, share
+    integer :: i
+
+    !$omp simd reduction(max: largest, worst) private(x, y, trial_x, trial_y, length, share)
+    do i = 1, n
+      x = unit*qx(i)
+      y = unit*qy(i)
+      trial_x = x - unit*stiffness*dsx(i)
+      trial_y = y - unit*stiffness*dsy(i)
+      length = sqrt(max(trial_x**2 + trial_y**2, nothing))
+      share = min(slope*max(unit*p(i), 0.0_wp)/length, 1.0_wp)
+      largest = max(largest, merge(x**2 + y**2, 0.0_wp, p(i) > 0.0_wp))
+      worst = max(worst, merge((x - share*trial_x)**2 + (y - share*trial_y)**2, 0.0_wp, p(i) > 0.0_wp))
+    end do
+  end subroutine residual_row
+
+  !> Classify the nodes of a row by |q - r ds|.
+  pure subroutine zone_row(n, unit, slope, r, p, qx, qy, dsx, dsy, zone)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of pressure; slope of the radius; classification parameter [Pa/m]
+    real(wp), intent(in) :: unit, slope, r
+    !> Pressure, traction and slip of the step
+    real(wp), intent(in) :: p(n), qx(n), qy(n), dsx(n), dsy(n)
+    !> separated, stick or slip
+    integer, intent(out) :: zone(n)
+    real(wp) :: x, y
+    integer :: i
+
+    !$omp simd private(x, y)
+    do i = 1, n
+      x = unit*(qx(i) - r*dsx(i))
+      y = unit*(qy(i) - r*dsy(i))
+      zone(i) = merge(stick, slip, x**2 + y**2 <= (slope*unit*p(i))**2)
+      zone(i) = merge(zone(i), separated, p(i) > 0.0_wp)
+    end do
+  end subroutine zone_row
+
+  !> Project the tractions of a row on the disc; zero where there is no pressure.
+  pure subroutine cone_row(n, unit, slope, p, qx, qy, cut_x, cut_y)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of pressure; slope of the radius
+    real(wp), intent(in) :: unit, slope
+    !> Pressure and traction
+    real(wp), intent(in) :: p(n), qx(n), qy(n)
+    !> What is left of the traction
+    real(wp), intent(out) :: cut_x(n), cut_y(n)
+    real(wp) :: length, share
+    integer :: i
+
+    !$omp simd private(length, share)
+    do i = 1, n
+      length = sqrt(max((unit*qx(i))**2 + (unit*qy(i))**2, nothing))
+      share = merge(min(slope*max(unit*p(i), 0.0_wp)/length, 1.0_wp), 0.0_wp, p(i) > 0.0_wp)
+      cut_x(i) = share*qx(i)
+      cut_y(i) = share*qy(i)
+    end do
+  end subroutine cone_row
+
+  !> Compute A v.
+  pure function stretched(a, x, y) result(vector)
+    !> The matrix A
+    real(wp), intent(in) :: a(2, 2)
+    !> Components of v
+    real(wp), intent(in) :: x(:), y(:)
+    real(wp) :: vector(size(x), 2)
+
+    vector(:, 1) = a(1, 1)*x + a(1, 2)*y
+    vector(:, 2) = a(2, 1)*x + a(2, 2)*y
+  end function stretched
+
+  !> Compute A^-1 v; the determinant of A is 1.
+  pure function squeezed(a, x, y) result(vector)
+    !> The matrix A
+    real(wp), intent(in) :: a(2, 2)
+    !> Components of v
+    real(wp), intent(in) :: x(:), y(:)
+    real(wp) :: vector(size(x), 2)
+
+    vector(:, 1) = a(2, 2)*x - a(1, 2)*y
+    vector(:, 2) = a(1, 1)*y - a(2, 1)*x
+  end function squeezed
+
+end module hc_disc_law

@@ -1,0 +1,102 @@
+!> The start of an iteration for frictionless contact.
+!>
+!> Equations: docs/theory/normal_contact.md, (N2), (N6).
+module hc_normal_start
+  use hc_precision, only: wp, sp
+  use hc_error, only: error_t, status, raise
+  use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_iterate, only: normal_iterate_t, find_span, rescale, linearize_law, advance
+  implicit none
+  private
+
+  public :: set_start
+
+  !> Steps of Newton's method for the size of a pressure of which only the shape is known, under a compliant law.
+  integer, parameter :: start_steps = 8
+
+contains
+
+  !> Set the pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
+  subroutine set_start(level, now, by_load, target, candidate, start, error)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(inout) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(inout) :: now
+    !> The normal load is prescribed, not the approach
+    logical, intent(in) :: by_load
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> Pressure to start from, up to a factor (n_col, n_row)
+    real(wp), intent(in) :: start(:, :)
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: scale, largest
+    integer :: n(2), row, stat, try
+    logical :: known
+
+    n = level%lattice%extent
+    stat = 0
+    if (allocated(now%w)) then
+      if (any(shape(now%w) /= n)) deallocate (now%w, now%r, now%z, now%d, now%kd, now%active, now%span)
+    end if
+    if (allocated(now%punch)) deallocate (now%punch)
+    if (allocated(now%compliance)) deallocate (now%compliance, now%offset)
+    if (allocated(now%p)) deallocate (now%p)
+    if (.not. allocated(now%w)) then
+      allocate (now%w(n(1), n(2)), now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
+                now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
+    end if
+    if (stat == 0) allocate (now%p(n(1), n(2)), stat=stat)
+    if (stat == 0 .and. level%law%is_compliant()) then
+      allocate (now%compliance(n(1), n(2)), now%offset(n(1), n(2)), source=0.0_wp, stat=stat)
+    end if
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
+      return
+    end if
+    known = any(start > 0.0_wp .and. candidate)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, n(2)
+      now%active(:, row) = candidate(:, row)
+      if (known) now%active(:, row) = candidate(:, row) .and. start(:, row) > 0.0_wp
+      now%p(:, row) = 1.0_wp
+      if (known) now%p(:, row) = start(:, row)
+      now%p(:, row) = merge(now%p(:, row), 0.0_wp, now%active(:, row))
+      now%w(:, row) = 0.0_wp
+      now%r(:, row, 1) = 0.0_sp
+    end do
+    !$omp end parallel do
+    now%n_active = level%space%count(now%active)
+    largest = level%space%max(now%p)
+    now%approach = target
+    now%closing_error = 0.0_wp
+    scale = 1.0_wp
+    if (by_load) scale = target/(level%lattice%cell_area()*level%space%sum(now%p))
+    now%span(1, :) = n(1) + 1
+    now%span(2, :) = 0
+    call find_span(now, level%space)
+    now%p_unit = scale*largest
+    now%w_unit = now%p_unit*level%preconditioner%unit
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, n(2)
+      now%d(:, row, 1) = real(now%p(:, row)/largest, sp)
+      now%p(:, row) = 0.0_wp
+    end do
+    !$omp end parallel do
+    call level%multiply(now%d, now%kd)
+    call advance(level, now, 1.0_wp)
+    do try = 1, merge(start_steps, 0, allocated(now%offset))
+      call linearize_law(level, now, 0.0_wp)
+      if (by_load) exit
+      call rescale(level, now)
+    end do
+    if (.not. by_load) then
+      call rescale(level, now)
+      now%p_unit = level%space%max(now%p)
+      now%w_unit = now%p_unit*level%preconditioner%unit
+    end if
+  end subroutine set_start
+
+end module hc_normal_start

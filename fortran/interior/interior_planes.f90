@@ -1,0 +1,242 @@
+!> Stress or displacement at the nodes of planes parallel to the surface, by zero-padded convolution.
+!>
+!> At one depth the stress is a sum over lattice offsets with fifteen tables: six components of three loads less the
+!> three that are equal by reciprocity, zz of q_a = az of p and xz of q_y = yz of q_x; the displacement is one with eight,
+!> since x of q_y = y of q_x. However slowly they decay, the padded sum is exact.
+!>
+!> Equations: docs/theory/interior.md, (I11).
+module hc_interior_planes
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t, check_lattice
+  use hc_field_space, only: field_space_t, space_over
+  use hc_interior_fields, only: n_derivative, stresses, displacements, check_interior, xx, yy, zz, xy, yz, xz
+  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
+  use hc_interior_points, only: check_body
+  use hc_fftw, only: good_size
+  use hc_fft_layout, only: convolution_memory, transform_memory
+  use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
+  use hc_spectrum, only: new_depth_key, of_stress, of_displacement
+  use hc_spectrum_cache, only: kernel_cache_t
+  implicit none
+  private
+
+  public :: interior_planes_t, new_interior_planes, planes_memory
+
+  !> The tables of a quantity.
+  type :: tables_t
+    !> Kind of their spectra, number of components, and the first odd table
+    integer :: kind = of_stress, n_component = 6, first_odd = 8
+    !> Component and load of each table
+    integer, allocatable :: component(:), load(:)
+    !> Table of a component by each load
+    integer, allocatable :: table(:, :)
+    !> Sign of each table under x -> -x, which equilateral lattices have as a symmetry
+    real(wp), allocatable :: mirror(:)
+    !> Components that change their sign in body 2, whose frame is mirrored
+    integer, allocatable :: turned(:)
+  end type tables_t
+
+  !> Planes of a window at any depth.
+  type :: interior_planes_t
+    private
+    type(lattice_t) :: lattice
+    type(interior_pyramid_t) :: pyramid
+    type(convolution_t) :: convolution
+    type(tables_t) :: tables
+    integer :: body = 1
+    real(wp) :: poisson_ratio = 0.0_wp
+    !> Tractions in the frame of the body
+    real(wp), allocatable :: loads(:, :, :)
+  contains
+    !> Take the tables of a depth
+    procedure :: set_depth
+    !> Stress or displacement at the nodes of the plane
+    procedure :: apply
+  end type interior_planes_t
+
+  !> The tables at one depth.
+  type, extends(kernel_source_t) :: plane_tables_t
+    type(interior_pyramid_t) :: pyramid
+    type(tables_t) :: tables
+    real(wp) :: basis(2, 2) = 0.0_wp
+    !> Depth over the longest edge
+    real(wp) :: depth = 0.0_wp
+    real(wp) :: poisson_ratio = 0.0_wp
+    !> x -> -x maps the lattice to itself, column i of row j to -i - j
+    logical :: mirrored = .false.
+  contains
+    procedure :: row => table_row
+  end type plane_tables_t
+
+contains
+
+  !> The tables of the stress, or of the displacement.
+  pure type(tables_t) function tables_of(displaced)
+    !> Of the displacement
+    logical, intent(in) :: displaced
+
+    if (displaced) then
+      tables_of%kind = of_displacement
+      tables_of%n_component = 3
+      tables_of%first_odd = 5
+      tables_of%component = [3, 1, 2, 2, 1, 2, 3, 3]
+      tables_of%load = [1, 2, 2, 3, 1, 1, 2, 3]
+      tables_of%table = reshape([5, 6, 1, 2, 3, 7, 3, 4, 8], [3, 3])
+      tables_of%mirror = real([1, 1, -1, 1, -1, 1, -1, 1], wp)
+      tables_of%turned = [3]
+    else
+      tables_of%component = [xx, yy, zz, xy, xz, yz, yz, xz, yz, xx, yy, xy, xx, yy, xy]
+      tables_of%load = [1, 1, 1, 1, 2, 2, 3, 1, 1, 2, 2, 2, 3, 3, 3]
+      tables_of%table = reshape([1, 2, 3, 4, 9, 8, 10, 11, 8, 12, 6, 5, 13, 14, 9, 15, 7, 6], [6, 3])
+      tables_of%mirror = real([1, 1, 1, -1, 1, -1, 1, -1, 1, -1, -1, 1, 1, 1, -1], wp)
+      tables_of%turned = [yz, xz]
+    end if
+  end function tables_of
+
+  !> Plans and scratch space.
+  subroutine new_interior_planes(planes, lattice, body, poisson_ratio, error, space, displaced)
+    !> Planes to be set up
+    type(interior_planes_t), intent(out) :: planes
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Number of the body, 1 or 2, and its Poisson's ratio
+    integer, intent(in) :: body
+    real(wp), intent(in) :: poisson_ratio
+    !> Allocated on failure: a lattice of no use, no such body or material, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Who shares the work; absent: as many threads as OpenMP would take
+    type(field_space_t), intent(in), optional :: space
+    !> The displacement is wanted, not the stress
+    logical, intent(in), optional :: displaced
+
+    type(field_space_t) :: shared
+    integer :: stat
+
+    call check_lattice(lattice, error)
+    if (.not. allocated(error)) call check_body(body, error)
+    if (.not. allocated(error)) call check_interior([0.0_wp], [0.0_wp], [0.0_wp], poisson_ratio, error)
+    if (allocated(error)) return
+    shared = space_over(lattice%extent)
+    if (present(space)) shared = space
+    planes%tables = tables_of(.false.)
+    if (present(displaced)) planes%tables = tables_of(displaced)
+    planes%lattice = lattice
+    planes%body = body
+    planes%poisson_ratio = poisson_ratio
+    call new_interior_pyramid(planes%pyramid, lattice%unit_basis())
+    allocate (planes%loads(lattice%extent(1), lattice%extent(2), 3), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the stress: use a smaller window')
+      return
+    end if
+    call new_convolution(planes%convolution, lattice%extent, good_size(2*lattice%extent - 1), &
+                         size(planes%tables%load), max(planes%tables%n_component, 3), shared, error, &
+                         first_odd=planes%tables%first_odd)
+  end subroutine new_interior_planes
+
+  !> Bytes that planes take, the setting up of their tables included.
+  pure integer(selected_int_kind(18)) function planes_memory(extent, threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: threads
+    integer, parameter :: long = selected_int_kind(18)
+
+    ! those of the stress, which are more
+    planes_memory = convolution_memory(extent, good_size(2*extent - 1), 15, 6, threads) &
+                    + transform_memory(extent, good_size(2*extent - 1), 15) &
+                    + 3*product(int(extent, long))*(storage_size(1.0_wp)/8)
+  end function planes_memory
+
+  !> Take the tables of a depth, from a cache or anew.
+  subroutine set_depth(self, depth, error, cache)
+    class(interior_planes_t), intent(inout) :: self
+    !> Depth below the surface of the body [m]
+    real(wp), intent(in) :: depth
+    !> Allocated on failure: a depth above the surface, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+
+    type(plane_tables_t) :: source
+    logical :: found
+
+    call check_interior([0.0_wp], [0.0_wp], [depth], self%poisson_ratio, error)
+    if (allocated(error)) return
+    source%basis = self%lattice%unit_basis()
+    source%depth = depth/self%lattice%spacing()
+    source%poisson_ratio = self%poisson_ratio
+    source%pyramid = self%pyramid
+    source%tables = self%tables
+    source%mirrored = all(abs([source%basis(2, 1), source%basis(1, 2) - 0.5_wp*source%basis(1, 1)]) <= 0.0_wp)
+    associate (key => new_depth_key(self%tables%kind, self%lattice, source%depth, self%poisson_ratio))
+      call self%convolution%find_spectra(found, error, cache, key)
+      if (found .or. allocated(error)) return
+      call self%convolution%transform_kernels(source, error)
+      if (.not. allocated(error)) call self%convolution%store_spectra(cache, key)
+    end associate
+  end subroutine set_depth
+
+  !> Stress, or displacement times the shear modulus, at the nodes of the plane.
+  subroutine apply(self, traction, field, error)
+    class(interior_planes_t), intent(inout) :: self
+    !> Pressure and traction on body 1 along x and y (n_col, n_row, component) [Pa]
+    real(wp), intent(in), contiguous :: traction(:, :, :)
+    !> Stress [Pa] or displacement [Pa m] (n_col, n_row, component xx, yy, zz, xy, yz, xz or x, y, z)
+    real(wp), intent(out), contiguous :: field(:, :, :)
+    !> Allocated on failure: arrays of other shapes than the window
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (n => self%lattice%extent, tables => self%tables)
+      if (any(shape(traction) /= [n, 3]) .or. any(shape(field) /= [n, tables%n_component])) then
+        call raise(error, status%invalid_input, 'the arrays do not have the shape of the lattice window')
+        return
+      end if
+      self%loads(:, :, 1) = traction(:, :, 1)
+      self%loads(:, :, 2:3) = merge(1.0_wp, -1.0_wp, self%body == 1)*traction(:, :, 2:3)
+      call self%convolution%convolve(tables%table, self%loads, field)
+      if (self%body == 2) field(:, :, tables%turned) = -field(:, :, tables%turned)
+      if (tables%kind == of_displacement) field = self%lattice%spacing()*field
+    end associate
+  end subroutine apply
+
+  pure subroutine table_row(self, j, k)
+    class(plane_tables_t), intent(in) :: self
+    integer, intent(in) :: j
+    real(wp), intent(out) :: k(:, :)
+
+    real(wp) :: x(most_points), y(most_points), z(most_points), d(most_points, n_derivative), s(most_points, 6, 3)
+    integer :: i, n, m, middle, first, t
+
+    n = size(k, 2)/2
+    middle = n + 1
+    ! columns of which the mirror images are in the row, too, are copies
+    first = -n
+    if (self%mirrored) first = -(j/2)
+    z = self%depth
+    do while (first <= n)
+      m = min(n - first + 1, most_points)
+      do i = 1, m
+        x(i) = (first + i - 1)*self%basis(1, 1) + j*self%basis(1, 2)
+        y(i) = (first + i - 1)*self%basis(2, 1) + j*self%basis(2, 2)
+      end do
+      call self%pyramid%potentials(m, x(:m), y(:m), z(:m), d(:m, :))
+      if (self%tables%kind == of_displacement) then
+        call displacements(m, d(:m, :), d(:m, :), d(:m, :), z(:m), self%poisson_ratio, s(:m, :3, :))
+      else
+        call stresses(m, d(:m, :), d(:m, :), d(:m, :), self%poisson_ratio, s(:m, :, :))
+      end if
+      do t = 1, size(k, 1)
+        k(t, middle + first:middle + first + m - 1) = s(:m, self%tables%component(t), self%tables%load(t))
+      end do
+      first = first + m
+    end do
+    if (self%mirrored) then
+      do i = -n, -(j/2) - 1
+        k(:, middle + i) = self%tables%mirror*k(:, middle - i - j)
+      end do
+    end if
+  end subroutine table_row
+
+end module hc_interior_planes

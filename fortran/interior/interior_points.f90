@@ -1,0 +1,166 @@
+!> Displacement and stress at single points of a body: the exact sum over the pyramids that carry traction.
+!>
+!> The frame is that of the contact: z points into body 1, p >= 0 pushes the bodies apart, q acts on body 1 and -q on
+!> body 2. A point is given by its depth below the surface of its body; body 2 is computed in the frame mirrored at
+!> z = 0, in which the loads are (p, -q), and its fields are turned back.
+!>
+!> Equations: docs/theory/interior.md, (I10).
+module hc_interior_points
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t, check_lattice
+  use hc_field_space, only: field_space_t, space_over
+  use hc_interior_fields, only: n_derivative, stresses, displacements, check_interior, yz, xz
+  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid, most_points
+  !$ use omp_lib, only: omp_get_thread_num
+  implicit none
+  private
+
+  public :: fields_at_points, check_body
+
+contains
+
+  !> Displacement and stress at points for a history of load steps.
+  !>
+  !> The influence of a pyramid on a point is worked out once for all steps.
+  subroutine fields_at_points(lattice, traction, body, poisson_ratio, x, y, depth, displacement, stress, error, space)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Pressure and traction on body 1 along x and y (n_col, n_row, component, step) [Pa]
+    real(wp), intent(in), contiguous :: traction(:, :, :, :)
+    !> Number of the body, 1 or 2, and its Poisson's ratio
+    integer, intent(in) :: body
+    real(wp), intent(in) :: poisson_ratio
+    !> Points, and their depths below the surface of the body [m]
+    real(wp), intent(in) :: x(:), y(:), depth(:)
+    !> Displacement times the shear modulus (direction, point, step) [Pa m]
+    real(wp), intent(out) :: displacement(:, :, :)
+    !> Stress (component xx, yy, zz, xy, yz, xz; point; step) [Pa]
+    real(wp), intent(out) :: stress(:, :, :)
+    !> Allocated on failure: a lattice of no use, no such body or material, points above the surface, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Who shares the work; absent: as many threads as OpenMP would take
+    type(field_space_t), intent(in), optional :: space
+
+    type(interior_pyramid_t) :: pyramid
+    type(field_space_t) :: shared
+    real(wp), allocatable :: node(:, :), load(:, :)
+    real(wp), allocatable :: sums(:, :, :) ! of each thread; no stack holds those of many steps
+    real(wp) :: u(1, 3, 3), s(1, 6, 3), zeta(1)
+    integer :: i, step, k, thread, stat
+
+    call check_lattice(lattice, error)
+    if (.not. allocated(error)) call check_body(body, error)
+    if (.not. allocated(error)) call check_interior(x, y, depth, poisson_ratio, error)
+    if (.not. allocated(error)) call loaded_nodes(lattice, traction, body, node, load, error)
+    if (allocated(error)) return
+    shared = space_over(lattice%extent)
+    if (present(space)) shared = space
+    call new_interior_pyramid(pyramid, lattice%basis)
+    allocate (sums(n_derivative, 3*size(traction, 4), shared%threads), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the stress: use fewer load steps')
+      return
+    end if
+
+    !$omp parallel do num_threads(shared%threads) schedule(dynamic) private(u, s, zeta, step, k, thread) if (size(x) > 1)
+    do i = 1, size(x)
+      thread = 1
+      !$ thread = omp_get_thread_num() + 1
+      call sum_pyramids(pyramid, node, load, [x(i), y(i), depth(i)], sums(:, :, thread))
+      zeta = depth(i)/pyramid%spacing
+      do step = 1, size(traction, 4)
+        k = 3*(step - 1)
+        associate (p => reshape(sums(:, k + 1, thread), [1, n_derivative]), &
+                   q_x => reshape(sums(:, k + 2, thread), [1, n_derivative]), &
+                   q_y => reshape(sums(:, k + 3, thread), [1, n_derivative]))
+          call displacements(1, p, q_x, q_y, zeta, poisson_ratio, u)
+          call stresses(1, p, q_x, q_y, poisson_ratio, s)
+        end associate
+        displacement(:, i, step) = pyramid%spacing*sum(u(1, :, :), dim=2)
+        stress(:, i, step) = sum(s(1, :, :), dim=2)
+      end do
+    end do
+    !$omp end parallel do
+    if (body == 2) then
+      displacement(3, :, :) = -displacement(3, :, :)
+      stress([yz, xz], :, :) = -stress([yz, xz], :, :)
+    end if
+  end subroutine fields_at_points
+
+  !> Refuse the number of a body that there is not.
+  pure subroutine check_body(body, error)
+    !> Number of the body
+    integer, intent(in) :: body
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+
+    if (body /= 1 .and. body /= 2) call raise(error, status%invalid_input, 'the number of the body: 1 or 2 expected')
+  end subroutine check_body
+
+  !> Nodes that carry traction in any step, and their tractions in the frame of the body.
+  subroutine loaded_nodes(lattice, traction, body, node, load, error)
+    type(lattice_t), intent(in) :: lattice
+    !> Pressure and traction on body 1 (n_col, n_row, component, step) [Pa]
+    real(wp), intent(in) :: traction(:, :, :, :)
+    !> Number of the body
+    integer, intent(in) :: body
+    !> Positions (node, direction) [m]
+    real(wp), allocatable, intent(out) :: node(:, :)
+    !> Tractions (node, component of the steps one after the other) [Pa]
+    real(wp), allocatable, intent(out) :: load(:, :)
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp) :: index(2), side
+    integer :: col, row, n, n_step, stat
+
+    n_step = size(traction, 4)
+    n = count(any(any(abs(traction) > 0.0_wp, dim=4), dim=3))
+    allocate (node(n, 2), load(n, 3*n_step), stat=stat)
+    if (stat /= 0) then
+      call raise(error, status%resources, 'not enough memory for the tractions: use fewer load steps')
+      return
+    end if
+    side = merge(1.0_wp, -1.0_wp, body == 1)
+    n = 0
+    do row = 1, size(traction, 2)
+      do col = 1, size(traction, 1)
+        if (.not. any(abs(traction(col, row, :, :)) > 0.0_wp)) cycle
+        n = n + 1
+        index = real(lattice%first + [col, row] - 1, wp)
+        node(n, :) = lattice%origin + matmul(lattice%basis, index)
+        load(n, 1::3) = traction(col, row, 1, :)
+        load(n, 2::3) = side*traction(col, row, 2, :)
+        load(n, 3::3) = side*traction(col, row, 3, :)
+      end do
+    end do
+  end subroutine loaded_nodes
+
+  !> Derivatives of the potentials of all loads at a point.
+  pure subroutine sum_pyramids(pyramid, node, load, point, sums)
+    type(interior_pyramid_t), intent(in) :: pyramid
+    !> Positions (node, direction) [m], and loads (node, load)
+    real(wp), intent(in) :: node(:, :), load(:, :)
+    !> The point [m]
+    real(wp), intent(in) :: point(3)
+    !> Sums (derivative, load), lengths in longest edges
+    real(wp), intent(out) :: sums(:, :)
+
+    real(wp) :: at(most_points, 3), d(most_points, n_derivative)
+    integer :: first, last, n, direction
+
+    sums = 0.0_wp
+    at(:, 3) = point(3)/pyramid%spacing
+    do first = 1, size(node, 1), most_points
+      last = min(first + most_points - 1, size(node, 1))
+      n = last - first + 1
+      do direction = 1, 2
+        at(:n, direction) = (point(direction) - node(first:last, direction))/pyramid%spacing
+      end do
+      call pyramid%potentials(n, at(:n, 1), at(:n, 2), at(:n, 3), d(:n, :))
+      sums = sums + matmul(transpose(d(:n, :)), load(first:last, :))
+    end do
+  end subroutine sum_pyramids
+
+end module hc_interior_points

@@ -1,0 +1,391 @@
+!> Edges of contact and stick areas between the nodes, from how tractions vanish there.
+!>
+!> At the edge of a contact the pressure vanishes like the square root of the distance, and beyond it the gap opens like
+!> its power 3/2; at the edge of a stick area the reserve of friction, mu p - |q|, vanishes like the pressure. So p^2,
+!> gap^(2/3) and (mu p - |q|)^2, each divided by its slope, are distances from the edge. The edge runs where they change
+!> sign: a polygon through the triangles of the lattice, for zones of any shape.
+!>
+!> Distances are in spacings, positive inside. Fields have the shape (n_col, n_row).
+!>
+!> Equations: docs/theory/edges.md, (B2) to (B4).
+module hc_contact_edges
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use hc_precision, only: wp
+  use hc_options, only: edge_options_t
+  use hc_lattice, only: lattice_t
+  use hc_edge_band, only: edge_band_t, new_edge_band, to_neighbors
+  use hc_zone_edge, only: zone_edge_t, zone_mesh_t, edge_of_zone, mesh_of_zone, distance_field
+  implicit none
+  private
+
+  public :: contact_edges_t, new_contact_edges
+
+  !> A contact and its edges.
+  type :: contact_edges_t
+    private
+    type(lattice_t) :: lattice
+    !> Nodes in contact, and those that can touch (n_col, n_row)
+    logical, allocatable :: contact(:, :), candidate(:, :)
+    !> Nodes about the edge of the contact, their pressure and their distance from it
+    type(edge_band_t) :: band
+    real(wp), allocatable :: pressure(:), distance(:)
+    !> Tuning numbers
+    type(edge_options_t) :: options
+  contains
+    !> The edge of the contact area
+    procedure :: contact_edge
+    !> The edge of the part of it that sticks
+    procedure :: stick_edge
+    !> Triangles that fill either of them, and a field there
+    procedure :: contact_mesh, stick_mesh
+    !> Distances of all nodes from either edge
+    procedure :: contact_distances, stick_distances
+    !> Squares of the pressure near the edge of the contact, and of the reserve near that of the stick area, good to
+    !> interpolate
+    procedure :: squares, stick_squares
+    procedure, private :: from_stick
+  end type contact_edges_t
+
+  !> What is known about the edge of a zone from its own nodes.
+  type :: one_sided_t
+    !> Distances from the edge, slopes there, and directions inwards
+    real(wp), allocatable :: distance(:), slope(:), direction(:, :)
+    !> Nodes where they are known
+    logical, allocatable :: has_distance(:), has_slope(:), has_direction(:)
+  end type one_sided_t
+
+contains
+
+  !> Find the distances of the nodes from the edge of a contact.
+  pure subroutine new_contact_edges(edges, lattice, pressure, gap, contact, candidate, options)
+    !> Edges to be set up
+    type(contact_edges_t), intent(out) :: edges
+    !> Equilateral lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Contact pressure [Pa] and gap [m]; the gap of nodes that can never touch does not matter
+    real(wp), intent(in) :: pressure(:, :), gap(:, :)
+    !> Nodes in contact
+    logical, intent(in) :: contact(:, :)
+    !> Nodes that can touch. Where a contact ends at others, as at the rim of a punch, its pressure does not vanish;
+    !> there the cells of its nodes count.
+    logical, intent(in) :: candidate(:, :)
+    !> Tuning numbers; absent: the usual ones
+    type(edge_options_t), intent(in), optional :: options
+    real(wp), allocatable :: opening(:)
+    logical, allocatable :: inside(:), opened(:)
+
+    if (present(options)) edges%options = options
+    edges%lattice = lattice
+    edges%contact = contact
+    edges%candidate = candidate
+    call new_edge_band(edges%band, contact, edges%options)
+    associate (band => edges%band, options => edges%options)
+      inside = band%part_of(contact)
+      opened = band%part_of(candidate) .and. .not. inside
+      edges%pressure = band%values_of(pressure)
+      opening = band%values_of(gap)
+      where (.not. opened) opening = 0.0_wp
+      opening = (opening**2)**(1.0_wp/3.0_wp)
+      edges%distance = -max(distances(band, options, opened, opening) - options%inward, 0.0_wp)
+      opening = max(distances(band, options, inside, edges%pressure**2) + options%inward, options%least_distance)
+      where (inside) edges%distance = opening
+    end associate
+  end subroutine new_contact_edges
+
+  !> Find the edge of the contact area.
+  pure function contact_edge(self) result(edge)
+    class(contact_edges_t), intent(in) :: self
+    type(zone_edge_t) :: edge
+    edge = edge_of_zone(self%lattice, self%candidate, self%contact, self%band, self%distance)
+  end function contact_edge
+
+  !> Fill the contact area with triangles, and carry a field to its edge.
+  pure function contact_mesh(self, field, vanishes) result(mesh)
+    class(contact_edges_t), intent(in) :: self
+    !> Values at the nodes, and whether they vanish at the edge
+    real(wp), intent(in) :: field(:, :)
+    logical, intent(in) :: vanishes
+    type(zone_mesh_t) :: mesh
+    mesh = mesh_of_zone(self%lattice, self%candidate, self%contact, self%band, self%distance, field, vanishes)
+  end function contact_mesh
+
+  !> Return the distances of the nodes from the edge of the contact, in spacings, positive inside.
+  pure function contact_distances(self) result(field)
+    class(contact_edges_t), intent(in) :: self
+    real(wp) :: field(size(self%contact, 1), size(self%contact, 2))
+    field = distance_field(self%candidate, self%contact, self%band, self%distance, self%options)
+  end function contact_distances
+
+  !> Find the edge of the part of the contact area that sticks.
+  pure function stick_edge(self, stick, reserve) result(edge)
+    class(contact_edges_t), intent(in) :: self
+    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
+    logical, intent(in) :: stick(:, :)
+    real(wp), intent(in) :: reserve(:, :)
+    type(zone_edge_t) :: edge
+    type(edge_band_t) :: band
+    real(wp), allocatable :: distance(:)
+
+    call self%from_stick(stick, reserve, band, distance)
+    edge = edge_of_zone(self%lattice, self%candidate, stick, band, distance)
+  end function stick_edge
+
+  !> Fill the stick area with triangles, and carry a field to its edge.
+  pure function stick_mesh(self, stick, reserve, field) result(mesh)
+    class(contact_edges_t), intent(in) :: self
+    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
+    logical, intent(in) :: stick(:, :)
+    real(wp), intent(in) :: reserve(:, :)
+    !> Values at the nodes
+    real(wp), intent(in) :: field(:, :)
+    type(zone_mesh_t) :: mesh
+    type(edge_band_t) :: band
+    real(wp), allocatable :: distance(:)
+
+    call self%from_stick(stick, reserve, band, distance)
+    mesh = mesh_of_zone(self%lattice, self%candidate, stick, band, distance, field, vanishes=.false.)
+  end function stick_mesh
+
+  !> Return the distances of the nodes from the edge of the stick area, in spacings, positive inside.
+  pure function stick_distances(self, stick, reserve) result(field)
+    class(contact_edges_t), intent(in) :: self
+    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
+    logical, intent(in) :: stick(:, :)
+    real(wp), intent(in) :: reserve(:, :)
+    real(wp) :: field(size(stick, 1), size(stick, 2))
+    type(edge_band_t) :: band
+    real(wp), allocatable :: distance(:)
+
+    call self%from_stick(stick, reserve, band, distance)
+    field = distance_field(self%candidate, stick, band, distance, self%options)
+  end function stick_distances
+
+  !> Find the distances of nodes from the edge of the part of the contact area that sticks.
+  pure subroutine from_stick(self, stick, reserve, band, distance)
+    class(contact_edges_t), intent(in) :: self
+    !> Nodes that stick, all in contact
+    logical, intent(in) :: stick(:, :)
+    !> What friction could carry beyond the shear traction, mu p - |q|; only its values at these nodes matter [Pa]
+    real(wp), intent(in) :: reserve(:, :)
+    !> Nodes about the edge, and their distances
+    type(edge_band_t), intent(out) :: band
+    real(wp), allocatable, intent(out) :: distance(:)
+    type(one_sided_t) :: seen
+    real(wp), allocatable :: square(:)
+    logical, allocatable :: inside(:), slipping(:), at_slip(:)
+    real(wp) :: total, to(2, 6)
+    integer :: k, j, n_seen
+
+    to = to_neighbors()
+    call new_edge_band(band, stick, self%options)
+    inside = band%part_of(stick)
+    slipping = band%part_of(self%contact) .and. .not. inside
+    square = band%values_of(reserve)
+    where (.not. inside) square = 0.0_wp
+    call find_inner_slopes(band, self%options, inside, square**2, seen)
+    at_slip = inside .and. band%next_to(slipping)
+    allocate (distance(band%n), source=huge(1.0_wp))
+    do k = 1, band%n
+      if (at_slip(k)) then
+        distance(k) = self%options%unknown_distance
+        if (seen%has_distance(k)) distance(k) = max(seen%distance(k), self%options%least_distance)
+      else if (slipping(k)) then
+        ! The power of the slip depends on how far the edge moved in the step, so that slip is no measure of the distance:
+        ! nodes outside have that of the nodes inside.
+        total = 0.0_wp
+        n_seen = 0
+        do j = 1, size(to, 2)
+          associate (m => band%beside(j, k))
+            if (m == 0) cycle
+            if (.not. (inside(m) .and. seen%has_distance(m) .and. seen%has_direction(m))) cycle
+            total = total + seen%distance(m) - dot_product(to(:, j), seen%direction(:, m))
+            n_seen = n_seen + 1
+          end associate
+        end do
+        distance(k) = -self%options%unknown_distance
+        if (n_seen > 0) distance(k) = min(total/n_seen, 0.0_wp)
+      end if
+      ! where the stick area reaches the edge of the contact, that is its edge
+      associate (at => band%node(:, k))
+        j = self%band%place(at(1), at(2))
+        if (j > 0) distance(k) = min(distance(k), self%distance(j))
+      end associate
+    end do
+  end subroutine from_stick
+
+  !> Return squares of the pressure that are good to interpolate linearly (n_col, n_row) [Pa^2].
+  !>
+  !> At nodes in contact the layer of the lattice next to the edge is taken off; beyond the edge the squares go on below
+  !> zero. They are NaN away from the edge, and where nothing is known about it.
+  pure function squares(self) result(field)
+    class(contact_edges_t), intent(in) :: self
+    real(wp) :: field(size(self%contact, 1), size(self%contact, 2))
+
+    field = squares_in_band(self%band, self%options, self%contact, self%candidate, self%pressure**2, self%distance)
+  end function squares
+
+  !> Return squares of the reserve of friction that are good to interpolate linearly, see `squares`.
+  pure function stick_squares(self, stick, reserve) result(field)
+    class(contact_edges_t), intent(in) :: self
+    !> Nodes that stick, and their reserve of friction, see `from_stick` [Pa]
+    logical, intent(in) :: stick(:, :)
+    real(wp), intent(in) :: reserve(:, :)
+    real(wp) :: field(size(stick, 1), size(stick, 2))
+    type(edge_band_t) :: band
+    real(wp), allocatable :: distance(:)
+
+    call self%from_stick(stick, reserve, band, distance)
+    field = squares_in_band(band, self%options, stick, self%contact .or. self%candidate, band%values_of(reserve)**2, distance)
+  end function stick_squares
+
+  !> Compute squares, good to interpolate, of what vanishes at the edge of a zone.
+  pure function squares_in_band(band, options, zone, around, square, distance) result(field)
+    !> Nodes about the edge
+    type(edge_band_t), intent(in) :: band
+    type(edge_options_t), intent(in) :: options
+    !> Nodes of the zone, and those to which it could extend (n_col, n_row)
+    logical, intent(in) :: zone(:, :), around(:, :)
+    !> Squares at the nodes of the band, and their distances from the edge
+    real(wp), intent(in) :: square(:), distance(:)
+    real(wp) :: field(size(zone, 1), size(zone, 2))
+    type(one_sided_t) :: seen
+    real(wp) :: inwards(2, band%n), rises(band%n)
+    logical :: inside(band%n), beyond(band%n), known(band%n)
+    integer :: k
+
+    inside = band%part_of(zone)
+    beyond = band%part_of(around) .and. .not. inside
+    call find_inner_slopes(band, options, inside, merge(square, 0.0_wp, inside), seen)
+    ! under the rim of a punch the pressure rises towards the edge: its square has no zero there
+    known = inside .and. band%next_to(.not. inside)
+    inwards = band%gradient(merge(1.0_wp, 0.0_wp, inside), known)
+    rises = merge(1.0_wp, 0.0_wp, seen%has_direction .and. sum(inwards*seen%direction, dim=1) < 0.0_wp)
+    call band%extend(rises, known)
+    field = ieee_value(1.0_wp, ieee_quiet_nan)
+    do k = 1, band%n
+      if (.not. (known(k) .and. seen%has_slope(k)) .or. any(band%node(:, k) < 1 .or. band%node(:, k) > shape(field))) cycle
+      if (rises(k) >= 0.5_wp) cycle
+      associate (there => field(band%node(1, k), band%node(2, k)))
+        if (inside(k)) then
+          there = square(k)
+          if (seen%has_distance(k) .and. seen%distance(k) < layer_end(options)) there = seen%slope(k)*seen%distance(k)
+        else if (beyond(k)) then
+          there = seen%slope(k)*min(distance(k), 0.0_wp)
+        end if
+      end associate
+    end do
+  end function squares_in_band
+
+  !> Find the distances of the nodes of a part from its edge, where some values vanish in proportion to them.
+  pure function distances(band, options, part, values) result(away)
+    !> Nodes about the edge
+    type(edge_band_t), intent(in) :: band
+    type(edge_options_t), intent(in) :: options
+    !> Those of the part
+    logical, intent(in) :: part(:)
+    !> Values at the nodes
+    real(wp), intent(in) :: values(:)
+    real(wp) :: away(band%n), slope(band%n)
+    logical :: known(band%n)
+
+    known = band%surrounded(part)
+    slope = norm2(band%gradient(values, known), dim=1)
+    call band%extend(slope, known)
+    away = options%unknown_distance
+    where (known .and. slope > options%least_relative_slope*abs(values)) away = values/slope
+  end function distances
+
+  !> Find distances from the edge, slopes there and directions inwards, from the nodes of one side only.
+  !>
+  !> The layer at the edge is taken off first, with the slope further inside. The slope at the edge itself then follows
+  !> from those of the parabola that the squares S are along the normal n: k^4 = S'^2 - 2 S S". Where this is little or
+  !> negative they vanish with a higher power than the first, and there is no slope.
+  pure subroutine find_inner_slopes(band, options, part, square, seen)
+    !> Nodes about the edge
+    type(edge_band_t), intent(in) :: band
+    type(edge_options_t), intent(in) :: options
+    !> Those on that side
+    logical, intent(in) :: part(:)
+    !> Values at the nodes, squares of what vanishes like a square root
+    real(wp), intent(in) :: square(:)
+    !> What is found
+    type(one_sided_t), intent(out) :: seen
+    logical :: whole(band%n), known(band%n)
+    real(wp) :: slope(band%n), smooth(band%n), flat(band%n), steepness, bend, to(2, 6)
+    integer :: k
+
+    to = to_neighbors()
+    whole = band%surrounded(part)
+    known = whole
+    slope = norm2(band%gradient(square, whole), dim=1)
+    call band%extend(slope, known)
+    smooth = square
+    do k = 1, band%n
+      if (.not. known(k) .or. slope(k) <= options%least_relative_slope*square(k)) cycle
+      associate (away => from_square(options, square(k)/slope(k)))
+        if (away < layer_end(options)) smooth(k) = slope(k)*away
+      end associate
+    end do
+
+    seen%direction = band%gradient(smooth, whole)
+    flat = 0.0_wp
+    seen%has_slope = whole
+    seen%has_direction = whole
+    known = whole
+    do k = 1, band%n
+      steepness = norm2(seen%direction(:, k))
+      if (.not. whole(k)) cycle
+      if (steepness > options%least_relative_slope*smooth(k)) then
+        seen%direction(:, k) = seen%direction(:, k)/steepness
+      else
+        ! but a rounding error, as in the middle of few nodes: one direction is as good as another
+        seen%direction(:, k) = [1.0_wp, 0.0_wp]
+      end if
+      ! second derivative along n from those along the three lines of nodes at angles t to n, with weights 1 + 2 cos 2t
+      bend = sum((4.0_wp*matmul(seen%direction(:, k), to)**2 - 1.0_wp)*(smooth(band%beside(:, k)) - smooth(k)))/3.0_wp
+      slope(k) = steepness**2 - 2.0_wp*smooth(k)*bend
+      if (slope(k) < options%least_slope*steepness**2) flat(k) = 1.0_wp
+      slope(k) = sqrt(max(slope(k), options%least_slope*steepness**2))
+      seen%has_slope(k) = slope(k) > 0.0_wp
+    end do
+    call band%extend(flat, whole)
+    call band%extend(slope, seen%has_slope)
+    call band%extend(seen%direction(1, :), known)
+    call band%extend(seen%direction(2, :), seen%has_direction)
+    seen%slope = slope
+    seen%has_slope = seen%has_slope .and. .not. (whole .and. flat > 0.5_wp)
+
+    seen%distance = square
+    seen%has_distance = seen%has_slope
+    do k = 1, band%n
+      seen%has_distance(k) = seen%has_slope(k) .and. slope(k) > options%least_relative_slope*square(k)
+      if (seen%has_distance(k)) seen%distance(k) = from_square(options, square(k)/slope(k))
+      associate (n => norm2(seen%direction(:, k)))
+        seen%has_direction(k) = seen%has_direction(k) .and. n > options%least_relative_slope
+        if (seen%has_direction(k)) seen%direction(:, k) = seen%direction(:, k)/n
+      end associate
+    end do
+  end subroutine find_inner_slopes
+
+  !> Compute the square beyond which there is no layer.
+  pure real(wp) function layer_end(options)
+    type(edge_options_t), intent(in) :: options
+    layer_end = options%layer_square(size(options%layer_square))
+  end function layer_end
+
+  !> Compute the distance of a node from the edge at which the solution on the lattice has a square, both in slopes.
+  pure real(wp) function from_square(options, square)
+    type(edge_options_t), intent(in) :: options
+    !> Square, at least 0
+    real(wp), intent(in) :: square
+    integer :: k
+
+    from_square = square
+    if (square >= layer_end(options)) return
+    associate (at => options%layer_distance, squares => options%layer_square)
+      k = findloc(squares <= square, .true., dim=1, back=.true.)
+      from_square = at(k) + (square - squares(k))/(squares(k + 1) - squares(k))*(at(k + 1) - at(k))
+    end associate
+  end function from_square
+
+end module hc_contact_edges

@@ -1,0 +1,334 @@
+!> Tractions of which the stress below the surface is computed: those at the nodes, corrected at the edges of the contact
+!> and of the stick area.
+!>
+!> Joined linearly, the nodal tractions end one link beyond the last nodes in contact, while the true ones vanish like a
+!> square root between the nodes. The shape between the nodes is taken from the edge; hats stand for it as well as they
+!> can, and the tractions of the nodes inside are solved for again, so that the displacements of the nodes in contact stay
+!> what they are. The edge then follows anew from what comes of it. The corrected tractions have the load of the nodal ones,
+!> and single nodes beyond the edge carry small ones of either sign.
+!>
+!> Equations: docs/theory/interior.md, (I16) to (I18).
+module hc_edge_tractions
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_options, only: edge_options_t
+  use hc_lattice, only: lattice_t, neighbors
+  use hc_field_space, only: field_space_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: normal, along_x, along_y
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_linear_system, only: linear_system_t, precondition_constraints, satisfy_constraints
+  use hc_projected_cg, only: projected_cg
+  use hc_interpolation, only: interpolate, interpolate_pressure
+  use hc_contact_edges, only: contact_edges_t
+  use hc_edge_residue, only: edge_residue_t, new_edge_residue
+  use hc_edge_fit, only: fit_squares
+  implicit none
+  private
+
+  public :: correct_at_edges
+
+  !> Displacements of nodes are what they were to this share of the largest change, after at most as many iterations.
+  real(wp), parameter :: accuracy = 1.0e-3_wp
+  integer, parameter :: most_iterations = 100
+
+  !> Shape of the tractions at the nodes of a contact (n_col, n_row).
+  type :: edge_shape_t
+    type(lattice_t) :: lattice
+    !> Pressure and reserve of friction [Pa], and their squares near the edges [Pa^2]
+    real(wp), allocatable :: pressure(:, :), reserve(:, :), squares(:, :), stick_squares(:, :)
+    !> Coefficient of friction, and direction of the shear traction (n_col, n_row, direction)
+    real(wp), allocatable :: friction(:, :), direction(:, :, :)
+  contains
+    !> What the shape has beyond the hats at a point
+    procedure, private :: beyond_hats
+  end type edge_shape_t
+
+  !> The elastic operator of some components, without a preconditioner: what changes is local.
+  type, extends(linear_system_t) :: elastic_part_t
+    type(fft_flexibility_t), pointer :: flexibility => null()
+    integer, allocatable :: component(:)
+  contains
+    procedure :: product => elastic_product
+    procedure :: precondition => no_precondition
+  end type elastic_part_t
+
+contains
+
+  !> Correct pressure and shear traction at the edges.
+  subroutine correct_at_edges(lattice, edges, pair, contact, stick, friction, traction, space, error, cache, options)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Edges of the contact
+    type(contact_edges_t), intent(in) :: edges
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Nodes in contact, and those of them that stick (n_col, n_row)
+    logical, intent(in) :: contact(:, :), stick(:, :)
+    !> Coefficient of friction; shear tractions stay as they are unless it is positive and finite (n_col, n_row)
+    real(wp), intent(in) :: friction(:, :)
+    !> Pressure and shear traction (n_col, n_row, component) [Pa]
+    real(wp), intent(inout) :: traction(:, :, :)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Spectra that are kept
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> Tuning numbers; absent: the usual ones
+    type(edge_options_t), intent(in), optional :: options
+
+    type(edge_options_t) :: tuning
+    type(edge_shape_t) :: edge_shape
+    type(edge_residue_t) :: residue
+    type(fft_flexibility_t), target :: flexibility
+    real(wp), allocatable :: hats(:, :, :), change(:, :, :), size_of(:, :), at_nodes(:, :, :)
+    integer :: pass, k, n
+
+    if (present(options)) tuning = options
+    n = 1
+    if (all(friction > 0.0_wp .and. friction <= huge(1.0_wp))) n = 3
+    edge_shape%lattice = lattice
+    edge_shape%pressure = traction(:, :, 1)
+    edge_shape%squares = edges%squares()
+    if (n == 3) then
+      edge_shape%friction = friction
+      size_of = norm2(traction(:, :, 2:3), dim=3)
+      edge_shape%reserve = merge(max(friction*traction(:, :, 1) - size_of, 0.0_wp), 0.0_wp, stick)
+      edge_shape%stick_squares = edges%stick_squares(stick, edge_shape%reserve)
+      edge_shape%direction = directions(traction(:, :, 2:3), size_of, contact)
+    end if
+    call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=n == 1, space=space, cache=cache)
+    if (allocated(error)) return
+    allocate (change(lattice%extent(1), lattice%extent(2), n))
+    do pass = 1, tuning%passes
+      call sample(edge_shape, tuning%samples, n, residue, at_nodes)
+      call residue%hats(space, hats, error)
+      if (allocated(error)) return
+      call residue%take_off(hats)
+      call solve_again(flexibility, pair, residue, contact, stick, friction, edge_shape, space, hats, change, error)
+      if (allocated(error)) return
+      if (pass == tuning%passes) exit
+      at_nodes = traction(:, :, :n) + change + at_nodes - hats
+      call fit_squares(edge_shape%squares, merge(at_nodes(:, :, 1), 0.0_wp, contact), edges%contact_distances(), tuning)
+      if (n == 3) then
+        call fit_squares(edge_shape%stick_squares, &
+                         merge(friction*at_nodes(:, :, 1) - norm2(at_nodes(:, :, 2:3), dim=3), 0.0_wp, stick), &
+                         edges%stick_distances(stick, edge_shape%reserve), tuning)
+      end if
+    end do
+    do k = 1, n
+      traction(:, :, k) = traction(:, :, k) + change(:, :, k)
+    end do
+  end subroutine correct_at_edges
+
+  !> Sample what the shape has beyond the hats, between the nodes and at them.
+  pure subroutine sample(shape_of, samples, n, residue, at_nodes)
+    !> The shape
+    type(edge_shape_t), intent(in) :: shape_of
+    !> Points along a spacing, and number of components
+    integer, intent(in) :: samples, n
+    !> What it has between the nodes
+    type(edge_residue_t), intent(out) :: residue
+    !> The same at the nodes (n_col, n_row, component) [Pa]
+    real(wp), allocatable, intent(out) :: at_nodes(:, :, :)
+    logical :: near(size(shape_of%pressure, 1), size(shape_of%pressure, 2))
+    integer :: col, row, i, k
+
+    do row = 1, size(near, 2)
+      do col = 1, size(near, 1)
+        near(col, row) = near_edge(shape_of, col, row, n)
+      end do
+    end do
+    call new_edge_residue(residue, shape_of%lattice, samples, near, n)
+    allocate (at_nodes(size(near, 1), size(near, 2), n), source=0.0_wp)
+    do k = 1, size(residue%node, 2)
+      associate (node => residue%node(:, k))
+        if (.not. near(node(1), node(2))) cycle
+        do i = 1, samples**2
+          residue%values(i, :, k) = shape_of%beyond_hats(matmul(shape_of%lattice%basis, &
+            real(shape_of%lattice%first + node - 1, wp) + residue%point(i)) + shape_of%lattice%origin, n)
+        end do
+        at_nodes(node(1), node(2), :) = residue%values(1, :, k)
+      end associate
+    end do
+  end subroutine sample
+
+  !> Compute the change of the nodal tractions that leaves the displacements of the nodes in contact as they are, (I18).
+  subroutine solve_again(flexibility, pair, residue, contact, stick, friction, shape_of, space, hats, change, error)
+    !> Elastic operator
+    type(fft_flexibility_t), intent(inout), target :: flexibility
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> What is between the nodes, less the hats
+    type(edge_residue_t), intent(in) :: residue
+    !> Nodes in contact, and those of them that stick (n_col, n_row)
+    logical, intent(in) :: contact(:, :), stick(:, :)
+    !> Coefficient of friction
+    real(wp), intent(in) :: friction(:, :)
+    !> The shape
+    type(edge_shape_t), intent(in) :: shape_of
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> Hats that stand for the shape (n_col, n_row, component) [Pa]
+    real(wp), intent(in) :: hats(:, :, :)
+    !> Change of the tractions, the hats included (n_col, n_row, component) [Pa]
+    real(wp), intent(out) :: change(:, :, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(elastic_part_t) :: system
+    real(wp), allocatable :: by_pressure(:, :, :)
+    integer :: k
+
+    change = hats
+    system%flexibility => flexibility
+    system%space = space
+    system%component = [normal]
+    call settle(system, contact, residue%displacements(pair, contact, system%component), change(:, :, 1:1), error)
+    if (allocated(error) .or. size(hats, 3) == 1) return
+    do k = 2, 3
+      where (contact .and. .not. stick)
+        change(:, :, k) = hats(:, :, k) + friction*shape_of%direction(:, :, k - 1)*(change(:, :, 1) - hats(:, :, 1))
+      end where
+    end do
+    if (.not. any(stick)) return
+    system%component = [along_x, along_y]
+    allocate (by_pressure(size(contact, 1), size(contact, 2), 2), source=0.0_wp)
+    if (abs(pair%lambda_2) > 0.0_wp) then
+      call flexibility%apply([normal], change(:, :, 1:1), system%component, by_pressure, error)
+      if (allocated(error)) return
+    end if
+    call settle(system, stick, residue%displacements(pair, stick, system%component) + by_pressure, change(:, :, 2:3), error)
+  end subroutine solve_again
+
+  !> Change tractions of some nodes so that displacements become alike all over them, without any load.
+  subroutine settle(system, nodes, moved, change, error)
+    !> The operator of the components
+    type(elastic_part_t), intent(inout) :: system
+    !> The nodes (n_col, n_row)
+    logical, intent(in) :: nodes(:, :)
+    !> Displacements by anything else (n_col, n_row, component) [m]
+    real(wp), intent(in) :: moved(:, :, :)
+    !> Changes of the tractions; those of other nodes are given (n_col, n_row, component) [Pa]
+    real(wp), intent(inout) :: change(:, :, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :)
+    logical, allocatable :: active(:)
+    real(wp) :: multiplier(size(change, 3)), residual
+    logical :: independent
+    integer :: k, iterations, outcome
+
+    associate (n => size(nodes))
+      active = reshape(spread(nodes, 3, size(change, 3)), [size(change)])
+      x = reshape(change, [size(change)])
+      rhs = merge(-reshape(moved, [size(change)]), 0.0_wp, active)
+      allocate (constraint(size(x), size(change, 3)), ax(size(x)))
+      constraint = 0.0_wp
+      do k = 1, size(change, 3)
+        constraint((k - 1)*n + 1:k*n, k) = reshape(merge(1.0_wp, 0.0_wp, nodes), [n])
+      end do
+      call precondition_constraints(system, active, constraint, mb, error)
+      if (allocated(error)) return
+      call satisfy_constraints(constraint, mb, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, system%space)
+      call system%product(x, ax, error)
+      if (allocated(error)) return
+      residual = maxval(abs(rhs - ax), mask=active)
+      call projected_cg(system, active, constraint, mb, rhs, x, ax, accuracy*residual, most_iterations, multiplier, &
+                        residual, iterations, outcome, error)
+      change = reshape(x, shape(change))
+    end associate
+  end subroutine settle
+
+  subroutine elastic_product(self, x, y, error)
+    class(elastic_part_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), pointer, contiguous :: acting(:, :, :), wanted(:, :, :)
+
+    associate (n => self%flexibility%lattice%extent, c => self%component)
+      acting(1:n(1), 1:n(2), 1:size(c)) => x
+      wanted(1:n(1), 1:n(2), 1:size(c)) => y
+      call self%flexibility%apply(c, acting, c, wanted, error)
+    end associate
+  end subroutine elastic_product
+
+  subroutine no_precondition(self, x, y, error)
+    class(elastic_part_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (nothing_of => self, error => error)
+      y = x
+    end associate
+  end subroutine no_precondition
+
+  !> Compute the direction of the shear traction at the nodes in contact, and at those next to them.
+  pure function directions(shear, size_of, contact) result(direction)
+    !> Shear traction (n_col, n_row, direction) and its size [Pa]
+    real(wp), intent(in) :: shear(:, :, :), size_of(:, :)
+    !> Nodes in contact
+    logical, intent(in) :: contact(:, :)
+    real(wp) :: direction(size(shear, 1), size(shear, 2), 2)
+    real(wp) :: total(2)
+    integer :: col, row, k
+
+    do k = 1, 2
+      direction(:, :, k) = merge(shear(:, :, k)/max(size_of, tiny(1.0_wp)), 0.0_wp, contact)
+    end do
+    do row = 1, size(contact, 2)
+      do col = 1, size(contact, 1)
+        if (contact(col, row)) cycle
+        total = 0.0_wp
+        do k = 1, size(neighbors, 2)
+          associate (at => [col, row] + neighbors(:, k))
+            if (any(at < 1 .or. at > shape(contact))) cycle
+            if (contact(at(1), at(2))) total = total + shear(at(1), at(2), :)/max(size_of(at(1), at(2)), tiny(1.0_wp))
+          end associate
+        end do
+        if (any(abs(total) > 0.0_wp)) direction(col, row, :) = total/norm2(total)
+      end do
+    end do
+  end function directions
+
+  !> Compute what the shape has beyond the hats at a point: pressure and shear traction [Pa], (I16).
+  pure function beyond_hats(self, point, n) result(more)
+    class(edge_shape_t), intent(in) :: self
+    !> x and y [m]
+    real(wp), intent(in) :: point(2)
+    !> Number of components, 1 or 3
+    integer, intent(in) :: n
+    real(wp) :: more(n), shear
+    integer :: k
+
+    associate (at => self%lattice)
+      more(1) = interpolate_pressure(at, self%pressure, self%squares, point) - interpolate(at, self%pressure, point, 0.0_wp)
+      if (n == 1) return
+      shear = interpolate(at, self%friction, point, 0.0_wp)*more(1) &
+              - interpolate_pressure(at, self%reserve, self%stick_squares, point) + interpolate(at, self%reserve, point, 0.0_wp)
+      do k = 2, n
+        more(k) = shear*interpolate(at, self%direction(:, :, k - 1), point, 0.0_wp)
+      end do
+    end associate
+  end function beyond_hats
+
+  !> Return whether a triangle at a node may have squares.
+  pure logical function near_edge(shape_of, col, row, n)
+    !> The shape
+    type(edge_shape_t), intent(in) :: shape_of
+    !> Column and row, counted from 1
+    integer, intent(in) :: col, row
+    !> Number of components
+    integer, intent(in) :: n
+
+    associate (c => [max(col - 1, 1), min(col + 1, size(shape_of%squares, 1))], &
+               r => [max(row - 1, 1), min(row + 1, size(shape_of%squares, 2))])
+      near_edge = any(abs(shape_of%squares(c(1):c(2), r(1):r(2))) >= 0.0_wp)
+      if (n > 1) near_edge = near_edge .or. any(abs(shape_of%stick_squares(c(1):c(2), r(1):r(2))) >= 0.0_wp)
+    end associate
+  end function near_edge
+
+end module hc_edge_tractions

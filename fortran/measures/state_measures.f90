@@ -1,0 +1,217 @@
+!> Measures of a state: residuals node by node, energy, areas of contact and stick and their extent.
+!>
+!> Equations: docs/theory/residuals.md, (R1) to (R3).
+module hc_state_measures
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
+  use hc_precision, only: wp
+  use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_contact_state, only: contact_state_t, separated, stick, normal, remote_displacement
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_zone_edge, only: zone_edge_t
+  use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, tangential_scale
+  use hc_normal_law, only: normal_law_t
+  use hc_friction_law, only: friction_law_t
+  use hc_zone_estimators, only: area_radius, pressure_center
+  implicit none
+  private
+
+  public :: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
+  public :: state_measures_t, zone_measures_t, measure_state
+
+  !> Size of a zone: of the cells of its nodes, and to its edge between the nodes.
+  type :: zone_measures_t
+    !> Areas [m^2], and radii of the discs with these areas [m]
+    real(wp) :: area = 0.0_wp, radius = 0.0_wp, area_fit = 0.0_wp, radius_fit = 0.0_wp
+    !> Half-axes of the ellipse with the moments of the area to the edge [m]
+    real(wp) :: semi_major = 0.0_wp, semi_minor = 0.0_wp
+  end type zone_measures_t
+
+  !> Quantities of a state that a load history records.
+  type :: state_measures_t
+    !> Contact area, and the part of it that sticks
+    type(zone_measures_t) :: contact, stick
+    !> Centroid of the pressure [m]
+    real(wp) :: pressure_center(2) = 0.0_wp
+    !> Centroid, smallest and largest coordinates of the stick area; NaN without stick [m]
+    real(wp) :: stick_center(2) = 0.0_wp, stick_lower(2) = 0.0_wp, stick_upper(2) = 0.0_wp
+    !> Largest pressure and shear traction [Pa]
+    real(wp) :: max_pressure = 0.0_wp, max_traction = 0.0_wp
+    !> Elastic energy of both bodies [J]
+    real(wp) :: elastic_energy = 0.0_wp
+  end type state_measures_t
+
+contains
+
+  !> Measure how far pressure and gap of a node are from the law of contact, over p_max: R_n is the largest value.
+  !> 0 where the gap is not finite.
+  function nodal_normal_residual(lattice, pair, law, state, space) result(residual)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Law of contact
+    class(normal_law_t), intent(in) :: law
+    !> State with pressure somewhere; its pressure and gap count
+    type(contact_state_t), intent(in) :: state
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    real(wp) :: residual(size(state%pressure, 1), size(state%pressure, 2))
+    real(wp) :: compliance
+    integer :: col, row
+
+    compliance = normal_self_compliance(lattice, pair)
+    residual = 0.0_wp
+    do row = 1, size(residual, 2)
+      do col = 1, size(residual, 1)
+        associate (p => state%pressure(col:col, row), g => state%gap(col:col, row))
+          if (ieee_is_finite(g(1))) then
+            call law%violation((row - 1)*size(residual, 1) + col, compliance, p, g, [.true.], residual(col, row))
+          end if
+        end associate
+      end do
+    end do
+    residual = residual/space%max(state%pressure)
+  end function nodal_normal_residual
+
+  !> Measure |q - P(q - ds/d_t)|/tau at the nodes in contact, P the projection on the cone: R_t is the largest value.
+  function nodal_tangential_residual(lattice, pair, friction, state, space) result(residual)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Law of friction
+    class(friction_law_t), intent(in) :: friction
+    !> State with pressure somewhere; its pressure, traction and slip increment count
+    type(contact_state_t), intent(in) :: state
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    real(wp) :: residual(size(state%pressure, 1), size(state%pressure, 2))
+    real(wp) :: p_max, stiffness, largest
+    integer :: col, row
+
+    residual = 0.0_wp
+    if (.not. friction%resists()) return
+    p_max = space%max(state%pressure)
+    stiffness = 1.0_wp/tangential_self_compliance(lattice, pair)
+    largest = 0.0_wp
+    do row = 1, size(residual, 2)
+      do col = 1, size(residual, 1)
+        if (state%pressure(col, row) <= 0.0_wp) cycle
+        associate (node => [state%pressure(col, row), state%traction(col, row, :), state%slip_increment(col, row, :)])
+          call friction%violation((row - 1)*size(residual, 1) + col, 1.0_wp/p_max, stiffness, node(1:1), node(2:2), node(3:3), &
+                                  node(4:4), node(5:5), largest, residual(col, row))
+        end associate
+      end do
+    end do
+    residual = sqrt(residual)/tangential_scale(friction, p_max, largest)
+  end function nodal_tangential_residual
+
+  !> Compute U = sum A_p (p w + q . (u_1 - u_2))/2 with w = g - g_0 + approach and u_1 - u_2 = s + shift + twist x r [J].
+  pure real(wp) function elastic_energy(lattice, initial_gap, state) result(energy)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Gap before loading (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> State, with friction or without
+    type(contact_state_t), intent(in) :: state
+    real(wp), allocatable :: x(:, :), y(:, :)
+    real(wp) :: moved(2)
+    integer :: col, row
+
+    allocate (x(size(initial_gap, 1), size(initial_gap, 2)), y(size(initial_gap, 1), size(initial_gap, 2)))
+    call lattice%coordinates(x, y)
+    energy = 0.0_wp
+    do row = 1, size(initial_gap, 2)
+      do col = 1, size(initial_gap, 1)
+        if (state%zone(col, row) == separated) cycle
+        energy = energy + state%pressure(col, row)*(state%gap(col, row) - initial_gap(col, row) + state%motion(normal))
+        if (.not. allocated(state%traction)) cycle
+        moved = state%relative_displacement(col, row, :) + remote_displacement(state%motion, x(col, row), y(col, row))
+        energy = energy + dot_product(state%traction(col, row, :), moved)
+      end do
+    end do
+    energy = 0.5_wp*lattice%cell_area()*energy
+  end function elastic_energy
+
+  !> Find the center of area of a zone, and smallest and largest coordinates of its nodes; NaN if there are none [m].
+  subroutine zone_extent(x, y, zone, center, lower, upper, space)
+    !> Coordinates of the nodes [m]
+    real(wp), intent(in), contiguous :: x(:, :), y(:, :)
+    !> Nodes of the zone
+    logical, intent(in), contiguous :: zone(:, :)
+    !> Mean, smallest and largest x and y
+    real(wp), intent(out) :: center(2), lower(2), upper(2)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: n
+
+    center = ieee_value(1.0_wp, ieee_quiet_nan)
+    lower = center
+    upper = center
+    n = space%count(zone)
+    if (n == 0) return
+    center = [space%sum(x, zone), space%sum(y, zone)]/n
+    lower = [space%min(x, zone), space%min(y, zone)]
+    upper = [space%max(x, zone), space%max(y, zone)]
+  end subroutine zone_extent
+
+  !> Measure areas of contact and stick, largest tractions and energy of a state, with friction or without.
+  type(state_measures_t) function measure_state(lattice, friction, initial_gap, candidate, state, space) result(found)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Law of friction; of no use without shear tractions
+    class(friction_law_t), intent(in) :: friction
+    !> Gap before loading (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that can touch (n_col, n_row)
+    logical, intent(in) :: candidate(:, :)
+    !> State
+    type(contact_state_t), intent(in) :: state
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    type(contact_edges_t) :: edges
+    real(wp), allocatable :: x(:, :), y(:, :), reserve(:, :), length(:)
+    logical, allocatable :: zone(:, :)
+    integer :: row
+
+    allocate (x, y, mold=initial_gap)
+    call lattice%coordinates(x, y)
+    zone = state%zone /= separated
+    call new_contact_edges(edges, lattice, state%pressure, state%gap, zone, candidate)
+    found%contact = size_of(lattice, space%count(zone), edges%contact_edge())
+    found%pressure_center = pressure_center(x, y, state%pressure)
+    found%max_pressure = space%max(state%pressure)
+    found%elastic_energy = elastic_energy(lattice, initial_gap, state)
+    if (.not. allocated(state%traction)) return
+    allocate (reserve, mold=initial_gap)
+    reserve = 0.0_wp ! of no use where nothing slips
+    if (friction%is_bounded()) then
+      allocate (length(size(reserve, 1)))
+      do row = 1, size(reserve, 2)
+        call friction%find_bounds((row - 1)*size(reserve, 1) + 1, state%pressure(:, row), reserve(:, row))
+        call friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), length)
+        reserve(:, row) = reserve(:, row) - length
+      end do
+    end if
+    zone = state%zone == stick
+    found%stick = size_of(lattice, space%count(zone), edges%stick_edge(zone, reserve))
+    call zone_extent(x, y, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
+    found%max_traction = space%max(norm2(state%traction, dim=3))
+  end function measure_state
+
+  !> Measure a zone with this edge.
+  pure type(zone_measures_t) function size_of(lattice, n_node, edge) result(found)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes of the zone
+    integer, intent(in) :: n_node
+    !> Its edge
+    type(zone_edge_t), intent(in) :: edge
+
+    found = zone_measures_t(lattice%cell_area()*n_node, area_radius(n_node, lattice%cell_area()), &
+                            edge%area, edge%radius(), edge%ellipse%semi_major, edge%ellipse%semi_minor)
+  end function size_of
+
+end module hc_state_measures

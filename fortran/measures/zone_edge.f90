@@ -1,0 +1,396 @@
+!> The edge of a zone between the nodes, and a mesh of the zone that ends there.
+!>
+!> The distance from the edge is known at the nodes about it, positive inside, in spacings. It is linear on the triangles
+!> of the lattice, and the edge is where it is zero. Where a triangle has a node that can never touch, as at the rim of a
+!> punch, the zone ends half-way to it: with the cells of its nodes. Fields have the shape (n_col, n_row).
+!>
+!> Equations: docs/theory/edges.md, (B5).
+module hc_zone_edge
+  use, intrinsic :: iso_fortran_env, only: int8
+  use hc_precision, only: wp, pi
+  use hc_options, only: edge_options_t
+  use hc_lattice, only: lattice_t
+  use hc_edge_band, only: edge_band_t
+  use hc_zone_estimators, only: ellipse_t, ellipse_of_moments
+  implicit none
+  private
+
+  public :: zone_edge_t, zone_mesh_t, edge_of_zone, mesh_of_zone, distance_field, cut_triangles
+
+  !> Corners of the lower and of the upper triangle of a cell, counterclockwise: column and row.
+  integer, parameter :: corner(2, 3, 2) = reshape([0, 0, 1, 0, 0, 1, 1, 1, 0, 1, 1, 0], [2, 3, 2])
+
+  !> An area of the plane whose edge runs between the nodes.
+  type :: zone_edge_t
+    !> Area [m^2]
+    real(wp) :: area = 0.0_wp
+    !> Ellipse with the second moments of the area; of an elliptic area it is the edge
+    type(ellipse_t) :: ellipse
+    !> Pieces of the edge, in no order: x and y, first and last point; none where the zone ends at nodes that can never
+    !> touch (2, 2, n) [m]
+    real(wp), allocatable :: segments(:, :, :)
+  contains
+    !> Radius of the disc with the same area [m]
+    procedure :: radius
+    !> Length of the edge [m]
+    procedure :: length
+  end type zone_edge_t
+
+  !> Triangles that fill a zone up to its edge, and a field on them.
+  type :: zone_mesh_t
+    !> Corners (2, n) [m], and the field there (n)
+    real(wp), allocatable :: points(:, :), values(:)
+    !> Numbers of the corners of each triangle, counted from 1, counterclockwise (3, m)
+    integer, allocatable :: triangles(:, :)
+    !> Number of points and of triangles
+    integer :: n_point = 0, n_triangle = 0
+  contains
+    procedure, private :: add_point, add_polygon
+  end type zone_mesh_t
+
+contains
+
+  !> Return the radius of the disc with the same area [m].
+  pure real(wp) function radius(self)
+    class(zone_edge_t), intent(in) :: self
+    radius = sqrt(self%area/pi)
+  end function radius
+
+  !> Return the length of the edge [m].
+  pure real(wp) function length(self)
+    class(zone_edge_t), intent(in) :: self
+    length = sum(norm2(self%segments(:, 2, :) - self%segments(:, 1, :), dim=1))
+  end function length
+
+  !> Count the triangles that the edge of a zone cuts.
+  pure integer function cut_triangles(zone)
+    !> Nodes of the zone (n_col, n_row)
+    logical, intent(in) :: zone(:, :)
+    integer :: n_with(0:3)
+
+    n_with = triangles(with_rim(zone))
+    cut_triangles = n_with(1) + n_with(2)
+  end function cut_triangles
+
+  !> Return a zone with a rim of nodes outside it: 1 in the zone, else 0.
+  pure function with_rim(zone) result(padded)
+    !> Nodes of the zone (n_col, n_row)
+    logical, intent(in) :: zone(:, :)
+    integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
+
+    padded = 0_int8
+    padded(1:size(zone, 1), 1:size(zone, 2)) = merge(1_int8, 0_int8, zone)
+  end function with_rim
+
+  !> Count the triangles with no, one, two and three corners in a zone.
+  pure function triangles(padded) result(n_with)
+    !> Zone with a rim
+    integer(int8), intent(in) :: padded(0:, 0:)
+    integer :: n_with(0:3), col, row, half, inside(2)
+
+    n_with = 0
+    do row = 0, ubound(padded, 2) - 1
+      do col = 0, ubound(padded, 1) - 1
+        inside = nodes_inside(padded(col:col + 1, row:row + 1))
+        do half = 1, 2
+          n_with(inside(half)) = n_with(inside(half)) + 1
+        end do
+      end do
+    end do
+  end function triangles
+
+  !> Count the corners of the lower and of the upper triangle of a cell that are in a zone.
+  pure function nodes_inside(cell) result(inside)
+    !> Its nodes: 1 in the zone, else 0
+    integer(int8), intent(in) :: cell(2, 2)
+    integer :: inside(2)
+    inside = cell(2, 1) + cell(1, 2) + [cell(1, 1), cell(2, 2)]
+  end function nodes_inside
+
+  !> Cut the triangles at the edge of a zone.
+  pure function edge_of_zone(lattice, candidate, zone, band, distance) result(edge)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes that can touch, nodes of the zone
+    logical, intent(in) :: candidate(:, :), zone(:, :)
+    !> Nodes about its edge, and their distances from it
+    type(edge_band_t), intent(in) :: band
+    real(wp), intent(in) :: distance(:)
+    type(zone_edge_t) :: edge
+    integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
+    real(wp), allocatable :: segments(:, :, :)
+    logical, allocatable :: can_touch(:)
+    real(wp) :: covered, moments(6), sign
+    integer :: n_with(0:3), inside(2), corners(2, 3), at(3), lone, col, row, half, n
+
+    padded = with_rim(zone)
+    n_with = triangles(padded)
+    can_touch = band%part_of(candidate)
+    allocate (segments(2, 2, n_with(1) + n_with(2)))
+    n = 0
+    covered = n_with(3)
+    moments = 0.0_wp
+    do row = 0, size(zone, 2)
+      do col = 0, size(zone, 1)
+        inside = nodes_inside(padded(col:col + 1, row:row + 1))
+        do half = 1, 2
+          if (inside(half) == 0) cycle
+          corners = reshape([half - 1, half - 1, 1, 0, 0, 1], [2, 3]) + spread([col, row], 2, 3)
+          if (inside(half) == 3) then
+            moments = moments + moments_of(real(corners, wp))
+            cycle
+          end if
+          at = [band%place(corners(1, 1), corners(2, 1)), band%place(corners(1, 2), corners(2, 2)), &
+                band%place(corners(1, 3), corners(2, 3))]
+          if (all(can_touch(at))) then
+            n = n + 1
+            call cut(real(corners, wp), distance(at), lone, segments(:, :, n), covered)
+            sign = merge(1.0_wp, -1.0_wp, inside(half) == 1)
+            if (inside(half) == 2) moments = moments + moments_of(real(corners, wp))
+            moments = moments + sign*moments_of(reshape([real(corners(:, lone), wp), segments(:, :, n)], [2, 3]))
+          else
+            covered = covered + inside(half)/3.0_wp
+            do lone = 1, 3  ! a third of the triangle for each node inside, in the moments at the node
+              if (padded(corners(1, lone), corners(2, lone)) /= 0) then
+                moments = moments + moments_of(spread(real(corners(:, lone), wp), 2, 3), 1.0_wp/6.0_wp)
+              end if
+            end do
+          end if
+        end do
+      end do
+    end do
+    edge%area = 0.5_wp*lattice%cell_area()*covered
+    if (moments(1) > 0.0_wp) edge%ellipse = ellipse_of(lattice, moments)
+    allocate (edge%segments(2, 2, n))
+    do half = 1, n
+      do col = 1, 2
+        edge%segments(:, col, half) = position(lattice, segments(:, col, half))
+      end do
+    end do
+  end function edge_of_zone
+
+  !> Return the place of a column and row, counted from 1 [m].
+  pure function position(lattice, index)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Column and row
+    real(wp), intent(in) :: index(2)
+    real(wp) :: position(2)
+    position = lattice%origin + matmul(lattice%basis, lattice%first - 1 + index)
+  end function position
+
+  !> Compute the area of a triangle, its first moments and its second ones (xx, xy, yy), in columns and rows.
+  pure function moments_of(corners, area) result(moments)
+    !> Columns and rows of the corners
+    real(wp), intent(in) :: corners(2, 3)
+    !> Area, if it is another one
+    real(wp), intent(in), optional :: area
+    real(wp) :: moments(6), total(2)
+
+    total = sum(corners, dim=2)
+    associate (a => corners(:, 2) - corners(:, 1), b => corners(:, 3) - corners(:, 1))
+      moments(1) = 0.5_wp*abs(a(1)*b(2) - a(2)*b(1))
+    end associate
+    if (present(area)) moments(1) = area
+    moments(2:3) = total/3.0_wp
+    moments(4) = (sum(corners(1, :)**2) + total(1)**2)/12.0_wp
+    moments(5) = (sum(corners(1, :)*corners(2, :)) + total(1)*total(2))/12.0_wp
+    moments(6) = (sum(corners(2, :)**2) + total(2)**2)/12.0_wp
+    moments(2:) = moments(1)*moments(2:)
+  end function moments_of
+
+  !> Find the ellipse with the moments of an area, (B5).
+  pure function ellipse_of(lattice, moments) result(ellipse)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Area, first and second moments in columns and rows
+    real(wp), intent(in) :: moments(6)
+    type(ellipse_t) :: ellipse
+    real(wp) :: central(2, 2)
+
+    associate (mean => moments(2:3)/moments(1))
+      central = reshape([moments(4), moments(5), moments(5), moments(6)]/moments(1), [2, 2]) &
+                - spread(mean, 2, 2)*spread(mean, 1, 2)
+      central = matmul(lattice%basis, matmul(central, transpose(lattice%basis)))
+      ellipse = ellipse_of_moments(position(lattice, mean), central(1, 1), central(1, 2), central(2, 2))
+    end associate
+  end function ellipse_of
+
+  !> Cut one triangle: add its part inside, and return the ends of the piece of the edge.
+  pure subroutine cut(corners, distance, lone, ends, covered)
+    !> Column and row of the corners, and their distances
+    real(wp), intent(in) :: corners(2, 3), distance(3)
+    !> Number of the corner that is alone on its side
+    integer, intent(out) :: lone
+    !> Columns and rows of both ends
+    real(wp), intent(out) :: ends(2, 2)
+    !> Area inside so far, in triangles
+    real(wp), intent(inout) :: covered
+    real(wp) :: way
+    integer :: order(3), k
+
+    ! the corner that is on its own side goes first
+    order = modulo(findloc(distance > 0.0_wp, count(distance > 0.0_wp) == 1, dim=1) + [-1, 0, 1], 3) + 1
+    lone = order(1)
+    way = 1.0_wp
+    do k = 1, 2
+      associate (one => distance(order(1)), other => distance(order(k + 1)))
+        way = way*(one/(one - other))
+        ends(:, k) = corners(:, order(1)) + one/(one - other)*(corners(:, order(k + 1)) - corners(:, order(1)))
+      end associate
+    end do
+    covered = covered + merge(way, 1.0_wp - way, distance(order(1)) > 0.0_wp)
+  end subroutine cut
+
+  !> Return the distances of all nodes from the edge, in spacings, cut off far away; at the rim of a punch the edge is half-way.
+  pure function distance_field(candidate, zone, band, distance, options) result(field)
+    !> Nodes that can touch, nodes of the zone
+    logical, intent(in) :: candidate(:, :), zone(:, :)
+    !> Nodes about its edge, and their distances from it
+    type(edge_band_t), intent(in) :: band
+    real(wp), intent(in) :: distance(:)
+    !> Tuning numbers
+    type(edge_options_t), intent(in) :: options
+    real(wp) :: field(size(zone, 1), size(zone, 2))
+    logical, allocatable :: inside(:), can_touch(:)
+    integer :: k, j
+
+    associate (away => options%largest_distance)
+      field = merge(away, -away, zone)
+      allocate (inside, source=band%part_of(zone))
+      can_touch = band%part_of(candidate)
+      do k = 1, band%n
+        associate (col => band%node(1, k), row => band%node(2, k))
+          if (min(col, row) < 1 .or. col > size(zone, 1) .or. row > size(zone, 2)) cycle
+          field(col, row) = min(max(distance(k), -away), away)
+          if (inside(k) .or. can_touch(k)) cycle
+          do j = 1, size(band%beside, 1)
+            associate (m => band%beside(j, k))
+              if (m == 0) cycle
+              if (inside(m)) field(col, row) = min(field(col, row), -min(distance(m), away))
+            end associate
+          end do
+        end associate
+      end do
+    end associate
+  end function distance_field
+
+  !> Fill a zone with triangles up to its edge, and carry a field there.
+  !>
+  !> At the edge the field vanishes, or goes on linearly from the two nodes before it on its line of nodes. Half-way to a
+  !> node that can never touch it is that of the node inside.
+  pure function mesh_of_zone(lattice, candidate, zone, band, distance, field, vanishes) result(mesh)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Nodes that can touch, nodes of the zone
+    logical, intent(in) :: candidate(:, :), zone(:, :)
+    !> Nodes about its edge, and their distances from it
+    type(edge_band_t), intent(in) :: band
+    real(wp), intent(in) :: distance(:)
+    !> Values at the nodes; only those of the zone matter
+    real(wp), intent(in) :: field(:, :)
+    !> Whether they vanish at the edge, like tractions
+    logical, intent(in) :: vanishes
+    type(zone_mesh_t) :: mesh
+    integer(int8) :: padded(0:size(zone, 1) + 1, 0:size(zone, 2) + 1)
+    logical, allocatable :: can_touch(:)
+    integer, allocatable :: at_node(:, :), at_cut(:, :, :)
+    integer :: n_with(0:3), polygon(5), ends(2, 2), base(2), kind, length, leaving, middle, col, row, half, k
+    real(wp) :: part, value
+    logical :: is_rim, touches
+
+    padded = with_rim(zone)
+    n_with = triangles(padded)
+    can_touch = band%part_of(candidate)
+    associate (n_cut => n_with(1) + n_with(2), n_node => count(zone))
+      allocate (mesh%points(2, n_node + 3*n_cut), mesh%values(n_node + 3*n_cut), mesh%triangles(3, n_with(3) + 3*n_cut))
+    end associate
+    allocate (at_node(0:size(zone, 1) + 1, 0:size(zone, 2) + 1), source=0)
+    allocate (at_cut(0:size(zone, 1) + 1, 0:size(zone, 2) + 1, 3), source=0)
+    do row = 0, size(zone, 2)
+      do col = 0, size(zone, 1)
+        do half = 1, 2
+          length = 0
+          leaving = 0
+          is_rim = .false.
+          do k = 1, 3
+            ends(:, 1) = [col, row] + corner(:, k, half)
+            ends(:, 2) = [col, row] + corner(:, modulo(k, 3) + 1, half)
+            associate (here => ends(:, 1), next => ends(:, 2), number => at_node(ends(1, 1), ends(2, 1)))
+              if (padded(here(1), here(2)) /= 0) then
+                if (number == 0) call mesh%add_point(position(lattice, real(here, wp)), field(here(1), here(2)), number)
+                length = length + 1
+                polygon(length) = number
+              end if
+              if (padded(here(1), here(2)) == padded(next(1), next(2))) cycle
+              if (padded(here(1), here(2)) /= 0) leaving = length + 1
+              if (padded(here(1), here(2)) == 0) ends = ends(:, 2:1:-1)
+            end associate
+            associate (node => ends(:, 1), beyond => ends(:, 2), link => ends(:, 2) - ends(:, 1))
+              touches = can_touch(band%place(beyond(1), beyond(2)))
+              is_rim = is_rim .or. .not. touches
+              length = length + 1
+              base = merge(node, beyond, link(2) > 0 .or. (link(2) == 0 .and. link(1) > 0))
+              kind = merge(1, merge(2, 3, link(1) == 0), link(2) == 0)
+              if (at_cut(base(1), base(2), kind) == 0) then
+                part = 0.5_wp  ! the edge of the cells
+                value = field(node(1), node(2))
+                if (touches) then
+                  associate (one => distance(band%place(node(1), node(2))), other => distance(band%place(beyond(1), beyond(2))))
+                    part = one/(one - other)
+                  end associate
+                  if (padded(node(1) - link(1), node(2) - link(2)) /= 0) then
+                    value = value + part*(value - field(node(1) - link(1), node(2) - link(2)))
+                  end if
+                  if (vanishes) value = 0.0_wp
+                end if
+                call mesh%add_point(position(lattice, node + part*link), value, at_cut(base(1), base(2), kind))
+              end if
+              polygon(length) = at_cut(base(1), base(2), kind)
+            end associate
+          end do
+          if (length == 0) cycle
+          if (is_rim) then
+            middle = 0
+            call mesh%add_point(position(lattice, [col, row] + sum(corner(:, :, half), dim=2)/3.0_wp), &
+                                sum(mesh%values(polygon(:length)))/length, middle)
+            call mesh%add_polygon([middle, cshift(polygon(:length), leaving)])
+          else
+            call mesh%add_polygon(polygon(:length))
+          end if
+        end do
+      end do
+    end do
+    mesh%points = mesh%points(:, :mesh%n_point)
+    mesh%values = mesh%values(:mesh%n_point)
+    mesh%triangles = mesh%triangles(:, :mesh%n_triangle)
+  end function mesh_of_zone
+
+  !> Add a point to a mesh.
+  pure subroutine add_point(mesh, point, value, number)
+    class(zone_mesh_t), intent(inout) :: mesh
+    !> Its place [m], and the field there
+    real(wp), intent(in) :: point(2), value
+    !> Its number
+    integer, intent(out) :: number
+
+    mesh%n_point = mesh%n_point + 1
+    number = mesh%n_point
+    mesh%points(:, number) = point
+    mesh%values(number) = value
+  end subroutine add_point
+
+  !> Add the triangles of a polygon, all with its first corner.
+  pure subroutine add_polygon(mesh, corners)
+    class(zone_mesh_t), intent(inout) :: mesh
+    !> Numbers of its corners, counterclockwise
+    integer, intent(in) :: corners(:)
+    integer :: k
+
+    do k = 2, size(corners) - 1
+      mesh%n_triangle = mesh%n_triangle + 1
+      mesh%triangles(:, mesh%n_triangle) = [corners(1), corners(k), corners(k + 1)]
+    end do
+  end subroutine add_polygon
+
+end module hc_zone_edge

@@ -1,0 +1,334 @@
+!> Fourier preconditioner: the inverse of the lattice symbol on a small periodic grid.
+!>
+!> The grid is that of the window, or the next of a fast length, instead of twice
+!> as large, so that one application costs about a quarter of a product. It is symmetric
+!> and positive definite, also when it is restricted to a set of nodes.
+!>
+!> For shear tractions there is a second one, of a body whose every node has a soft spring (symbol_preconditioner says where
+!> it serves).
+!>
+!> Equations: docs/theory/preconditioner.md, (P1), (P4) to (P6).
+module hc_inverse_symbol
+  use hc_precision, only: wp, sp
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_fftw, only: good_size
+  use hc_convolution_single, only: convolution_t, new_convolution
+  use hc_fft_layout_single, only: convolution_memory
+  use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_preconditioner_extension, only: edge_extension_t
+  use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
+  implicit none
+  private
+
+  public :: inverse_symbol_t, new_inverse_symbol, preconditioner_memory, node_compliance
+
+  !> A transform in single precision moves half of the bytes, and is counted as half of one.
+  real(wp), parameter, public :: single_cost = 0.5_wp
+
+  !> Blocks (onto, from) of the symmetric inverse.
+  integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
+  !> Self-compliance d_n of a node over lambda_1 and the spacing: K1(0) of the equilateral lattice.
+  real(wp), parameter :: self_ratio = 2.854_wp
+  !> Compliance of springs, over d_n, up to which they count as stiff.
+  real(wp), parameter :: stiff = 0.5_wp
+  !> Kernels of the tangential inverse; those on soft springs come after them.
+  integer, parameter :: n_tangential = 3
+
+  !> Approximate inverse of the normal or of the tangential flexibility.
+  type :: inverse_symbol_t
+    type(convolution_t), private :: convolution
+    !> Displacement per traction that the single precision numbers are scaled with [m/Pa]
+    real(wp) :: unit = 1.0_wp
+    !> Of the tangential flexibility
+    logical, private :: tangential = .false.
+    !> Columns, rows and components of the fields
+    integer, private :: shape(3) = 0
+    !> Fields in single precision
+    real(sp), allocatable, private :: given(:, :, :), wanted(:, :, :)
+    !> Cost of one application in applications of the full flexibility operator
+    real(wp) :: cost = 0.0_wp
+    !> On springs along the normal: the inverse symbol, and the factor S of each node (n_col, n_row)
+    type(convolution_t), allocatable, private :: sprung
+    real(sp), allocatable, private :: share(:, :)
+    !> They are stiffer than the nodes: displacements go on beyond the edge as they do without springs
+    logical, private :: stiff_springs = .false.
+  contains
+    !> Put the nodes on springs along the normal
+    procedure :: set_springs
+    !> Traction that causes a given displacement, approximately
+    procedure :: apply
+    !> The same in single precision, displacements and tractions in any units of ratio `unit`
+    procedure :: apply_single
+  end type inverse_symbol_t
+
+contains
+
+  !> Make plans and inverse symbol over a window.
+  subroutine new_inverse_symbol(self, lattice, pair, space, error, soft, cache)
+    !> Preconditioner to be set up
+    type(inverse_symbol_t), intent(out) :: self
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> For shear tractions instead of the pressure: compliance of soft springs over that of a node
+    real(wp), intent(in), optional :: soft
+    !> Cache of spectra; for the usual springs
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+
+    type(kernel_key_t) :: key
+    integer, allocatable :: f(:, :)
+    integer :: length(2), b, i, n_component
+    real(wp) :: scale, k(3), matrix(3), spring, layer, basis(2, 2), gamma
+    real(wp), allocatable :: symbol(:)
+    logical :: found
+
+    self%tangential = present(soft)
+    n_component = merge(2, 1, self%tangential)
+    self%shape = [lattice%extent, n_component]
+    length = good_size(lattice%extent)
+    call new_convolution(self%convolution, lattice%extent, length, merge(2*n_tangential, 1, self%tangential), n_component, &
+                         space, error)
+    if (allocated(error)) return
+    self%unit = pair%lambda_1*lattice%spacing()
+    self%cost = single_cost*n_component*product(real(length, wp))/product(real(good_size(2*lattice%extent - 1), wp))/3.0_wp
+    key = new_kernel_key(merge(inverse_of_shear, inverse_of_pressure, self%tangential), lattice, pair)
+    call self%convolution%find_spectra(found, error, cache, key)
+    if (found .or. allocated(error)) return
+    ! all in units of lambda_1 and the spacing
+    basis = lattice%unit_basis()
+    gamma = pair%gamma()
+    spring = 0.0_wp
+    layer = pair%tangential_layer/self%unit
+    if (self%tangential) spring = soft*(node_ratio(pair) + layer)
+    scale = 1.0_wp/product(real(length, wp))
+    !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, k, matrix, symbol)
+    do b = 1, self%convolution%n_block
+      f = self%convolution%frequencies(b)
+      if (.not. self%tangential) then
+        allocate (symbol(size(f, 2)))
+        ! beyond length/2 there is mere filling
+        f(1, :) = min(f(1, :), length(1)/2)
+        call normal_symbols(basis, length, f, symbol)
+        self%convolution%spectrum(:, b, 1) = real(scale/symbol, sp)
+        deallocate (symbol)
+      else
+        do i = 1, size(f, 2)
+          if (f(1, i) > length(1)/2) cycle
+          k = kernel_symbols(basis, length, f(:, i))
+          ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
+          matrix = [k(symbol_1) + gamma*k(symbol_xx), gamma*k(symbol_xy), k(symbol_1) + gamma*(k(symbol_1) - k(symbol_xx))]
+          matrix([1, 3]) = matrix([1, 3]) + layer
+          self%convolution%spectrum(i, b, :n_tangential) = real(scale*inverse(matrix), sp)
+          matrix([1, 3]) = matrix([1, 3]) + spring
+          self%convolution%spectrum(i, b, n_tangential + 1:) = real(scale*inverse(matrix), sp)
+        end do
+      end if
+    end do
+    !$omp end parallel do
+    call self%convolution%store_spectra(cache, key)
+  end subroutine new_inverse_symbol
+
+  !> Invert a symmetric matrix.
+  pure function inverse(matrix)
+    !> Elements xx, xy and yy
+    real(wp), intent(in) :: matrix(3)
+    real(wp) :: inverse(3)
+    inverse = [matrix(3), -matrix(2), matrix(1)]/(matrix(1)*matrix(3) - matrix(2)**2)
+  end function inverse
+
+  !> Count the bytes that the preconditioner takes, for a window of the given size.
+  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, threads, tangential)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: threads
+    !> For shear tractions instead of the pressure
+    logical, intent(in) :: tangential
+    integer, parameter :: long = selected_int_kind(18)
+
+    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), &
+                                               merge(2, 1, tangential), threads)
+    ! fields in single precision; those of the tangential one belong to the shear system
+    if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
+  end function preconditioner_memory
+
+  !> Estimate the traction that causes a given displacement.
+  subroutine apply(self, displacement, traction, edge)
+    class(inverse_symbol_t), intent(inout) :: self
+    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2) [m]
+    real(wp), intent(in) :: displacement(self%shape(1), self%shape(2), self%shape(3))
+    !> Pressure, or shear tractions (n_col, n_row, 1 or 2) [Pa]
+    real(wp), intent(out) :: traction(self%shape(1), self%shape(2), self%shape(3))
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in), optional :: edge
+    real(sp), allocatable :: given(:, :, :), wanted(:, :, :)
+    integer :: row, m
+
+    ! out of `self`, which the product changes
+    call move_alloc(self%given, given)
+    call move_alloc(self%wanted, wanted)
+    if (.not. allocated(given)) then
+      allocate (given(size(displacement, 1), size(displacement, 2), size(displacement, 3)))
+      allocate (wanted, mold=given)
+    end if
+    associate (space => self%convolution%space)
+      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
+      do m = 1, size(given, 3)
+        do row = 1, size(given, 2)
+          given(:, row, m) = real(displacement(:, row, m)/self%unit, sp)
+        end do
+      end do
+      !$omp end parallel do
+      call self%apply_single(given, wanted, edge)
+      !$omp parallel do collapse(2) schedule(static) num_threads(space%threads)
+      do m = 1, size(wanted, 3)
+        do row = 1, size(wanted, 2)
+          traction(:, row, m) = wanted(:, row, m)
+        end do
+      end do
+      !$omp end parallel do
+    end associate
+    call move_alloc(given, self%given)
+    call move_alloc(wanted, self%wanted)
+  end subroutine apply
+
+  !> Estimate it in single precision, displacements and tractions in any units of ratio `unit`.
+  subroutine apply_single(self, displacement, traction, edge, on_springs)
+    class(inverse_symbol_t), intent(inout) :: self
+    !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
+    real(sp), intent(inout), target :: displacement(self%shape(1), self%shape(2), self%shape(3))
+    !> Pressure, or shear tractions (n_col, n_row, 1 or 2)
+    real(sp), intent(out), target :: traction(self%shape(1), self%shape(2), self%shape(3))
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in), optional :: edge
+    !> Displacements of nodes on soft springs; absent: without springs
+    logical, intent(in), optional :: on_springs
+    real(sp), pointer, contiguous :: field(:)
+    integer :: m, block(2, 2)
+
+    if (allocated(self%sprung)) then
+      call apply_on_springs(self, displacement(:, :, 1), traction, edge)
+      return
+    end if
+    if (present(edge)) then
+      do m = 1, size(displacement, 3)
+        field(1:size(displacement, 1)*size(displacement, 2)) => displacement(:, :, m)
+        call edge%extend(field)
+      end do
+    end if
+    if (self%tangential) then
+      block = tangential_block
+      if (present(on_springs)) block = block + merge(n_tangential, 0, on_springs)
+      call self%convolution%convolve(block, displacement, traction)
+    else
+      call self%convolution%convolve(normal_block, displacement, traction)
+    end if
+    if (.not. present(edge)) return
+    do m = 1, size(displacement, 3)
+      field(1:size(displacement, 1)*size(displacement, 2)) => traction(:, :, m)
+      call edge%fold(field)
+    end do
+  end subroutine apply_single
+
+  !> Put the nodes on springs along the normal, of a compliant interface.
+  !>
+  !> Their compliance varies smoothly from the middle of the contact to its edge, so that one inverse symbol, of the body on
+  !> springs of a mean compliance, serves them all, (P7).
+  subroutine set_springs(self, compliance, active)
+    class(inverse_symbol_t), intent(inout) :: self
+    !> Compliance of each spring (n_col, n_row) [m/Pa]
+    real(wp), intent(in) :: compliance(:, :)
+    !> Active nodes (n_col, n_row)
+    logical, intent(in) :: active(:, :)
+    type(error_t), allocatable :: error
+    real(wp) :: mean, self_compliance
+    real(sp) :: stretch
+    logical :: found
+    integer :: block, row
+
+    if (.not. any(active .and. compliance > 0.0_wp)) return
+    if (.not. allocated(self%sprung)) then
+      allocate (self%sprung, self%share(size(compliance, 1), size(compliance, 2)))
+      call new_convolution(self%sprung, shape(compliance), good_size(shape(compliance)), 1, 1, self%convolution%space, error)
+      if (.not. allocated(error)) call self%sprung%find_spectra(found, error)
+      if (allocated(error)) then
+        ! without memory for it: the symbol without springs still is a preconditioner
+        deallocate (self%sprung, self%share)
+        return
+      end if
+    end if
+    self_compliance = self_ratio*self%unit
+    mean = minval(compliance, mask=active .and. compliance > 0.0_wp)
+    mean = mean*sum(mean/compliance, mask=active .and. compliance > 0.0_wp) &
+           /sum((mean/compliance)**2, mask=active .and. compliance > 0.0_wp)
+    self%stiff_springs = mean < stiff*self_compliance
+    ! the spectrum is the inverse of the symbol over the number of frequencies
+    stretch = real(mean/self%unit*product(real(good_size(shape(compliance)), wp)), sp)
+    !$omp parallel do schedule(static) num_threads(self%convolution%space%threads)
+    do block = 1, self%sprung%n_block
+      associate (stiffness => self%convolution%spectrum(:, block, 1))
+        self%sprung%spectrum(:, block, 1) = stiffness/(1.0_sp + stretch*stiffness)
+      end associate
+    end do
+    !$omp end parallel do
+    !$omp parallel do schedule(static) num_threads(self%convolution%space%threads)
+    do row = 1, size(compliance, 2)
+      self%share(:, row) = real(sqrt((mean + self_compliance)/(compliance(:, row) + self_compliance)), sp)
+    end do
+    !$omp end parallel do
+  end subroutine set_springs
+
+  !> Apply the inverse for nodes on springs along the normal.
+  subroutine apply_on_springs(self, displacement, traction, edge)
+    class(inverse_symbol_t), intent(inout) :: self
+    !> Closing of the gap (n_col, n_row)
+    real(sp), intent(in) :: displacement(:, :)
+    !> Pressure (n_col, n_row, 1)
+    real(sp), intent(out), contiguous, target :: traction(:, :, :)
+    !> Continuation beyond the nodes where displacements are given
+    type(edge_extension_t), intent(in), optional :: edge
+    real(sp), allocatable, target :: shared(:, :, :)
+    real(sp), pointer, contiguous :: field(:)
+
+    allocate (shared, mold=traction)
+    shared(:, :, 1) = self%share*displacement
+    if (present(edge) .and. self%stiff_springs) then
+      field(1:size(shared)) => shared
+      call edge%extend(field)
+    end if
+    call self%sprung%convolve(normal_block, shared, traction)
+    if (present(edge) .and. self%stiff_springs) then
+      field(1:size(traction)) => traction
+      call edge%fold(field)
+    end if
+    traction(:, :, 1) = self%share*traction(:, :, 1)
+  end subroutine apply_on_springs
+
+  !> Compute the elastic compliance t_h = 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa].
+  pure real(wp) function node_compliance(lattice, pair)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+
+    node_compliance = node_ratio(pair)*pair%lambda_1*lattice%spacing() + pair%tangential_layer
+  end function node_compliance
+
+  !> Compute t_h over lambda_1 and the spacing.
+  pure real(wp) function node_ratio(pair)
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+
+    node_ratio = 2.0_wp + pair%gamma()
+  end function node_ratio
+
+end module hc_inverse_symbol

@@ -1,0 +1,85 @@
+!> Abstract preconditioner of the linear problems of contact.
+!>
+!> The linear problems of contact are K x + D x = b on the active nodes: K is a part of the flexibility operator, D the
+!> compliance of springs in series with the nodes. A preconditioner M is a symmetric positive definite estimate of
+!> (K + D)^-1 there. The preconditioner of the whole library is that of symbol_preconditioner; another one extends this type and is
+!> given to hc_elastic_operators or hc_normal_lattice in its place.
+!>
+!> Equations: docs/theory/preconditioner.md.
+module hc_preconditioner
+  use hc_precision, only: wp, sp
+  implicit none
+  private
+
+  public :: preconditioner_t
+
+  !> Approximate inverse of the normal or of the tangential flexibility on the active nodes.
+  type, abstract :: preconditioner_t
+    !> Displacement per traction that numbers in single precision are scaled with [m/Pa]
+    real(wp) :: unit = 1.0_wp
+  contains
+    !> Set the active nodes
+    procedure(set_active), deferred :: set_active
+    !> Estimate the traction that causes a displacement
+    procedure(apply), deferred :: apply
+    !> The same in single precision
+    procedure :: apply_single
+    !> Forget the active nodes, and free what was stored for them
+    procedure :: clear
+  end type preconditioner_t
+
+  abstract interface
+    !> Set the active nodes, and the springs in series with them.
+    subroutine set_active(self, active, compliance, direction)
+      import :: preconditioner_t, wp
+      class(preconditioner_t), intent(inout) :: self
+      !> Active nodes (n)
+      logical, intent(in), contiguous :: active(:)
+      !> Compliance D of the springs along the first component of a vector (n); absent: no springs [m/Pa]. It has to outlive
+      !> the applications
+      real(wp), intent(in), optional, target, contiguous :: compliance(:)
+      !> With two components: the second axis e of the frame (t, e) of each node (2, n); it has to outlive the applications
+      real(wp), intent(in), optional, target, contiguous :: direction(:, :)
+    end subroutine set_active
+
+    !> Compute z = M r for an r that vanishes off the active nodes; z is used on them only.
+    subroutine apply(self, displacement, traction, work)
+      import :: preconditioner_t, wp
+      class(preconditioner_t), intent(inout) :: self
+      !> Displacement, one component after the other, shear in the frames (n or 2 n) [m]
+      real(wp), intent(in), contiguous, target :: displacement(:)
+      !> Traction that causes it (n or 2 n) [Pa]
+      real(wp), intent(out), contiguous, target :: traction(:)
+      !> Work so far, in applications of the full flexibility operator; this one is added
+      real(wp), intent(inout) :: work
+    end subroutine apply
+  end interface
+
+contains
+
+  !> Compute z = M r in single precision, in units of displacement and traction of the ratio `unit`.
+  subroutine apply_single(self, displacement, traction, work)
+    class(preconditioner_t), intent(inout) :: self
+    !> Displacement; values off the active nodes may change (n or 2 n)
+    real(sp), intent(inout), contiguous, target :: displacement(:)
+    !> Traction that causes it (n or 2 n)
+    real(sp), intent(out), contiguous, target :: traction(:)
+    !> Work so far, in applications of the full flexibility operator; this one is added
+    real(wp), intent(inout) :: work
+    real(wp), allocatable :: given(:), wanted(:)
+
+    allocate (given(size(displacement)), wanted(size(traction)))
+    given = self%unit*displacement
+    call self%apply(given, wanted, work)
+    traction = real(wanted, sp)
+  end subroutine apply_single
+
+  !> Forget the active nodes: by default nothing is stored for them.
+  subroutine clear(self)
+    class(preconditioner_t), intent(inout) :: self
+
+    associate (nothing_of => self)
+    end associate
+  end subroutine clear
+
+end module hc_preconditioner

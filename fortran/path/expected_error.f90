@@ -1,0 +1,129 @@
+!> Expected error of a run with few load steps, or few spacings in the contact, before it is solved.
+!>
+!> The rules were fitted to spheres: pressed with materials that differ, pressed and sheared at once, sheared to and fro, each
+!> against a solution with many more steps or spacings. They are right to a factor of about 1.5, which decides whether a run is
+!> worth its time; error bars and adaptive load steps measure what a run has reached.
+!>
+!> Equations and measurements: docs/theory/expected_errors.md, (X1)-(X5).
+module hc_expected_error
+  use hc_precision, only: wp
+  implicit none
+  private
+
+  public :: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, entry_steps, &
+            oblique_error, oblique_steps
+
+  !> Relative errors that a lattice leaves at most, in nine of ten positions of it.
+  type :: lattice_errors_t
+    !> Largest pressure, contact area to the edge between the nodes
+    real(wp) :: max_pressure = 0.0_wp, contact_area = 0.0_wp
+    !> Stick area to the edge, energy dissipated in a cycle
+    real(wp) :: stick_area = 0.0_wp, dissipated_energy = 0.0_wp
+  end type lattice_errors_t
+
+  !> Errors of 1/n^2 with n spacings in the radius: of the largest pressure, the contact area, the stick area
+  real(wp), parameter :: of_pressure = 0.12_wp, of_area = 0.4_wp, of_stick = 0.8_wp
+  !> Spacings from which that is true of the stick area: fewer have one or two nodes in it
+  real(wp), parameter :: least_stick = 3.0_wp
+  !> Error and exponent of the energy that a slip ring of one spacing dissipates; where it is narrower than half of one the
+  !> energy is off by 65 % and says nothing
+  real(wp), parameter :: of_ring = 0.09_wp, ring_order = 3.5_wp, no_value = 0.65_wp
+  !> -ln of the error of a contact pressed in one step without slip, what slip adds, its exponent, and what a step adds
+  real(wp), parameter :: no_slip = 0.2_wp, slip_share = 1.2_wp, slip_order = 1.2_wp, per_step = 0.13_wp
+  !> Error of an oblique load in one step, exponent of what friction has left, and what a step divides it by
+  real(wp), parameter :: oblique = 0.8_wp, oblique_order = 0.65_wp, per_oblique_step = 0.28_wp
+
+contains
+
+  !> Estimate the errors of a lattice, (X1), (X2).
+  pure function lattice_errors(spacings, ring) result(errors)
+    !> Spacings in the radius, or in the smaller half-axis, of the contact (above 0)
+    real(wp), intent(in) :: spacings
+    !> Width of the slip ring over the radius; 0: nothing slips
+    real(wp), intent(in) :: ring
+    type(lattice_errors_t) :: errors
+
+    errors%max_pressure = min(no_value, of_pressure/spacings**2)
+    errors%contact_area = min(no_value, of_area/spacings**2)
+    if (ring <= 0.0_wp) return
+    errors%stick_area = merge(of_stick/spacings**2, no_value, spacings >= least_stick)
+    errors%dissipated_energy = min(no_value, of_ring*(ring*spacings)**(-ring_order))
+  end function lattice_errors
+
+  !> Estimate the spacings in the radius that leave no more than an error in any of them, (X1) and (X2) solved for them.
+  elemental real(wp) function lattice_spacings(error, ring)
+    !> The error
+    real(wp), intent(in) :: error
+    !> Width of the slip ring over the radius; 0: nothing slips
+    real(wp), intent(in) :: ring
+
+    lattice_spacings = sqrt(of_area/error)
+    if (ring > 0.0_wp) lattice_spacings = max(sqrt(of_stick/error), (of_ring/error)**(1.0_wp/ring_order)/ring)
+  end function lattice_spacings
+
+  !> Compute the width of the slip ring over the contact radius under a load Q: 1 - (1 - Q/mu P)^(1/3) (Cattaneo, Mindlin).
+  elemental real(wp) function slip_ring(load_ratio)
+    !> Q/mu P, from 0 to 1
+    real(wp), intent(in) :: load_ratio
+    slip_ring = 1.0_wp - max(0.0_wp, 1.0_wp - load_ratio)**(1.0_wp/3.0_wp)
+  end function slip_ring
+
+  !> Count the steps in which the contact grows, each weighted with the load that the nodes entering in it will carry, (X3).
+  !>
+  !> Both m equal increments of the load of a sphere and of its radius count as m.
+  pure real(wp) function even_steps(before, after)
+    !> Contact radius before and after each step in which it grows [m]
+    real(wp), intent(in) :: before(:), after(:)
+    real(wp) :: largest, weight(size(after))
+
+    even_steps = 1.0_wp
+    if (size(after) == 0) return
+    largest = maxval(after)
+    weight = after**3 - before**3
+    even_steps = largest*sum(weight)/sum(weight*(after - before))
+  end function even_steps
+
+  !> Estimate the error of the shear tractions, over their sum, where dissimilar bodies are pressed with implicit entry, (X4).
+  elemental real(wp) function entry_error(steps, stick)
+    !> Steps, see even_steps
+    real(wp), intent(in) :: steps
+    !> mu/|beta|; huge: no slip
+    real(wp), intent(in) :: stick
+    entry_error = exp(-one_step(stick)*(1.0_wp + per_step*(steps - 1.0_wp)))
+  end function entry_error
+
+  !> Estimate the steps that leave no more than an error, (X4) solved for them.
+  elemental real(wp) function entry_steps(error, stick)
+    !> The error
+    real(wp), intent(in) :: error
+    !> mu/|beta|
+    real(wp), intent(in) :: stick
+    entry_steps = 1.0_wp + max(0.0_wp, -log(error)/one_step(stick) - 1.0_wp)/per_step
+  end function entry_steps
+
+  !> Compute -ln of (X4) for one step.
+  elemental real(wp) function one_step(stick)
+    !> mu/|beta|
+    real(wp), intent(in) :: stick
+    one_step = no_slip + slip_share*stick**(-slip_order)
+  end function one_step
+
+  !> Estimate the error of the shear tractions where the contact grows while the tangential load does, with implicit entry, (X5).
+  elemental real(wp) function oblique_error(steps, load_ratio)
+    !> Steps, see even_steps
+    real(wp), intent(in) :: steps
+    !> Q/mu P at the end, from 0 to 1
+    real(wp), intent(in) :: load_ratio
+    oblique_error = oblique*max(0.0_wp, 1.0_wp - load_ratio)**oblique_order/(1.0_wp + per_oblique_step*(steps - 1.0_wp))
+  end function oblique_error
+
+  !> Estimate the steps that leave no more than an error, (X5) solved for them.
+  elemental real(wp) function oblique_steps(error, load_ratio)
+    !> The error
+    real(wp), intent(in) :: error
+    !> Q/mu P at the end
+    real(wp), intent(in) :: load_ratio
+    oblique_steps = 1.0_wp + max(0.0_wp, oblique_error(1.0_wp, load_ratio)/error - 1.0_wp)/per_oblique_step
+  end function oblique_steps
+
+end module hc_expected_error

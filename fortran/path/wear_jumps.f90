@@ -1,0 +1,88 @@
+!> Wear of the surfaces by fretting cycles, of which one stands for many.
+!>
+!> A cycle of the loads is solved with the gap as it is worn, and wears the surfaces as often as the jump says, (V3). Two
+!> jumps of n cycles are compared with one of 2 n, (V4); what they change decides, through hc_step_control, how large the
+!> next jump is:
+!>
+!>     energy = dissipation density of one cycle at the depth at hand
+!>     call wear_by(energy, coefficient, friction, cycles, area, depth, volume)
+!>     change = jump_change(energy, energy of the cycle after half the jump, ...)
+!>
+!> Equations: docs/theory/wear.md, (V1) to (V4).
+module hc_wear_jumps
+  use hc_precision, only: wp
+  use hc_options, only: step_options_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_lattice, only: lattice_t
+  use hc_contact_residuals, only: normal_self_compliance
+  use hc_step_error, only: step_change_t
+  implicit none
+  private
+
+  public :: archard_depth, wear_by, jump_change
+
+contains
+
+  !> Depth that is worn off where friction dissipates an energy, (V2) [m].
+  elemental real(wp) function archard_depth(energy, coefficient, friction) result(depth)
+    !> Dissipated energy by area [J/m^2]
+    real(wp), intent(in) :: energy
+    !> Coefficient of wear of both bodies together, k [m^2/N]
+    real(wp), intent(in) :: coefficient
+    !> Coefficient of friction
+    real(wp), intent(in) :: friction
+
+    depth = 0.0_wp
+    if (friction > 0.0_wp) depth = coefficient*energy/friction
+  end function archard_depth
+
+  !> Wear the surfaces by cycles that are all alike, (V3).
+  pure subroutine wear_by(energy, coefficient, friction, cycles, area, depth, volume)
+    !> Dissipated energy of a cycle by area (n_col, n_row) [J/m^2]
+    real(wp), intent(in) :: energy(:, :)
+    !> Coefficient of wear [m^2/N]
+    real(wp), intent(in) :: coefficient
+    !> Coefficient of friction (n_col, n_row)
+    real(wp), intent(in) :: friction(:, :)
+    !> Number of cycles
+    real(wp), intent(in) :: cycles
+    !> Area of a node [m^2]
+    real(wp), intent(in) :: area
+    !> Worn depth (n_col, n_row) [m]
+    real(wp), intent(inout) :: depth(:, :)
+    !> Worn volume [m^3]
+    real(wp), intent(out) :: volume
+
+    depth = depth + cycles*archard_depth(energy, coefficient, friction)
+    volume = area*sum(depth)
+  end subroutine wear_by
+
+  !> What two jumps change in comparison with one of both, (V4): the root mean square of the depth, over what the largest
+  !> pressure indents one node, as tractions that the step adds.
+  pure subroutine jump_change(lattice, pair, energy, energy_after, coefficient, friction, cycles, p_max, change)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants
+    type(elastic_pair_t), intent(in) :: pair
+    !> Dissipated energy by area of the cycles before the first and the second jump (n_col, n_row) [J/m^2]
+    real(wp), intent(in) :: energy(:, :), energy_after(:, :)
+    !> Coefficient of wear [m^2/N]
+    real(wp), intent(in) :: coefficient
+    !> Coefficient of friction (n_col, n_row)
+    real(wp), intent(in) :: friction(:, :)
+    !> Cycles of each of the two jumps
+    real(wp), intent(in) :: cycles
+    !> Largest pressure [Pa]
+    real(wp), intent(in) :: p_max
+    !> What it changes, for hc_step_control
+    type(step_change_t), intent(out) :: change
+    type(step_options_t) :: options
+
+    associate (error => cycles*archard_depth(energy_after - energy, coefficient, friction), &
+               n_wearing => count(energy > 0.0_wp .or. energy_after > 0.0_wp))
+      if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(sum(error**2)/n_wearing) &
+                                                              /(normal_self_compliance(lattice, pair)*p_max)
+    end associate
+  end subroutine jump_change
+
+end module hc_wear_jumps

@@ -1,0 +1,249 @@
+!> Edges of contact and stick areas, for Python: flat procedures for f2py, no mathematics.
+!>
+!> Fields have the shape (n_col, n_row), and zones are integers: not zero at nodes of the zone. The module has no state,
+!> so that several threads may call at a time.
+!>
+!> `fields` are the pressure [Pa], the gap [m] and the reserve of friction [Pa]; `zones` the nodes in contact, those that can
+!> touch and those that stick. The third of each matters to the edge of the stick area only.
+module hc_f2py_edges
+  use iso_c_binding, only: c_double, c_int
+  use hc_error, only: error_t, status, raise
+  use hc_f2py_handles, only: report, kernel_cache
+  use hc_field_space, only: space_over
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_lattice, only: lattice_t, new_lattice
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_edge_tractions, only: correct_at_edges
+  use hc_zone_edge, only: zone_edge_t, zone_mesh_t, cut_triangles
+  implicit none
+  private
+
+  public :: count_cut_triangles, edge_of_zone, mesh_of_zone, distances_of_zone, pressure_squares, tractions_to_edges
+
+contains
+
+  !> Count the triangles that the edge of a zone cuts.
+  subroutine count_cut_triangles(n_col, n_row, zone, n_cut)
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Zone
+    integer(c_int), intent(in) :: zone(n_col, n_row)
+    !> Number of triangles
+    integer(c_int), intent(out) :: n_cut
+    n_cut = cut_triangles(zone /= 0)
+  end subroutine count_cut_triangles
+
+  !> Find the edge of the contact area, or of the part of it that sticks.
+  subroutine edge_of_zone(n_col, n_row, basis, start, fields, zones, of_stick, &
+                          n_cut, numbers, segments, n_segment, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns, position of the first node [m]
+    real(c_double), intent(in) :: basis(2, 2), start(2)
+    !> Pressure, gap, reserve of friction; nodes in contact, that can touch, that stick
+    real(c_double), intent(in) :: fields(n_col, n_row, 3)
+    integer(c_int), intent(in) :: zones(n_col, n_row, 3)
+    !> Not zero: the edge of the stick area
+    integer(c_int), intent(in) :: of_stick
+    !> Triangles that the edge cuts
+    integer(c_int), intent(in) :: n_cut
+    !> Area [m^2]; radius of the disc with that area, length of the edge [m]; semi-axes [m], angle [rad] and center [m] of
+    !> the ellipse with its moments
+    real(c_double), intent(out) :: numbers(8)
+    !> Pieces of the edge: x and y, first and last point [m]
+    real(c_double), intent(out) :: segments(2, 2, n_cut)
+    !> Number of pieces
+    integer(c_int), intent(out) :: n_segment
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(contact_edges_t) :: edges
+    type(zone_edge_t) :: edge
+
+    numbers = 0.0_c_double
+    segments = 0.0_c_double
+    n_segment = 0
+    call set_edges(basis, start, fields, zones, edges, error)
+    if (.not. allocated(error)) then
+      if (of_stick /= 0) then
+        edge = edges%stick_edge(zones(:, :, 3) /= 0, fields(:, :, 3))
+      else
+        edge = edges%contact_edge()
+      end if
+      associate (ellipse => edge%ellipse)
+        numbers = [edge%area, edge%radius(), edge%length(), ellipse%semi_major, ellipse%semi_minor, ellipse%angle, ellipse%center]
+      end associate
+      n_segment = size(edge%segments, 3)
+      if (n_segment > n_cut) then
+        call raise(error, status%invalid_input, 'the edge cuts more triangles than were counted')
+      else
+        segments(:, :, :n_segment) = edge%segments
+      end if
+    end if
+    call report(error, code, message)
+  end subroutine edge_of_zone
+
+  !> Return squares of the pressure near the edge of the contact, good to interpolate.
+  subroutine pressure_squares(n_col, n_row, basis, fields, zones, squares, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> Pressure, gap, reserve of friction; nodes in contact, that can touch, that stick
+    real(c_double), intent(in) :: fields(n_col, n_row, 3)
+    integer(c_int), intent(in) :: zones(n_col, n_row, 3)
+    !> Squares; NaN away from the edge [Pa^2]
+    real(c_double), intent(out) :: squares(n_col, n_row)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(contact_edges_t) :: edges
+
+    squares = 0.0_c_double
+    call set_edges(basis, [0.0_c_double, 0.0_c_double], fields, zones, edges, error)
+    if (.not. allocated(error)) then
+      squares = edges%squares()
+    end if
+    call report(error, code, message)
+  end subroutine pressure_squares
+
+  !> Correct tractions at the edges of the contact and of the stick area.
+  subroutine tractions_to_edges(n_col, n_row, basis, lambda, gap, zones, friction, traction, threads, corrected, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> Elastic constants lambda_1, lambda_2, lambda_5 [1/Pa]
+    real(c_double), intent(in) :: lambda(3)
+    !> Gap [m] and coefficient of friction
+    real(c_double), intent(in) :: gap(n_col, n_row), friction(n_col, n_row)
+    !> Nodes in contact, that can touch, that stick
+    integer(c_int), intent(in) :: zones(n_col, n_row, 3)
+    !> Pressure and shear traction [Pa], and the corrected ones
+    real(c_double), intent(in) :: traction(n_col, n_row, 3)
+    !> Threads to use; 0: as many as OpenMP would take
+    integer(c_int), intent(in) :: threads
+    real(c_double), intent(out) :: corrected(n_col, n_row, 3)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+
+    corrected = traction
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
+    if (.not. allocated(error)) then
+      call new_contact_edges(edges, lattice, traction(:, :, 1), gap, zones(:, :, 1) /= 0, zones(:, :, 2) /= 0)
+      call correct_at_edges(lattice, edges, elastic_pair_t(lambda(1), lambda(2), lambda(3)), zones(:, :, 1) /= 0, &
+                            zones(:, :, 3) /= 0, friction, corrected, space_over([n_col, n_row], threads), error, kernel_cache)
+    end if
+    call report(error, code, message)
+  end subroutine tractions_to_edges
+
+  !> Fill the contact area, or the part of it that sticks, with triangles, and carry a field there.
+  subroutine mesh_of_zone(n_col, n_row, basis, start, fields, zones, of_stick, &
+                          field, vanishes, n_point, n_triangle, points, values, triangles, numbers, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns, position of the first node [m]
+    real(c_double), intent(in) :: basis(2, 2), start(2)
+    !> Pressure, gap, reserve of friction; nodes in contact, that can touch, that stick
+    real(c_double), intent(in) :: fields(n_col, n_row, 3)
+    integer(c_int), intent(in) :: zones(n_col, n_row, 3)
+    !> Not zero: the stick area
+    integer(c_int), intent(in) :: of_stick
+    !> Values at the nodes; not zero: they vanish at the edge of the contact
+    real(c_double), intent(in) :: field(n_col, n_row)
+    integer(c_int), intent(in) :: vanishes
+    !> Room for points and triangles
+    integer(c_int), intent(in) :: n_point, n_triangle
+    !> Corners [m], and values there
+    real(c_double), intent(out) :: points(2, n_point), values(n_point)
+    !> Corners of each triangle, counted from 1
+    integer(c_int), intent(out) :: triangles(3, n_triangle)
+    !> Number of points and of triangles
+    integer(c_int), intent(out) :: numbers(2)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(contact_edges_t) :: edges
+    type(zone_mesh_t) :: mesh
+
+    points = 0.0_c_double
+    values = 0.0_c_double
+    triangles = 0
+    numbers = 0
+    call set_edges(basis, start, fields, zones, edges, error)
+    if (.not. allocated(error)) then
+      if (of_stick /= 0) then
+        mesh = edges%stick_mesh(zones(:, :, 3) /= 0, fields(:, :, 3), field)
+      else
+        mesh = edges%contact_mesh(field, vanishes /= 0)
+      end if
+      numbers = [mesh%n_point, mesh%n_triangle]
+      if (numbers(1) > n_point .or. numbers(2) > n_triangle) then
+        call raise(error, status%invalid_input, 'the zone has more triangles than were counted')
+      else
+        points(:, :numbers(1)) = mesh%points
+        values(:numbers(1)) = mesh%values
+        triangles(:, :numbers(2)) = mesh%triangles
+      end if
+    end if
+    call report(error, code, message)
+  end subroutine mesh_of_zone
+
+  !> Return the distances of all nodes from the edge of the contact area, or of the part of it that sticks.
+  subroutine distances_of_zone(n_col, n_row, basis, fields, zones, of_stick, &
+                               distances, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> Pressure, gap, reserve of friction; nodes in contact, that can touch, that stick
+    real(c_double), intent(in) :: fields(n_col, n_row, 3)
+    integer(c_int), intent(in) :: zones(n_col, n_row, 3)
+    !> Not zero: of the stick area
+    integer(c_int), intent(in) :: of_stick
+    !> Distances in spacings, positive inside
+    real(c_double), intent(out) :: distances(n_col, n_row)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(contact_edges_t) :: edges
+
+    distances = 0.0_c_double
+    call set_edges(basis, [0.0_c_double, 0.0_c_double], fields, zones, edges, error)
+    if (.not. allocated(error)) then
+      if (of_stick /= 0) then
+        distances = edges%stick_distances(zones(:, :, 3) /= 0, fields(:, :, 3))
+      else
+        distances = edges%contact_distances()
+      end if
+    end if
+    call report(error, code, message)
+  end subroutine distances_of_zone
+
+  !> Find the edges of a contact, with the first node at a position.
+  subroutine set_edges(basis, start, fields, zones, edges, error)
+    real(c_double), intent(in) :: basis(2, 2), start(2), fields(:, :, :)
+    integer(c_int), intent(in) :: zones(:, :, :)
+    type(contact_edges_t), intent(out) :: edges
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+
+    call new_lattice(lattice, basis, [0, 0], shape(fields(:, :, 1)), error, start)
+    if (allocated(error)) return
+    call new_contact_edges(edges, lattice, fields(:, :, 1), fields(:, :, 2), zones(:, :, 1) /= 0, zones(:, :, 2) /= 0)
+  end subroutine set_edges
+
+end module hc_f2py_edges

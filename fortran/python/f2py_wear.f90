@@ -1,0 +1,93 @@
+!> Wear by fretting cycles for Python: flat procedures for f2py, no mathematics.
+module hc_f2py_wear
+  use iso_c_binding, only: c_double, c_int
+  use hc_error, only: error_t
+  use hc_f2py_handles, only: report, pair_of
+  use hc_lattice, only: lattice_t, new_lattice
+  use hc_step_error, only: step_change_t
+  use hc_wear_jumps, only: archard_depth, wear_by, jump_change
+  implicit none
+  private
+
+  public :: depth_of_energy, wear_of_cycles, change_by_jump
+
+contains
+
+  !> Compute the depth that is worn off where friction dissipates an energy.
+  subroutine depth_of_energy(n_node, energy, coefficient, friction, depth)
+    !f2py threadsafe
+    !> Number of nodes
+    integer(c_int), intent(in) :: n_node
+    !> Dissipated energy by area [J/m^2]
+    real(c_double), intent(in) :: energy(n_node)
+    !> Coefficient of wear [m^2/N]
+    real(c_double), intent(in) :: coefficient
+    !> Coefficient of friction
+    real(c_double), intent(in) :: friction(n_node)
+    !> Depth [m]
+    real(c_double), intent(out) :: depth(n_node)
+
+    depth = archard_depth(energy, coefficient, friction)
+  end subroutine depth_of_energy
+
+  !> Compute depth and volume after cycles that are all alike.
+  subroutine wear_of_cycles(n_col, n_row, energy, coefficient, friction, cycles, area, depth, worn, volume, deepest)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Dissipated energy of a cycle by area [J/m^2]
+    real(c_double), intent(in) :: energy(n_col, n_row)
+    !> Coefficient of wear [m^2/N]
+    real(c_double), intent(in) :: coefficient
+    !> Coefficient of friction
+    real(c_double), intent(in) :: friction(n_col, n_row)
+    !> Number of cycles, area of a node [m^2]
+    real(c_double), intent(in) :: cycles, area
+    !> Depth before and after [m]
+    real(c_double), intent(in) :: depth(n_col, n_row)
+    real(c_double), intent(out) :: worn(n_col, n_row)
+    !> Worn volume [m^3], largest depth [m]
+    real(c_double), intent(out) :: volume, deepest
+
+    worn = depth
+    call wear_by(energy, coefficient, friction, cycles, area, worn, volume)
+    deepest = maxval(worn)
+  end subroutine wear_of_cycles
+
+  !> Compare two jumps with one of both.
+  subroutine change_by_jump(n_col, n_row, basis, lambda, energy, energy_after, coefficient, friction, cycles, p_max, &
+                            change, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> lambda_1, lambda_2, lambda_5 [1/Pa]
+    real(c_double), intent(in) :: lambda(3)
+    !> Dissipated energy by area of the cycles before both jumps [J/m^2]
+    real(c_double), intent(in) :: energy(n_col, n_row), energy_after(n_col, n_row)
+    !> Coefficient of wear [m^2/N]
+    real(c_double), intent(in) :: coefficient
+    !> Coefficient of friction
+    real(c_double), intent(in) :: friction(n_col, n_row)
+    !> Cycles of each of the two jumps, largest pressure [Pa]
+    real(c_double), intent(in) :: cycles, p_max
+    !> What it changes
+    real(c_double), intent(out) :: change(5)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+    type(step_change_t) :: found
+
+    change = 0.0_c_double
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
+    if (.not. allocated(error)) then
+      call jump_change(lattice, pair_of(lambda), energy, energy_after, coefficient, friction, cycles, p_max, found)
+      change = [found%stick, found%traction, found%added, found%lattice, found%gain]
+    end if
+    call report(error, code, message)
+  end subroutine change_by_jump
+
+end module hc_f2py_wear

@@ -1,9 +1,9 @@
-"""Arguments of the Python interface: numbers and arrays as the core takes them, or one sentence."""
+"""Checks of numbers and arrays that users pass, before the core takes them."""
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -11,16 +11,31 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import DeckError
 
-_LARGEST_INTEGER = 2**31 - 1  # that the core can take
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_LARGEST_INTEGER = 2**31 - 1  # of the core
 
 
-def reals(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Return an argument as an array of real numbers; of the same memory if it is one already.
+def reals(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None, meaning: str = "") -> Array:
+    """Return an argument as an array of real numbers, without a copy if it is one.
+
+    Parameters
+    ----------
+    values : array_like
+        The argument.
+    name : str
+        Its name in messages.
+    shape : tuple of int, optional
+        The shape that it must have.
+    meaning : str
+        Meaning of the shape, which follows it in messages.
 
     Raises
     ------
     DeckError
-        If it is none: complex numbers, text, objects, nothing, rows of different lengths, masked values.
+        If it has another shape, or holds complex numbers, text, objects, rows of different lengths or masked
+        values.
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise DeckError(f"{name}: an array without masked values expected")
@@ -30,18 +45,56 @@ def reals(values: ArrayLike, name: str) -> NDArray[np.float64]:
             array = array.astype(float)
         if array.dtype.kind not in "biuf" or values is None:
             raise TypeError(f"values of the type {array.dtype}")
-        return array.astype(np.float64, copy=False)
+        array = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise DeckError(f"{name}: an array of real numbers expected") from error
+    if shape is not None and array.shape != shape:
+        raise DeckError(f"{name}: an array of shape {array.shape}, expected {shape}{meaning}")
+    return array
 
 
-def number(value: Any, name: str, expected: str = "a number") -> float:
-    """Return an argument as a real number, which may be infinite.
+def has_entries(values: Any) -> bool:
+    """Test whether a value is an array, also one of rows of different lengths."""
+    try:
+        return np.ndim(values) > 0
+    except ValueError:
+        return True
+
+
+def broadcast(**coordinates: ArrayLike) -> dict[str, NDArray[np.float64]]:
+    """Return arguments as arrays of real numbers of one shape, by their names.
 
     Raises
     ------
     DeckError
-        If it is none, or NaN.
+        If one is no array of real numbers, or their shapes do not broadcast.
+    """
+    arrays = {name: reals(values, name) for name, values in coordinates.items()}
+    try:
+        return dict(zip(arrays, np.broadcast_arrays(*arrays.values()), strict=True))
+    except ValueError as error:
+        shapes = " and ".join(str(array.shape) for array in arrays.values())
+        raise DeckError(f"{' and '.join(arrays)}: arrays of shapes {shapes} do not broadcast") from error
+
+
+def number(
+    value: Any, name: str, expected: str = "a number", fits: Callable[[float], bool] = lambda found: True
+) -> float:
+    """Return an argument as a real number, which may be infinite.
+
+    Parameters
+    ----------
+    value : object
+        The argument.
+    name, expected : str
+        Its name in messages, and the expected value.
+    fits : callable
+        Tests whether a number is in its range.
+
+    Raises
+    ------
+    DeckError
+        If it is no number, NaN, or out of its range.
     """
     try:
         if isinstance(value, str | bytes) or np.iscomplexobj(value):
@@ -49,18 +102,18 @@ def number(value: Any, name: str, expected: str = "a number") -> float:
         found = float(value)
     except (TypeError, ValueError, OverflowError) as error:
         raise DeckError(f"{name} = {_shown(value)}: expected {expected}") from error
-    if found != found:
+    if found != found or not fits(found):
         raise DeckError(f"{name} = {_shown(value)}: expected {expected}")
     return found
 
 
 def integer(value: Any, name: str, expected: str = "an integer") -> int:
-    """Return an argument as an integer that the core can take.
+    """Return an argument as an integer of 32 bits.
 
     Raises
     ------
     DeckError
-        If it is none.
+        If it is no integer, or too large.
     """
     try:
         found = operator.index(value)
@@ -72,12 +125,12 @@ def integer(value: Any, name: str, expected: str = "an integer") -> int:
 
 
 def word(value: Any, name: str, allowed: Collection[str]) -> str:
-    """Return an argument that has to be one of a few words.
+    """Return an argument that is one of a few words.
 
     Raises
     ------
     DeckError
-        If it is none of them.
+        If it is another.
     """
     if not isinstance(value, str) or value not in allowed:
         raise DeckError(f"{name} = {_shown(value)}: expected {' or '.join(map(repr, allowed))}")

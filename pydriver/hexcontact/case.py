@@ -6,16 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .arrays import Array
 from .core.lattice import Lattice
 from .deck.read import assemble
 from .deck.tables import Grid, Solver
 from .deck.toml import refuse_deep
 from .deck.write import plain
 from .errors import DeckError
-from .problem.arguments import Body, middle_of, with_radians
+from .problem.arguments import Body, known_keywords, middle_of, with_radians
+from .problem.friction_law import given_coefficient
 from .problem.gap import given_gap
 from .problem.loads import LoadStep, Target
 from .problem.problem import Problem
@@ -28,15 +29,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Body", "Case", "LoadStep", "Target"]
 
-Array = NDArray[np.float64]
-_LEFT_OUT = ("friction", "solver", "output")  # tables of which nothing is said
+_LEFT_OUT = ("friction", "interface", "solver", "wear", "output")  # tables, if they are empty
 
 
 class Case(Problem):
     """A checked contact problem.
 
-    Made from a deck by `from_toml` or `from_dict`, or here from arguments in SI units, which are checked in
-    the same way and complained about with the same keys.
+    Made from a deck by `from_toml` or `from_dict`, or here from arguments in SI units; checks and messages
+    are those of the keys of a deck.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Case(Problem):
         Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m); an array
         (n_row, n_col) over the nodes of `lattice`; or heights on a rectangular grid, an xarray.DataArray
         with the coordinates x and y (in m, or in their attribute ``units``), which a cubic spline joins.
-        Infinite where nothing can touch. The approach is measured from gap = 0.
+        Infinite where the bodies cannot touch. The approach counts from gap = 0.
     lattice : Lattice, optional
         The window, instead of the keyword arguments of the grid.
     spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional
@@ -54,15 +54,26 @@ class Case(Problem):
     normal_load, approach : float, optional
         The only load (N) or motion (m), in one step or in `steps`.
     steps : int or "auto", optional
-        Number of equal increments of it, or as many as `step_tolerance` takes.
+        Number of equal increments of it; "auto": chosen by `step_tolerance`.
     loads : sequence of mappings, or mapping, optional
-        Entries of [[load]] instead, for anything more; twist in rad.
+        Entries of [[load]] instead; twist in rad.
+    interface : mapping, optional
+        Keys of [interface]: a compliant layer between the bodies.
     friction_coefficient : float, optional
-        Coefficient of friction; frictionless if absent.
+        Coefficient of friction; frictionless if absent. Two with a direction: ``{"along": 0.3, "across": 0.2,
+        "angle": "30 deg"}``. One that varies: a formula of x and y (m) as text, a function of two arrays x, y
+        (m), an array (n_row, n_col) over the nodes of `lattice`, or values on a rectangular grid, an
+        xarray.DataArray with the coordinates x and y, between which it is bilinear.
+    shear_limit : float, optional
+        Bound of the shear traction (Pa).
+    bulk : mapping, optional
+        Keys of [bulk]: which body carries the bulk stress of the loads.
     algorithm, method, tolerance, coupling, entry, step_tolerance : optional
         Keys of [solver].
     accuracy : float or mapping, optional
-        Target of [accuracy], or all its keys: refine the lattice until it is reached.
+        Target of [accuracy], or all its keys: the lattice is refined until it is reached.
+    wear : mapping, optional
+        Keys of [wear]: cycles that wear the surfaces.
     fields, every : optional
         Keys of [output].
     title : str, optional
@@ -73,7 +84,9 @@ class Case(Problem):
     Raises
     ------
     DeckError
-        With a sentence for each thing that is wrong.
+        With a sentence for each fault.
+    TypeError
+        If there is no such argument; it names the nearest.
 
     Examples
     --------
@@ -90,6 +103,7 @@ class Case(Problem):
     115.38
     """
 
+    @known_keywords
     def __init__(
         self,
         *,
@@ -107,8 +121,13 @@ class Case(Problem):
         normal_load: float | None = None,
         approach: float | None = None,
         steps: int | str | None = None,
+        interface: Mapping[str, Any] | None = None,
         loads: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None,
-        friction_coefficient: float | None = None,
+        friction_coefficient: (
+            float | str | Mapping[str, Any] | ArrayLike | Callable[[Array, Array], ArrayLike] | None
+        ) = None,
+        shear_limit: float | None = None,
+        bulk: Mapping[str, Any] | None = None,
         algorithm: str | None = None,
         method: str | None = None,
         tolerance: float | None = None,
@@ -116,17 +135,19 @@ class Case(Problem):
         entry: str | None = None,
         step_tolerance: float | None = None,
         accuracy: float | Mapping[str, Any] | None = None,
+        wear: Mapping[str, Any] | None = None,
         fields: Sequence[str] | None = None,
         every: int | None = None,
         title: str = "",
     ) -> None:
         own_gap = given_gap(gap, lattice)
+        mu = given_coefficient(friction_coefficient, lattice)
         if lattice is not None:
             for key, value in {"spacing": spacing, "window": window, "origin": origin}.items():
                 if value is not None:
                     raise DeckError(f"{key}: expected a lattice, or keys of the grid, not both")
             spacing, window, origin = lattice.spacing, lattice.shape, lattice.origin
-            if not callable(own_gap):  # so that the deck of the case finds the same window again
+            if not callable(own_gap):  # the deck of the case leads to the same window
                 center = middle_of(lattice)
         if loads is None:
             loads = {"normal_load": normal_load, "approach": approach, "steps": steps}
@@ -136,10 +157,13 @@ class Case(Problem):
         data = {
             "title": title or None,
             "body": {"1": body_1, "2": body_2},
-            "friction": {"coefficient": friction_coefficient},
+            "interface": interface,
+            "friction": {"coefficient": mu, "shear_limit": shear_limit},
+            "bulk": bulk,
             "grid": {key: arguments[key] for key in Grid.model_fields},
             "solver": {key: arguments[key] for key in Solver.model_fields},
             "accuracy": {"target": accuracy} if isinstance(accuracy, int | float) else accuracy,
+            "wear": wear,
             "load": [loads] if isinstance(loads, Mapping) else loads,
             "output": {"fields": fields, "every": every},
         }
@@ -177,14 +201,14 @@ class Case(Problem):
         Raises
         ------
         DeckError, ConvergenceError, ResourceError
-            As `hexcontact.solve.run`, which does it.
+            As `hexcontact.solve.run`.
         """
         from .solve.run import run
 
         return run(self, output=output, overwrite=overwrite, on_step=on_step, progress=progress)
 
     def start(self, output: str | Path | None = None, overwrite: bool = False) -> Session:
-        """Begin a run that waits between its load steps, for loads that depend on answers.
+        """Begin a run that waits between its load steps, for loads that depend on results.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The exceptions a caller may want to catch, and the exit code each one means."""
+"""Exceptions of the package, each with its exit code."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ import errno
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-LACKING = frozenset(  # what the system says if it is not the input that is wrong
+LACKING = frozenset(  # errors of the system that are not due to the input
     {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE}
 )
 
 
 class Fault(NamedTuple):
-    """One thing that is wrong with the input, in parts.
+    """A fault of the input, in parts.
 
     Attributes
     ----------
     message : str
         The whole sentence, with the place in front.
     key : str
-        Dotted key of the deck; empty where none is to blame.
+        Dotted key of the deck; empty if the fault belongs to no key.
     value : str
-        What the deck says there, shortened; empty if nothing.
+        Value in the deck, shortened; empty if there is none.
     file : str
-        File that says it; empty for an override, or a case that was built in Python.
+        File of the key; empty for an override, or a case that was built in Python.
     line, column : int or None
-        Where in the file, from 1.
+        Place in the file, from 1.
     """
 
     message: str
@@ -40,7 +40,7 @@ class HexcontactError(Exception):
     """Base of every error this package raises on purpose."""
 
     exit_code = 1
-    logged = False  # whether the log has it already
+    logged = False  # whether it is in the log
 
 
 class DeckError(HexcontactError, ValueError):
@@ -49,7 +49,7 @@ class DeckError(HexcontactError, ValueError):
     Attributes
     ----------
     faults : tuple of Fault
-        Each thing that is wrong with a deck; empty for what is no deck.
+        Faults of a deck; empty for other input.
     """
 
     exit_code = 2
@@ -60,11 +60,11 @@ class DeckError(HexcontactError, ValueError):
 
 
 class KernelFolderWarning(UserWarning):
-    """Spectra of kernels cannot be kept in a folder, or taken from it; nothing else comes of it."""
+    """Spectra of kernels cannot be stored in a folder or read from it; results do not change."""
 
 
 class AccuracyWarning(UserWarning):
-    """The lattice could not be refined to the accuracy asked for; the finest result is kept."""
+    """The lattice could not be refined to the target accuracy; the result is that of the finest one."""
 
     exit_code = 3
 
@@ -73,8 +73,12 @@ class PathWarning(UserWarning):
     """A load step was solved in parts, along a path that the load history does not prescribe."""
 
 
+class RimWarning(UserWarning):
+    """Contact at the rim of the window: a larger window may have another solution."""
+
+
 class ConvergenceError(HexcontactError, RuntimeError):
-    """A load step did not meet its tolerance; the last good step is kept.
+    """A load step did not meet its tolerance; the steps before it are recorded.
 
     Attributes
     ----------
@@ -96,7 +100,7 @@ class ResourceError(HexcontactError, MemoryError):
 
 
 class StopRun(Exception):
-    """Raised by a callback (`on_step`) to end a run after the step at hand; the message says why.
+    """Ends a run after the current step if a callback (`on_step`) raises it; the message is the reason.
 
-    It does not leave `hexcontact.Case.run`: the run returns what is finished.
+    `hexcontact.Case.run` catches it and returns the finished steps.
     """

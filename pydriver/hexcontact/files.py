@@ -1,4 +1,4 @@
-"""Files: reading those that users name, or one sentence; writing them as a whole, or not at all."""
+"""Reading of files that users name, with one sentence for a fault, and atomic writing."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
+from ._version import __version__
 from .errors import LACKING, DeckError, HexcontactError, ResourceError
 
 LARGEST_TEXT = 1 << 25  # bytes; 100,000 load steps of six loads each fit
+MADE_BY = f"made by hexcontact {__version__}"  # in pictures and pages
+_HDF5 = b"\x89HDF\r\n\x1a\n"  # how files of HDF5 begin, and netCDF-4 is one
+_MARK = MADE_BY.removesuffix(__version__).encode()
+_ENDS = 1 << 16  # bytes at the beginning and at the end of a file, in one of which the mark is
 
 
 def text_of(path: str | Path, expected: str) -> str:
@@ -22,7 +27,7 @@ def text_of(path: str | Path, expected: str) -> str:
     path : str or Path
         The file.
     expected : str
-        What it should have been, for messages: "a deck (a TOML file)".
+        The expected kind of file, for messages: "a deck (a TOML file)".
 
     Raises
     ------
@@ -45,13 +50,15 @@ def text_of(path: str | Path, expected: str) -> str:
         fault = "is a folder"
     except UnicodeDecodeError as error:
         fault = f"is not UTF-8 text (byte {error.start})"
+        if content.startswith(_HDF5):
+            fault = "is a netCDF file, such as a result; hexcontact info shows it"
     except (OSError, ValueError) as error:
         fault = f"cannot be read ({getattr(error, 'strerror', None) or error})"
     raise DeckError(f"{path}: {fault}; expected {expected}")
 
 
 def beginning(path: Path, size: int) -> bytes:
-    """Read the first bytes of a file; none of what cannot be read, and of devices and pipes."""
+    """Return the first bytes of a file; none if it cannot be read, or is a device or a pipe."""
     with contextlib.suppress(OSError), open(path, "rb", opener=_opened) as file:
         if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             return file.read(size) or b""
@@ -59,12 +66,12 @@ def beginning(path: Path, size: int) -> bytes:
 
 
 def _opened(name: str, flags: int) -> int:
-    """Open a file; a pipe that nobody writes to would block."""
+    """Open a file without waiting for the writer of a pipe."""
     return os.open(name, flags | os.O_NONBLOCK)
 
 
 def require_ordinary(path: str | os.PathLike[str], expected: str) -> None:
-    """Refuse what a library that opens a file by its name would read for ever, or has no name for.
+    """Refuse a file that a library, which opens it by its name, would read for ever or cannot name.
 
     Raises
     ------
@@ -87,7 +94,7 @@ def require_utf8(path: str | os.PathLike[str], expected: str) -> None:
 
 @contextlib.contextmanager
 def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
-    """Turn what goes wrong on reading a damaged or foreign file, or a device, into one sentence."""
+    """Raise one sentence for any exception by a damaged or foreign file, or a device."""
     require_ordinary(path, kind)
     try:
         yield
@@ -98,27 +105,53 @@ def reading(path: Path, kind: str = "a netCDF file") -> Iterator[None]:
     except Exception as error:  # damage takes any form: every library below has its own exceptions
         if isinstance(error, OSError) and error.errno in LACKING:
             raise ResourceError(f"{path} cannot be read: {error.strerror}") from error
-        raise DeckError(
-            f"{path} is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
-        ) from error
+        fault = f"is damaged or not {kind} ({str(error).strip() or type(error).__name__})"
+        if path.suffix == ".toml":
+            fault = f"is a TOML file; expected {kind}, which hexcontact run or study writes"
+        raise DeckError(f"{path} {fault}") from error
 
 
 # --- writing ------------------------------------------------------------------------------------------------
 
 
+def require_replaceable(path: Path) -> None:
+    """Refuse to replace a picture or page that hexcontact has not made; an empty file may be replaced.
+
+    Raises
+    ------
+    DeckError
+        If the file is of other origin.
+    """
+    if not path.is_file() or not path.stat().st_size:
+        return
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        head = file.read(_ENDS)
+        file.seek(max(0, path.stat().st_size - _ENDS))
+        if _MARK in head or _MARK in file.read(_ENDS):
+            return
+    raise DeckError(f"{path} is there and was not made by hexcontact; delete it or choose another name")
+
+
 @contextlib.contextmanager
 def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
-    """Give the name under which a file is written, which then takes the place of `target` as a whole.
+    """Yield the temporary name of a file, which then replaces `target` as a whole.
 
-    When this ends, the file is on the disk; after an error nothing is left of it, and `target` is as it was.
+    At the end the file is on the disk; after an error it is deleted and `target` is unchanged.
 
     Parameters
     ----------
     target : Path
-        The file to replace, which need not be there.
+        The file to replace, which may be missing.
     temporary : Path, optional
         The name, in the same file system; by default one beside it that other processes do not use.
+
+    Raises
+    ------
+    DeckError
+        If `target` is a device or a pipe, which replacing would delete.
     """
+    if os.path.lexists(target) and not (target.is_file() or target.is_symlink()):
+        raise DeckError(f"{target} is not a regular file; choose another name")
     temporary = temporary or target.with_name(f"{target.name}.{os.getpid()}.tmp")
     make_anew(temporary)
     try:
@@ -133,13 +166,13 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
 
 
 def make_anew(path: Path) -> None:
-    """Make an empty file; what had its name is gone: a link would be followed to another file."""
+    """Create an empty file in the place of any other of its name, without following a link."""
     path.unlink(missing_ok=True)
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
 
 
 def flush(path: Path) -> None:
-    """See to it that a file, or the names in a folder, are on the disk."""
+    """Flush a file, or the names in a folder, to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

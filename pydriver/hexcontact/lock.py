@@ -1,4 +1,4 @@
-"""Keeps two runs from writing one file."""
+"""Locks, which keep two runs from writing one file."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from .errors import DeckError
 
 _CLOCKS = 2.0  # s, between which the clocks of the system and of its processes may differ
 _LONGEST = 1000  # bytes of a lock
+_TRIES = 1000  # to open a lock that its holder deletes at the same time
 
 
 class Lock:
     """Keeps two runs from writing one output.
 
-    The lock is held through the operating system, which lets go of it when the process dies.
+    The operating system holds the lock, and releases it when the process dies.
     File systems differ in whether another machine notices, so the file names process and host:
     a lock left by another host counts as held.
 
@@ -32,28 +33,30 @@ class Lock:
     path : Path
         Lock file.
     output : Path
-        What is being protected, for the message.
+        The output that it protects, for messages.
 
     Raises
     ------
     DeckError
-        If another run holds it, or what is there is no lock: that stays as it is.
+        If another run holds it, or the file is no lock, which stays unchanged.
     """
 
     def __init__(self, path: Path, output: Path) -> None:
         self.path = path
-        while True:
+        for _ in range(_TRIES):
             self._descriptor = _opened(path)
             try:
                 fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 held = False
             except BlockingIOError:
                 held = True
-            except OSError:  # a file system without locks: only the process number is left to go by
+            except OSError:  # a file system without locks: the process number decides
                 held = _is_running(self._holder())
             if held or _same_file(path, self._descriptor):
                 break
-            os.close(self._descriptor)  # the one who held it deleted the file in between
+            os.close(self._descriptor)  # its holder has deleted the file since
+        else:
+            raise _no_lock(path)
         holder = self._holder()
         if holder is None:
             os.close(self._descriptor)
@@ -82,18 +85,18 @@ class Lock:
             raise
 
     def _holder(self) -> dict[str, Any] | None:
-        """Return who has written the lock, nobody if it is blank; None if it is no lock."""
+        """Return process and host of the lock, see `holder_of`."""
         return holder_of(os.pread(self._descriptor, _LONGEST + 1, 0))
 
     def release(self) -> None:
-        """Let go of the lock; a file that came in its place stays."""
+        """Release the lock and delete its file, but no other file in its place."""
         if _same_file(self.path, self._descriptor):
             self.path.unlink(missing_ok=True)
         os.close(self._descriptor)
 
 
 def holder_of(text: bytes) -> dict[str, Any] | None:
-    """Return who has written the text of a lock, nobody if it is blank or cut short; None if it is none."""
+    """Return process and host in the text of a lock; nothing if it is blank or cut; None for other text."""
     if not text.strip(b"\0"):  # nothing yet; zeros after a power failure
         return {}
     with contextlib.suppress(ValueError, RecursionError):
@@ -103,7 +106,7 @@ def holder_of(text: bytes) -> dict[str, Any] | None:
 
 
 def names_a_run(path: Path) -> bool:
-    """Tell whether a run has written this lock, or made it: it is blank for a moment."""
+    """Test whether a run has written this lock, or created it: it is blank for a moment."""
     with contextlib.suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)  # a pipe would block
         try:
@@ -115,7 +118,7 @@ def names_a_run(path: Path) -> bool:
 
 
 def _opened(path: Path) -> int:
-    """Open a lock, or make it; DeckError for anything but a file of this one name."""
+    """Open or create a lock; DeckError for anything but a file of this one name."""
     try:
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
         descriptor = os.open(path, flags, 0o666)
@@ -135,7 +138,7 @@ def _no_lock(path: Path) -> DeckError:
 
 
 def _is_running(holder: dict[str, Any] | None) -> bool:
-    """Tell whether a process of this machine holds the lock, not one that got its number since."""
+    """Test whether the process that wrote the lock runs on this machine, not a later one of its number."""
     import psutil
 
     if not holder or holder.get("host") != socket.gethostname():

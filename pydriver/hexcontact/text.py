@@ -1,4 +1,4 @@
-"""Words and numbers for people: quantities with prefixes, and tables as text, as HTML and for terminals."""
+"""Words, numbers with prefixes of units, and tables as text, as HTML and for terminals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.table import Table
 
-Row = Sequence[str]
+Row = tuple[str, ...]
 
 _TABLE = "border-collapse:collapse;margin:0.3em 0"
 _CELL = "padding:0.15em 1.2em 0.15em 0;border:0;background:none"
@@ -29,7 +29,7 @@ _UNSEEN = re.compile(
 
 
 def visible(text: str) -> str:
-    r"""Write text of a user so that a terminal or a page only shows it: an escape character as ``\u001b``."""
+    r"""Replace what a terminal would obey and XML forbids: an escape character becomes ``\u001b``."""
     return _UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
@@ -38,13 +38,21 @@ def escaped(text: str) -> str:
     return html.escape(visible(text))
 
 
+def cut(text: str, width: int) -> str:
+    """Shorten a line to a width by whole parts, which two blanks divide, or by whole words."""
+    for blank in ("  ", " "):
+        while len(text) > width and blank in text:
+            text = text.rpartition(blank)[0].rstrip()
+    return text[:width]
+
+
 def dotted(key: Sequence[str | int]) -> str:
-    """Write the path of a key as users know it: "load.2.steps" is the second entry of [[load]]."""
+    """Write the path of a key as in a deck: "load.2.steps" belongs to the second entry of [[load]]."""
     return ".".join(str(part + 1) if isinstance(part, int) else part for part in key)
 
 
 def shown(value: object, width: int = 60, depth: int = 5) -> str:
-    """Write a value the way a deck would, shortened if it is long or deep."""
+    """Write a value as in a deck, shortened if it is long or deep."""
     if isinstance(value, str | bool):
         text = json.dumps(value, ensure_ascii=False)
     elif isinstance(value, Mapping | list | tuple) and depth == 0:
@@ -57,7 +65,7 @@ def shown(value: object, width: int = 60, depth: int = 5) -> str:
         text = "[" + ", ".join(shown(entry, width, depth - 1) for entry in value[:width]) + "]"
     elif isinstance(value, int):
         text = hex(value) if value.bit_length() > 200 else str(value)
-    elif hasattr(value, "__float__") and not getattr(value, "shape", ()):
+    elif hasattr(value, "__float__") and not getattr(value, "shape", ()) and not hasattr(value, "units"):
         text = repr(float(value))
     else:
         text = str(value)
@@ -65,7 +73,7 @@ def shown(value: object, width: int = 60, depth: int = 5) -> str:
 
 
 def listed(entries: Sequence[str], conjunction: str) -> str:
-    """Join entries as a sentence would: "a, b or c"."""
+    """Join entries with commas and a conjunction: "a, b or c"."""
     return entries[0] if len(entries) == 1 else f"{', '.join(entries[:-1])} {conjunction} {entries[-1]}"
 
 
@@ -79,7 +87,7 @@ PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M
 
 
 def quantity(value: float, unit: str = "", digits: int = 4) -> str:
-    """Write a number as an engineer would: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``.
+    """Write a number with a prefix of its unit: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``.
 
     Parameters
     ----------
@@ -105,19 +113,22 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Return factor and unit that bring a quantity into 1 ... 1000: ``(1e-6, "MPa")`` for 8.5e8 Pa.
+    """Return factor and unit that scale a quantity to 1 ... 1000: ``(1e-6, "MPa")`` for 8.5e8 Pa.
+
+    An area is scaled to 0.1 ... 100,000, as by `quantity`.
 
     Parameters
     ----------
     largest : float
         Largest magnitude, SI.
     unit : str
-        SI unit; "1" or empty for a pure number, which is left alone. An area takes the square of a prefix.
+        SI unit; "1" or empty for a pure number, which has no prefix. An area takes the square of a prefix.
     """
     if unit in ("", "1") or not math.isfinite(largest) or largest == 0.0:
         return 1.0, unit.replace("1", "")
     power = 2 if unit == "m2" else 1
-    exponent = 3 * math.floor(math.log10(abs(largest) * 1.0000001) / (3 * power))
+    size = math.log10(abs(largest) * 1.0000001) + (power - 1)
+    exponent = 3 * math.floor(size / (3 * power))
     exponent = min(max(exponent, -12), 9)
     return 10.0 ** (-exponent * power), PREFIXES[exponent] + unit.replace("m2", "m²")
 
@@ -134,7 +145,7 @@ def percent(share: float) -> str:
 
 
 def text_table(headers: Row, rows: Iterable[Row]) -> str:
-    """Return a table as plain text; numbers are at the right of their columns."""
+    """Return a table as plain text with numbers at the right of their columns."""
     table = [[visible(cell) for cell in row] for row in (headers, *rows)]
     widths = [max(len(row[k]) for row in table) for k in range(len(headers))]
     left = [k == 0 or not _numbers(row[k] for row in table[1:]) for k in range(len(headers))]
@@ -149,8 +160,8 @@ def text_table(headers: Row, rows: Iterable[Row]) -> str:
 
 
 def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") -> str:
-    """Return a table as HTML that looks the same in light and dark notebooks."""
-    rows = [list(row) for row in rows]
+    """Return a table as HTML for light and dark notebooks."""
+    rows = [tuple(row) for row in rows]
     right = [k > 0 and _numbers(row[k] for row in rows) for k in range(len(headers))]
 
     def line(row: Row, tag: str, style: str) -> str:
@@ -168,13 +179,13 @@ def html_table(title: str, headers: Row, rows: Iterable[Row], note: str = "") ->
 
 
 def _numbers(cells: Iterable[str]) -> bool:
-    """Tell whether a column holds numbers, some of which may be missing."""
+    """Test whether a column holds numbers; some may be missing."""
     found = [cell for cell in cells if cell not in ("", "-")]
     return bool(found) and all(cell.lstrip("+-").replace("inf", "0")[:1].isdigit() for cell in found)
 
 
 def rich_table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: bool = False) -> Table:
-    """Return a table of numbers; names and labels are text, which may wrap on a narrow terminal."""
+    """Return a table for terminals; columns of names and labels may wrap, those of numbers do not."""
     from rich import box
     from rich.table import Table
     from rich.text import Text

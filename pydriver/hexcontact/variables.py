@@ -1,13 +1,14 @@
-"""The quantities of a result, each defined once, with all that tables, pictures, files and the core need.
+"""The quantities of a result, each defined once, for tables, pictures, files and the core.
 
-`VARIABLES` has a row for each quantity. What the rooms need in another order stands below it, derived from
-its columns: fields, loads and motions, residuals, panels and maps, arrays of the compiled core.
+`VARIABLES` has a row for each quantity. The lists below it are derived from its columns: fields, loads and
+motions, residuals, panels and maps, arrays of the compiled core.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ CONVENTIONS = "CF-1.11 UGRID-1.0"
 LARGEST = 1e30
 
 NAN = float("nan")
-NOT_KEPT = -1  # zone of a step whose fields the deck chose not to keep (output.every)
+NOT_KEPT = -1  # zone of a step whose fields are not in the output (output.every)
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Variable:
     units : str
         SI unit, ``"1"`` for a pure number, empty for text.
     long_name : str
-        What it is, in words.
+        Its meaning in words.
     padding : float or int
         Value at nodes outside the window that a step was solved on.
     dtype : str
@@ -41,26 +42,35 @@ class Variable:
     flags : mapping of int to str
         Meaning of each value, for a quantity that is a code.
     symbol : str
-        Symbol of the theory; empty if tables and messages name it in words.
+        Symbol of the theory; empty if tables and messages use words.
     title : str
-        Title of the panel (history) or map (field) that shows it; quantities of one title are shown together.
+        Title of its panel (history) or map (field); quantities of one title share it.
     motion : str
-        Rigid motion (``z``, ``x``, ``y``, ``twist``) that it drives as a load, or is.
+        Rigid motion (``z``, ``x``, ``y``, ``twist``), also of the load that drives it.
     scale : tuple of str and int
-        Quantity, and power of the contact radius, whose product it is noise beside; ``("", 0)``: it is none.
+        Quantity, and power of the contact radius: noise is small beside their product; ``("", 0)``: none.
     least : float
-        Smallest value that a solution can have.
+        Smallest value of a solution, but for noise beside `scale`.
+    most : float or str
+        Largest value: a number, the quantity of the history that it is part of, or ``"window"``, the area of
+        all nodes.
     summary : int
-        Place in the summary of a load step, after loads and motions; 0: it is not there.
+        Place in the summary of a load step, after loads and motions; 0: none.
     required : str
-        When a file must have it: ``"always"``, ``"friction"``, or never if empty.
+        Whether files must have it: ``"always"``, ``"friction"``; empty: never.
     frictional : bool
-        Whether it is a field that a contact without friction does not have.
+        Whether it is a field, or a measure of one, that a contact without friction does not have.
     estimated : bool
         Whether its discretization error is estimated: a value by step of the solution, not of the work.
+    rough : bool
+        Whether it depends on a few nodes at the edge of a zone, so that its error decreases like the root of
+        the spacing.
+    slip_zone : bool
+        Whether it depends on the width of the slip zone, so that its error decreases slowly while that is
+        narrower than the lattice resolves.
     core : str
         Array of fortran/python/f2py_friction.f90 that holds it: ``"fields"``, ``"zone"``, ``"numbers"``,
-        ``"residuals"``. The order there is that of the rows here.
+        ``"residuals"``. The order there is that of the rows here. ``"wear"``: a field of cycles that wear.
     """
 
     dims: tuple[str, ...]
@@ -74,10 +84,13 @@ class Variable:
     motion: str = ""
     scale: tuple[str, int] = ("", 0)
     least: float = -LARGEST
+    most: float | str = LARGEST
     summary: int = 0
     required: str = ""
     frictional: bool = False
     estimated: bool = False
+    rough: bool = False
+    slip_zone: bool = False
     core: str = ""
 
     @property
@@ -107,24 +120,13 @@ class Variable:
         return attributes
 
 
-def _node(units: str, long_name: str, **more: Any) -> Variable:
-    """Return a value at each node, by step."""
-    return Variable(("step", "row", "col"), units, long_name, **more)
-
-
-def _shear(units: str, long_name: str, **more: Any) -> Variable:
-    """Return a field of the state of a contact with friction."""
-    return _node(units, long_name, frictional=True, core="fields", **more)
-
-
-def _scalar(units: str, long_name: str, **more: Any) -> Variable:
-    """Return a value of the solution by step, whose discretization error can be estimated."""
-    return Variable(("step",), units, long_name, estimated=True, **more)
-
-
-def _work(units: str, long_name: str, **more: Any) -> Variable:
-    """Return a value by step that tells about its solving."""
-    return Variable(("step",), units, long_name, **more)
+_Row = Callable[..., Variable]
+_node: _Row = partial(Variable, ("step", "row", "col"))  # a value at each node, by step
+_shear: _Row = partial(_node, frictional=True, core="fields")  # a field of the state with friction
+_work: _Row = partial(Variable, ("step",))  # a value by step, of solving or of what is prescribed
+_scalar: _Row = partial(_work, estimated=True)  # a value of the solution, whose lattice error is estimated
+_measure: _Row = partial(_scalar, core="measures")
+_stick: _Row = partial(_measure, frictional=True)
 
 
 def _residual(symbol: str, long_name: str, required: str = "friction") -> Variable:
@@ -132,12 +134,26 @@ def _residual(symbol: str, long_name: str, required: str = "friction") -> Variab
     return _work("1", f"residual of the {long_name}, {symbol}", **about)
 
 
-_ALWAYS = {"required": "always"}
-_FRICTION = {"required": "friction"}
+def _along(name: str, make: _Row, units: str, long_name: str, **more: Any) -> dict[str, Variable]:
+    """Return the components of a vector; x and y take the place of {} in its texts."""
+    words = {key for key, value in more.items() if isinstance(value, str)}
+    return {
+        name.format(axis): make(
+            units, long_name.format(axis), **more | {key: more[key].format(axis) for key in words}
+        )
+        for axis in "xy"
+    }
+
+
+_ALWAYS, _FRICTION = {"required": "always"}, {"required": "friction"}
 _ZONES = {NOT_KEPT: "not_kept", 0: "separated", 1: "stick", 2: "slip"}
 _LIMITS = {NOT_KEPT: "not_adaptive", 0: "within_tolerance", 1: "no_smaller_step_helps"}
 _PLANE = ("row", "col")
 _LOAD, _APPROACH = ("normal_load", 0), ("approach", 0)  # what shear is noise beside
+_WORK = ("normal_load", 1)
+_AREA = {"least": 0.0, "most": "window"}
+_FROM_0: dict[str, Any] = {"least": 0.0}
+_WORN: dict[str, Any] = {"padding": 0.0, "frictional": True, "core": "wear"}
 _AREAS, _SLIP = "Contact and stick area", "Slip in the step"
 
 # fmt: off
@@ -153,106 +169,127 @@ VARIABLES: dict[str, Variable] = {
     "pressure": _node(
         "Pa", "contact pressure", padding=0.0, symbol="p", title="Pressure", least=0.0, core="fields"
     ),
-    "traction_x": _shear(
-        "Pa", "shear traction on body 1 along x", padding=0.0, symbol="q_x", title="Shear traction"
-    ),
-    "traction_y": _shear(
-        "Pa", "shear traction on body 1 along y", padding=0.0, symbol="q_y", title="Shear traction"
+    **_along(
+        "traction_{}", _shear, "Pa", "shear traction on body 1 along {}",
+        padding=0.0, symbol="q_{}", title="Shear traction",
     ),
     "gap": _node("m", "gap between the deformed surfaces", core="fields"),
     "zone": _node("1", "contact zone of the node", padding=0, dtype="i1", flags=_ZONES, core="zone"),
-    "relative_displacement_x": _shear(
-        "m", "displacement of body 1 relative to body 2 along x, less the shift"
+    **_along(
+        "relative_displacement_{}", _shear, "m",
+        "displacement of body 1 relative to body 2 along {}, less the shift",
     ),
-    "relative_displacement_y": _shear(
-        "m", "displacement of body 1 relative to body 2 along y, less the shift"
-    ),
-    "slip_increment_x": _shear("m", "slip during the step along x", padding=0.0, title=_SLIP),
-    "slip_increment_y": _shear("m", "slip during the step along y", padding=0.0, title=_SLIP),
+    **_along("slip_increment_{}", _shear, "m", "slip during the step along {}", padding=0.0, title=_SLIP),
     "accumulated_slip": _shear(
         "m", "length of the slip path so far", padding=0.0, title="Accumulated slip", least=0.0
     ),
-    "displacement_1_x": _node("m", "surface displacement of body 1 along x"),
-    "displacement_1_y": _node("m", "surface displacement of body 1 along y"),
+    "dissipation_density": _shear("J/m2", "energy by area dissipated so far", padding=0.0, title="Energy"),
+    "worn_depth": _node("m", "depth that is worn off both bodies", title="Worn depth", **_WORN),
+    "worn_depth_step_change": _node("m", "change of the worn depth by jumps of half the size", **_WORN),
+    "cycle_dissipation_density": _node("J/m2", "energy by area that friction takes in a cycle", **_WORN),
+    "cycle_slip_amplitude": _node("m", "slip amplitude of a cycle, a quarter of its slip path", **_WORN),
+    **_along("displacement_1_{}", _node, "m", "surface displacement of body 1 along {}"),
     "displacement_1_z": _node("m", "surface displacement of body 1 into body 1"),
-    "displacement_2_x": _node("m", "surface displacement of body 2 along x"),
-    "displacement_2_y": _node("m", "surface displacement of body 2 along y"),
+    **_along("displacement_2_{}", _node, "m", "surface displacement of body 2 along {}"),
     "displacement_2_z": _node("m", "surface displacement of body 2 into body 2"),
-    # history
     "normal_load": _scalar(
         "N", "normal load pressing the bodies together",
         symbol="P", title="Normal load", motion="z", least=0.0, core="numbers", **_ALWAYS,
     ),
-    "tangential_load_x": _scalar(
-        "N", "tangential load on body 1 along x",
-        symbol="Q_x", title="Tangential load", motion="x", scale=_LOAD, core="numbers", **_FRICTION,
-    ),
-    "tangential_load_y": _scalar(
-        "N", "tangential load on body 1 along y",
-        symbol="Q_y", title="Tangential load", motion="y", scale=_LOAD, core="numbers", **_FRICTION,
+    **_along(
+        "tangential_load_{}", _scalar, "N", "tangential load on body 1 along {}",
+        symbol="Q_{}", title="Tangential load", motion="{}", scale=_LOAD, core="numbers", **_FRICTION,
     ),
     "torque": _scalar(
         "N m", "torque on body 1 about z",
-        symbol="M_z", title="Torque", motion="twist", scale=("normal_load", 1), core="numbers", **_FRICTION,
+        symbol="M_z", title="Torque", motion="twist", scale=_WORK, core="numbers", **_FRICTION,
     ),
     "approach": _scalar(
         "m", "normal approach of the remote parts of the bodies",
         title="Approach", motion="z", core="numbers", **_ALWAYS,
     ),
-    "shift_x": _scalar(
-        "m", "shift of body 2 relative to body 1 far away along x",
-        title="Shift", motion="x", scale=_APPROACH, core="numbers", **_FRICTION,
-    ),
-    "shift_y": _scalar(
-        "m", "shift of body 2 relative to body 1 far away along y",
-        title="Shift", motion="y", scale=_APPROACH, core="numbers", **_FRICTION,
+    **_along(
+        "shift_{}", _scalar, "m", "shift of body 2 relative to body 1 far away along {}",
+        title="Shift", motion="{}", scale=_APPROACH, core="numbers", **_FRICTION,
     ),
     "twist": _scalar(
         "rad", "rotation of body 2 relative to body 1 far away about z",
         title="Twist", motion="twist", scale=("approach", -1), core="numbers", **_FRICTION,
     ),
-    "contact_area": _scalar(
-        "m2", "contact area: cells of the nodes in contact", title=_AREAS, least=0.0, **_ALWAYS
+    **{
+        f"bulk_strain_{axes}": _work(
+            "1", f"bulk strain {axes} of body 1 less that of body 2", core="numbers", frictional=True
+        )
+        for axes in ("xx", "yy", "xy")
+    },
+    "bulk_body": _work(
+        "1", "body that carries the bulk stress", dtype="i4", flags={1: "body_1", 2: "body_2"}
     ),
-    "stick_area": _scalar(
-        "m2", "stick area: cells of the sticking nodes", title=_AREAS, least=0.0, **_FRICTION
+    **{
+        f"bulk_stress_{axes}": _work(
+            "Pa", f"bulk stress {axes} of the named body, tension positive", title="Bulk stress"
+        )
+        for axes in ("xx", "yy", "xy")
+    },
+    "contact_area": _measure(
+        "m2", "contact area: cells of the nodes in contact", title=_AREAS, **_AREA, **_ALWAYS
     ),
-    "contact_radius": _scalar(
+    "stick_area": _stick(
+        "m2", "stick area: cells of the sticking nodes",
+        title=_AREAS, least=0.0, most="contact_area", **_FRICTION,
+    ),
+    "contact_radius": _measure(
         "m", "radius of the disc as large as the contact area", least=0.0, summary=3, **_ALWAYS
     ),
-    "contact_area_fit": _scalar("m2", "contact area: to the edge, between the nodes"),
-    "contact_radius_fit": _scalar("m", "radius of the disc as large as the fitted contact area"),
-    "pressure_center_x": _scalar("m", "x coordinate of the centroid of the pressure"),
-    "pressure_center_y": _scalar("m", "y coordinate of the centroid of the pressure"),
-    "stick_radius": _scalar(
-        "m", "radius of the disc as large as the stick area", least=0.0, summary=4, **_FRICTION
+    "contact_area_fit": _measure("m2", "contact area: to the edge, between the nodes", **_AREA),
+    "contact_radius_fit": _measure("m", "radius of the disc as large as the fitted contact area", **_FROM_0),
+    "contact_semi_major": _measure(
+        "m", "larger half-axis of the ellipse with the moments of that area", **_FROM_0
     ),
-    "stick_area_fit": _scalar("m2", "stick area: to its edge, between the nodes"),
-    "stick_radius_fit": _scalar("m", "radius of the disc as large as the fitted stick area"),
-    "stick_center_x": _scalar("m", "x coordinate of the centroid of the stick area", **_FRICTION),
-    "stick_center_y": _scalar("m", "y coordinate of the centroid of the stick area", **_FRICTION),
-    "stick_min_x": _scalar("m", "smallest x coordinate of a sticking node"),
-    "stick_max_x": _scalar("m", "largest x coordinate of a sticking node"),
-    "stick_min_y": _scalar("m", "smallest y coordinate of a sticking node"),
-    "stick_max_y": _scalar("m", "largest y coordinate of a sticking node"),
-    "max_pressure": _scalar(
-        "Pa", "largest contact pressure of a node", title="Largest pressure", least=0.0, summary=1, **_ALWAYS
+    "contact_semi_minor": _measure("m", "smaller half-axis of that ellipse", **_FROM_0),
+    "pressure_center_x": _measure("m", "x coordinate of the centroid of the pressure"),
+    "pressure_center_y": _measure("m", "y coordinate of the centroid of the pressure"),
+    "stick_radius": _stick(
+        "m", "radius of the disc as large as the stick area",
+        least=0.0, most="contact_radius", summary=4, **_FRICTION,
     ),
-    "max_traction": _scalar(
+    "stick_area_fit": _stick("m2", "stick area: to its edge, between the nodes", slip_zone=True, **_AREA),
+    "stick_radius_fit": _stick(
+        "m", "radius of the disc as large as the fitted stick area", slip_zone=True, **_FROM_0
+    ),
+    "stick_center_x": _stick("m", "x coordinate of the centroid of the stick area", **_FRICTION),
+    "stick_center_y": _stick("m", "y coordinate of the centroid of the stick area", **_FRICTION),
+    "stick_min_x": _stick("m", "smallest x coordinate of a sticking node"),
+    "stick_max_x": _stick("m", "largest x coordinate of a sticking node"),
+    "stick_min_y": _stick("m", "smallest y coordinate of a sticking node"),
+    "stick_max_y": _stick("m", "largest y coordinate of a sticking node"),
+    "max_pressure": _measure(
+        "Pa", "largest contact pressure of a node", title="Max pressure", least=0.0, summary=1, **_ALWAYS
+    ),
+    "max_traction": _stick(
         "Pa", "largest shear traction of a node",
-        title="Largest shear traction", least=0.0, summary=2, **_FRICTION,
+        title="Max traction", least=0.0, summary=2, rough=True, slip_zone=True, **_FRICTION,
     ),
     "dissipated_energy": _scalar(
         "J", "energy dissipated by friction so far",
-        title="Dissipated energy", summary=6, core="numbers", **_FRICTION,
+        title="Dissipated energy", least=0.0, scale=_WORK, summary=6, slip_zone=True, core="numbers",
+        **_FRICTION,
     ),
-    "dissipated_energy_step": _scalar("J", "energy dissipated by friction during the step"),
-    "elastic_energy": _scalar(
-        "J", "elastic energy stored in both bodies", title="Elastic energy", summary=5, **_FRICTION
+    "dissipated_energy_step": _scalar(
+        "J", "energy dissipated by friction during the step", least=0.0, scale=_WORK, slip_zone=True
     ),
-    "sweeps": _work("1", "iterations of the solver", dtype="i4", **_ALWAYS),
+    "wear_cycles": _work("1", "cycles that have worn the surfaces", **_FROM_0),
+    "wear_volume": _work("m3", "volume that is worn off both bodies", title="Wear volume", least=0.0),
+    "max_worn_depth": _work("m", "largest worn depth of a node", title="Largest worn depth", least=0.0),
+    "worn_depth_step_error": _work("m", "error of the worn depth by the size of jumps", **_FROM_0),
+    "cycle_dissipated_energy": _work("J", "energy dissipated by friction in a cycle", **_FROM_0),
+    "elastic_energy": _measure(
+        "J", "elastic energy stored in both bodies",
+        title="Elastic energy", least=0.0, scale=_WORK, summary=5, **_FRICTION,
+    ),
+    "sweeps": _work("1", "iterations of the solver", dtype="i4", least=0.0, **_ALWAYS),
     "cuts": _work(
-        "1", "how often the step was halved until the solver converged", dtype="i4", **_FRICTION
+        "1", "how often the step was halved until the solver converged", dtype="i4", least=0.0, **_FRICTION
     ),
     "operator_applications": _work(
         "1", "applications of the full flexibility operator", least=0.0, **_ALWAYS
@@ -263,30 +300,33 @@ VARIABLES: dict[str, Variable] = {
     "residual_force": _residual("R_P", "normal load", **_ALWAYS),
     "residual_shear_force": _residual("R_Q", "tangential load"),
     "residual_torque": _residual("R_M", "torque"),
-    "stick_area_step_error": _work("m2", "bound on the error of the stick area by the size of load steps"),
+    "stick_area_step_error": _work(
+        "m2", "bound on the error of the stick area by the size of load steps", **_AREA
+    ),
     "stick_area_step_change": _work("m2", "change of the stick area by load steps of half the size"),
+    "traction_step_error": _work(
+        "1", "bound on the error of the shear tractions by load steps, share of what friction can carry"
+    ),
     "traction_step_change": _work(
-        "1", "change of the shear tractions by load steps of half the size, share of what friction can carry"
+        "1", "change of the shear tractions by load steps of half the size, share of what friction can carry",
+        least=0.0,
     ),
     "rejected_steps": _work("1", "larger load steps that were tried and rejected", dtype="i4"),
     "step_limited": _work(
         "1", "whether the tolerance of load steps was missed, since smaller ones did not help",
         dtype="i1", flags=_LIMITS,
     ),
-    "segment_fraction": _work("1", "fraction of the segment that is done"),
-    "segment": _work("1", "segment of the load history, the first is 1", dtype="i4", **_ALWAYS),
+    "segment_fraction": _work("1", "fraction of the segment that is done", least=0.0, most=1.0),
+    "segment": _work("1", "segment of the load history, the first is 1", dtype="i4", least=1.0, **_ALWAYS),
     "label": _work("", "label of the segment", dtype="str", **_ALWAYS),
 }
-# fmt: on
 
 ESTIMATED = tuple(name for name, variable in VARIABLES.items() if variable.estimated)
 """Quantities of the history whose discretization error is estimated."""
 
 VARIABLES |= {
-    f"{name}_error": _work(
-        VARIABLES[name].units, f"estimated discretization error: {VARIABLES[name].long_name}"
-    )
-    for name in ESTIMATED
+    f"{name}_error": _work(v.units, f"estimated discretization error: {v.long_name}", **_FROM_0)
+    for name, v in VARIABLES.items() if v.estimated
 }
 VARIABLES |= {
     "trial_level": Variable(("trial",), "1", "how often the lattice of the trial was refined", dtype="i4"),
@@ -297,17 +337,33 @@ VARIABLES |= {
     "trial_nodes": Variable(("trial",), "1", "nodes of the window of the trial", dtype="i4"),
 }
 VARIABLES |= {
-    f"trial_{name}": Variable(
-        ("trial", "step"), VARIABLES[name].units, f"on each trial: {VARIABLES[name].long_name}"
-    )
-    for name in ESTIMATED
+    f"trial_{name}": Variable(("trial", "step"), v.units, f"on each trial: {v.long_name}")
+    for name, v in VARIABLES.items() if v.estimated
+}
+# fmt: on
+
+# Quantities below the surface, in the order of the core; they follow from a result at any points.
+STRESSES: dict[str, Variable] = {
+    f"stress_{ab}": Variable((), "Pa", f"component {ab} of the stress, positive in tension")
+    for ab in ("xx", "yy", "zz", "xy", "yz", "xz")
+}
+STRESSES |= {
+    **{
+        f"principal_stress_{k}": Variable((), "Pa", f"{which} principal stress")
+        for k, which in ((1, "largest (most tensile)"), (2, "middle"), (3, "smallest (most compressive)"))
+    },
+    "von_mises_stress": Variable((), "Pa", "equivalent stress of von Mises", least=0.0),
+    "tresca_stress": Variable(
+        (), "Pa", "equivalent stress of Tresca, twice the largest shear stress", least=0.0
+    ),
+    **{f"displacement_{axis}": Variable((), "m", f"displacement of the body along {axis}") for axis in "xyz"},
 }
 
 # --- derived ------------------------------------------------------------------------------------------------
 
 
 def names_where(matches: Callable[[Variable], object]) -> tuple[str, ...]:
-    """Return the names of the quantities whose columns fulfil a condition, in the order of the table."""
+    """Return the names of the quantities that fulfil a condition, in the order of the table."""
     return tuple(name for name, variable in VARIABLES.items() if matches(variable))
 
 
@@ -320,15 +376,21 @@ def grouped(column: Callable[[str, Variable], str]) -> dict[str, tuple[str, ...]
     return groups
 
 
+# Parameters of a case with a compliant interface.
+INTERFACE = ("interface_coefficient", "interface_exponent", "interface_tangential_stiffness")
 FIELDS = names_where(lambda v: v.is_field)
 FRICTIONLESS_FIELDS = names_where(lambda v: v.is_field and not v.frictional)
-STATE = {
-    False: names_where(lambda v: v.is_field and v.core and not v.frictional),
-    True: names_where(lambda v: v.is_field and v.core),
-}
+_HELD = names_where(lambda v: v.core in ("fields", "zone"))
+STATE = {False: tuple(name for name in _HELD if not VARIABLES[name].frictional), True: _HELD}
 """Fields of every step, without and with friction: the state from which the next step starts."""
 DISPLACEMENTS = names_where(lambda v: v.is_field and not v.core)
-"""Fields that are computed if a deck names them."""
+"""Fields that need to be named in a deck."""
+
+WORN = names_where(lambda v: v.core == "wear")  # fields of a cycle that wears the surfaces
+
+BULK_STRAIN = names_where(lambda v: v.long_name.startswith("bulk strain "))
+BULK_STRESS = names_where(lambda v: v.long_name.startswith("bulk stress "))
+"""Components of the bulk strain and of the bulk stress, xx, yy, xy."""
 
 LOADS = grouped(lambda name, v: v.motion)
 """What drives each rigid motion: a load or a displacement. Decks have keys of the same names."""
@@ -338,10 +400,10 @@ RESIDUALS = {VARIABLES[name].symbol: name for name in names_where(lambda v: v.co
 """Residuals by the symbol of the theory."""
 
 CORE = grouped(lambda name, v: v.core)
-"""Names of what each array of the interface with friction holds, in its order."""
+"""Names of the entries of each array of the interface with friction, in its order."""
 
 VECTORS = grouped(lambda name, v: name[:-2] if v.is_field and name[-2:] in ("_x", "_y", "_z") else "")
-"""Components of each vector field by its name, which is theirs without the axis."""
+"""Components of each vector field, by their name without the axis."""
 
 PANELS = dict(
     sorted(
@@ -352,7 +414,7 @@ PANELS = dict(
 """Quantities of the history that share a panel, by its title: loads and motions first, as in a summary."""
 
 MAPS = grouped(lambda name, v: v.title if v.is_field else "")
-"""Fields that have a map by its title: one, or the components of a vector whose length the map shows."""
+"""Fields of each map by its title: one, or the components of a vector whose length it shows."""
 
 
 def spelled(name: str) -> str:
@@ -361,5 +423,5 @@ def spelled(name: str) -> str:
 
 
 def label_of(name: str) -> str:
-    """Return what narrow tables call a load or motion: "Qx", "shift x"."""
+    """Return the short name of a load or motion: "Qx", "shift x"."""
     return VARIABLES[name].symbol.replace("_", "") or spelled(name)

@@ -1,4 +1,4 @@
-"""A load step of a result beside the closed solutions that hold for it."""
+"""Comparison of a load step with the closed solutions that hold for it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import DeckError
 from ..text import html_table, quantity, rich_table, text_table
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     import xarray
     from rich.table import Table
 
-Array = NDArray[np.float64]
 
 _HEADERS = ("", "solution", "exact", "computed", "error")
 
@@ -34,7 +32,7 @@ class Entry:
     quantity : str
         Name of the quantity.
     solution : str
-        Whose solution it is compared with.
+        Name of the closed solution.
     exact, computed : float
         The two values, SI; NaN for a field.
     error : float
@@ -50,7 +48,7 @@ class Entry:
 
 
 class Comparison(Sequence[Entry]):
-    """A load step beside closed solutions; printed, a table.
+    """Comparison of a load step with closed solutions; printed, a table.
 
     Parameters
     ----------
@@ -59,7 +57,7 @@ class Comparison(Sequence[Entry]):
     step : int
         Number of the load step.
     note : str
-        A remark on them, or why there are none.
+        A remark on them, or the reason why there are none.
     """
 
     def __init__(self, entries: Sequence[Entry], step: int, note: str = "") -> None:
@@ -77,7 +75,7 @@ class Comparison(Sequence[Entry]):
             for entry in self.entries:
                 if entry.quantity == place:
                     return entry
-            raise KeyError(f"no closed solution here knows {place}")
+            raise KeyError(f"no closed-form solution has {place}")
         return self.entries[place]
 
     def __len__(self) -> int:
@@ -86,7 +84,7 @@ class Comparison(Sequence[Entry]):
 
     @property
     def largest_error(self) -> float:
-        """Largest of the errors; NaN if there is nothing to compare with."""
+        """Largest of the errors; NaN without closed solutions."""
         return max((abs(entry.error) for entry in self.entries), default=math.nan)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -112,7 +110,7 @@ class Comparison(Sequence[Entry]):
 
     @property
     def _title(self) -> str:
-        return f"Load step {self.step} against closed solutions"
+        return f"Load step {self.step} against closed-form solutions"
 
     def __repr__(self) -> str:
         """Return the table as text."""
@@ -151,7 +149,7 @@ def compare(
 
 
 def _own(exact: Mapping[str, float] | object, name: str, dataset: xarray.Dataset) -> Exact:
-    """Return a solution that the user gave."""
+    """Return a given solution."""
     if isinstance(exact, Mapping):
         for quantity_name in exact:
             if dataset[str(quantity_name)].dims != ("step",):
@@ -167,7 +165,7 @@ def _own(exact: Mapping[str, float] | object, name: str, dataset: xarray.Dataset
 
 
 def _entries(data: Any, exact: Exact) -> Iterator[Entry]:
-    """Yield the lines about one solution."""
+    """Yield the lines of one solution."""
     for name, value in exact.values.items():
         if name in data and math.isfinite(computed := float(data[name])):
             error = (computed - value) / abs(value) if value else (0.0 if computed == 0.0 else math.inf)

@@ -7,13 +7,11 @@ from dataclasses import astuple, dataclass
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import reals
+from ..arrays import Array, reals
 from ..core.analytic import at_points, flat
 from .frictionless import Given, driven_by, require_positive
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class EllipticContact:
         return along, across
 
     def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Contact pressure (Pa) at the points (x, y) (m, broadcast); 0 outside the contact."""
+        """Return the contact pressure (Pa) at points (x, y) (m, broadcast); 0 outside the contact."""
         return at_points(flat.ellipse_pressure, astuple(self), (reals(x, "x"), reals(y, "y")))
 
 

@@ -1,4 +1,4 @@
-"""Contacts with friction that have a closed solution (or one integral) to check the solver against.
+"""Closed solutions (or one integral) of contacts with friction.
 
 Compliances of the pair of bodies: S = sum (2-nu_i)/G_i = 4 pi (lambda_1 + lambda_5/2) for a shear force,
 S_t = sum 1/G_i = 2 pi (lambda_1 + lambda_5) for a torque.  beta is Dundurs' constant.  SI units.
@@ -11,12 +11,11 @@ from collections.abc import Callable
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import reals
+from ..arrays import Array, reals
 from ..core.analytic import at_points, flat
-
-Array = NDArray[np.float64]
+from .frictionless import AxisymmetricContact
 
 
 @dataclass(frozen=True)
@@ -50,26 +49,26 @@ class MindlinContact:
 
     @property
     def sliding_shift(self) -> float:
-        """Rigid shift at which the spheres start to slide, Delta_s = 3 mu P S/(16 a), m."""
+        """Rigid shift at which the spheres begin to slide, Delta_s = 3 mu P S/(16 a), m."""
         return float(flat.mindlin_sliding(astuple(self))[1])
 
     def _bounded(self, load: ArrayLike) -> Array:
-        """Return loads (N), none of which exceeds the sliding load."""
+        """Return loads (N) up to the sliding load; ValueError for others."""
         loads = reals(load, "load")
         if np.any(np.abs(loads / self.sliding_load) > 1.0):
             raise ValueError("the tangential load is larger than mu P")
         return loads
 
     def stick_radius(self, load: ArrayLike) -> Array:
-        """Radius of the stick circle under the first loading to Q (N): c = a (1 - Q/mu P)^(1/3)."""
+        """Return the stick radius (m) under the first loading to Q (N): c = a (1 - Q/mu P)^(1/3)."""
         return at_points(flat.mindlin_stick_radius, astuple(self), [self._bounded(load)])
 
     def shift(self, load: ArrayLike) -> Array:
-        """Rigid shift (m) under the first loading to Q (N): Delta_s [1 - (1 - Q/mu P)^(2/3)]."""
+        """Return the rigid shift (m) under the first loading to Q (N): Delta_s [1 - (1 - Q/mu P)^(2/3)]."""
         return at_points(flat.mindlin_shift, astuple(self), [self._bounded(load)])
 
     def load(self, shift: ArrayLike) -> Array:
-        """Tangential load (N) under a first prescribed shift (m): mu P [1 - (1 - Delta/Delta_s)^(3/2)]."""
+        """Return the tangential load (N) under a first shift (m): mu P [1 - (1 - Delta/Delta_s)^(3/2)]."""
         return at_points(flat.mindlin_load, astuple(self), [reals(shift, "shift")])
 
     def traction(self, r: ArrayLike, load: float) -> Array:
@@ -77,7 +76,7 @@ class MindlinContact:
         return at_points(flat.mindlin_traction, astuple(self), [reals(r, "r")], float(self._bounded(load)))
 
     def shift_unloading(self, load: ArrayLike, peak: float) -> Array:
-        """Rigid shift (m) at Q (N) on the way back from the load ``peak`` = Q* > 0 towards -Q*, P constant.
+        """Return the rigid shift (m) at Q (N) on the way back from ``peak`` = Q* > 0 towards -Q*, P constant.
 
         The way from -Q* back up is the point reflection: -shift_unloading(-Q, peak).
         """
@@ -85,13 +84,75 @@ class MindlinContact:
         return at_points(flat.mindlin_shift_unloading, astuple(self), [self._bounded(load)], top)
 
     def traction_unloading(self, r: ArrayLike, load: float, peak: float) -> Array:
-        """Shear traction (Pa) at Q (N) on the way back from ``peak`` = Q* > 0: slip reversed at the rim."""
+        """Return the shear traction (Pa) at Q (N) on the way back from ``peak`` = Q* > 0."""
         loads = float(self._bounded(load)), float(self._bounded(peak))
         return at_points(flat.mindlin_traction_unloading, astuple(self), [reals(r, "r")], *loads)
 
     def energy_per_cycle(self, peak: float) -> float:
-        """Energy (J) dissipated in one cycle between +Q* and -Q* at constant P (Q* = ``peak``, N)."""
+        """Return the energy (J) of one cycle between +Q* and -Q* at constant P (Q* = ``peak``, N)."""
         return float(flat.mindlin_energy(astuple(self), float(self._bounded(peak))))
+
+
+@dataclass(frozen=True)
+class SuperposedContact:
+    """Similar bodies pressed by P, then sheared: superposed contacts without friction (Jaeger, Ciavarella).
+
+    With p(P), delta(P) and a(P) of the contact without friction and P* = P - Q/mu, the shear traction is
+    q = mu (p(P) - p(P*)), the stick zone is the contact under P*, and the shift is (1 + gamma/2) mu
+    (delta(P) - delta(P*)). Exact for beta = 0 and gamma = 0, whatever the surfaces; for gamma > 0 as exact as
+    Mindlin's.
+
+    Parameters
+    ----------
+    friction_coefficient : float
+        mu > 0.
+    normal_load : float
+        P, N.
+    tangential_compliance_ratio : float
+        gamma.
+    pressed : callable
+        The contact without friction under a load (N) above 0.
+    """
+
+    friction_coefficient: float
+    normal_load: float
+    tangential_compliance_ratio: float
+    pressed: Callable[[float], AxisymmetricContact]
+
+    @property
+    def sliding_load(self) -> float:
+        """Tangential load mu P at which the bodies slide, N."""
+        return self.friction_coefficient * self.normal_load
+
+    def _stuck(self, load: float) -> AxisymmetricContact | None:
+        """Return the contact under P*, the stick zone of a first loading to Q (N); None where all slides."""
+        left = self.normal_load - abs(load) / self.friction_coefficient
+        if left < -1e-9 * self.normal_load:
+            raise ValueError("the tangential load is larger than mu P")
+        return self.pressed(left) if left > 1e-9 * self.normal_load else None
+
+    def stick_radius(self, load: float) -> float:
+        """Return the radius (m) of the stick circle under the first loading to Q (N)."""
+        stuck = self._stuck(load)
+        return stuck.contact_radius if stuck else 0.0
+
+    def shift(self, load: float) -> float:
+        """Return the rigid shift (m) under the first loading to Q (N)."""
+        stuck = self._stuck(load)
+        moved = self.pressed(self.normal_load).approach - (stuck.approach if stuck else 0.0)
+        factor = self.friction_coefficient * (1.0 + 0.5 * self.tangential_compliance_ratio)
+        return math.copysign(factor * moved, load)
+
+    def traction(self, r: ArrayLike, load: float) -> Array:
+        """Shear traction (Pa) at distance r (m) from the axis under the first loading to Q (N).
+
+        nan where both pressures are infinite.
+        """
+        stuck = self._stuck(load)
+        pressure = self.pressed(self.normal_load).pressure(r)
+        with np.errstate(invalid="ignore"):
+            difference = pressure - (stuck.pressure(r) if stuck else 0.0)
+        return math.copysign(self.friction_coefficient, load) * difference
 
 
 @dataclass(frozen=True)
@@ -121,22 +182,22 @@ class LubkinTorsion:
         return float(flat.lubkin_sliding_torque(astuple(self)))
 
     def twist(self, stick_radius: float) -> float:
-        """Twist (rad) at which the stick radius is c (m): (S_t mu p0/2) [K - E](k), k^2 = 1 - c^2/a^2."""
+        """Return the twist (rad) at a stick radius c (m): (S_t mu p0/2) [K - E](k), k^2 = 1 - c^2/a^2."""
         return float(flat.lubkin_twist(astuple(self), stick_radius))
 
     def torque(self, stick_radius: float) -> float:
-        """Torque (N m) at which the stick radius is c (m)."""
+        """Return the torque (N m) at which the stick radius is c (m)."""
         return float(flat.lubkin_torque(astuple(self), stick_radius))
 
     def stick_radius(self, torque: float) -> float:
-        """Stick radius (m) under a first torque (N m) below the sliding torque."""
+        """Return the stick radius (m) under a first torque (N m) below the sliding torque."""
         if not 0.0 <= torque < self.sliding_torque:
             raise ValueError("the torque is not between 0 and the sliding torque 3 pi mu P a/16")
         return float(flat.lubkin_stick_radius(astuple(self), torque))
 
 
 def no_slip_constants(beta: float) -> tuple[float, float]:
-    """Constants of indentation without slip (Mossakovskii, Spence).
+    """Return the constants of indentation without slip (Mossakovskii, Spence).
 
     kappa = artanh(beta)/beta and chi = 1/2 / integral_0^1 t cos[(artanh(beta)/pi) ln((1-t)/(1+t))] dt.
     A flat punch has P = 2 kappa E* a delta; a sphere, pressed incrementally, delta = chi a^2/R and
@@ -159,7 +220,7 @@ def no_slip_constants(beta: float) -> tuple[float, float]:
 
 
 def goodman_stick_ratio(beta: float, friction_coefficient: float) -> float:
-    """Stick ratio c/a of monotone indentation where shear does not move the pressure (Goodman, Spence).
+    """Return the stick ratio c/a of monotone indentation in Goodman's approximation (Spence).
 
     Solves ``(a/2c) ln[(a+c)/(a-c)] = (mu/|beta|) K'(c/a)`` with ``K'(k) = K(sqrt(1-k^2))``.
 
@@ -202,19 +263,19 @@ class PlaneCattaneo:
     half_width: float
 
     def stick_half_width(self, load: float) -> float:
-        """Half the width (m) of the stick strip under Q' (N/m): c = b sqrt(1 - Q'/mu P')."""
+        """Return half the width (m) of the stick strip under Q' (N/m): c = b sqrt(1 - Q'/mu P')."""
         if abs(load) / (self.friction_coefficient * self.normal_load) > 1.0:
             raise ValueError("the tangential load is larger than mu P'")
         return float(flat.plane_stick_half_width(astuple(self), load))
 
     def traction(self, x: ArrayLike, load: float) -> Array:
-        """Shear traction (Pa) at distance x (m) from the middle under a first loading to Q' (N/m)."""
-        self.stick_half_width(load)  # refuses too large a load
+        """Return the shear traction (Pa) at x (m) from the middle under a first loading to Q' (N/m)."""
+        self.stick_half_width(load)  # refuses a load above mu P'
         return at_points(flat.plane_traction, astuple(self), [reals(x, "x")], load)
 
 
 def goodman_stick_ratio_plane(beta: float, friction_coefficient: float) -> float:
-    """Stick ratio c/b of cylinders pressed monotonically where shear does not move the pressure.
+    """Return the stick ratio c/b of cylinders pressed monotonically in Goodman's approximation.
 
     Solves ``|beta| K(k) = mu K'(k)``, k = c/b (Spence). It follows from a flat punch,
     ``p = P'/(pi sqrt(b^2-x^2))``, of which all self-similar contacts are made: a bounded traction in the

@@ -1,4 +1,4 @@
-"""Frictionless axisymmetric contacts with a closed solution: what the solver is checked against.
+"""Closed solutions of frictionless axisymmetric contacts.
 
 Two elastic half-spaces touch with an undeformed separation ``h``; the materials enter through the effective
 modulus E* only, 1/E* = (1-nu_1^2)/E_1 + (1-nu_2^2)/E_2.  All quantities are SI (or any consistent set).
@@ -19,19 +19,18 @@ from dataclasses import dataclass, field
 from typing import TypedDict, Unpack
 
 import numpy as np
-import scipy  # its parts are loaded when they are first used: a fifth of a second
-from numpy.typing import ArrayLike, NDArray
+import scipy  # whose parts, a fifth of a second, are loaded at their first use
+from numpy.typing import ArrayLike
 
-from ..arrays import number, reals
+from ..arrays import Array, number, reals
 from ..core.analytic import at_points
 from ..core.analytic import axisymmetric as flat
 
-Array = NDArray[np.float64]
 Profile = Callable[[Array], Array]
 
 
 class Given(TypedDict, total=False):
-    """What a contact is driven by: one of the load (N), the approach (m), the contact radius (m)."""
+    """One of the normal load (N), the approach (m), the contact radius (m)."""
 
     normal_load: float
     approach: float
@@ -39,6 +38,7 @@ class Given(TypedDict, total=False):
 
 
 _GIVEN = ("normal_load", "approach", "contact_radius")  # in the order of the core
+_POWER_LAW, _ROUNDED_PUNCH = range(2)  # bodies of the core
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class AxisymmetricContact:
     _pressure: Profile = field(repr=False, compare=False)
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Contact pressure (Pa) at distance ``r`` (m, any shape) from the axis; 0 outside the contact."""
+        """Return the contact pressure (Pa) at distances (m) from the axis; 0 outside the contact."""
         radius: Array = np.abs(reals(r, "r"))
         inside = radius <= self.contact_radius
         p = np.zeros(radius.shape)
@@ -76,14 +76,14 @@ class AxisymmetricContact:
 
 
 def require_positive(**values: float) -> None:
-    """Refuse values that are not positive numbers, by their names."""
+    """Refuse values, given by their names, that are not positive numbers."""
     for name, value in values.items():
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} is {value!r}; expected a positive number")
 
 
 def driven_by(given: Given, with_radius: bool = True) -> tuple[str, float]:
-    """Return name and value of the one quantity that was given."""
+    """Return name and value of the given quantity."""
     names = _GIVEN[: 3 if with_radius else 2]
     if len(given) != 1 or not set(given) <= set(names):
         raise TypeError(f"give exactly one of {', '.join(names)}; got {', '.join(given) or 'none'}")
@@ -124,20 +124,19 @@ def power_law(
     if not (np.isfinite(n) and n >= 1.0):
         raise ValueError(f"exponent is {exponent!r}; expected a number of at least 1")
     name, value = driven_by(given)
-    return _contact(flat.power_law, flat.power_law_pressure, (effective_modulus, coefficient, n), name, value)
+    return _contact(_POWER_LAW, (effective_modulus, coefficient, n), name, value)
 
 
-def _contact(
-    solve: Callable[..., Array],
-    pressure: Callable[..., Array],
-    body: tuple[float, ...],
-    name: str,
-    value: float,
-) -> AxisymmetricContact:
+def _contact(kind: int, body: tuple[float, ...], name: str, value: float) -> AxisymmetricContact:
     """Solve the contact with a body of the Fortran library."""
-    radius, approach, load, peak = solve(body, _GIVEN.index(name), value).tolist()
+    radius, approach, load, peak = flat.contact_of_body(kind, body, _GIVEN.index(name), value).tolist()
     return AxisymmetricContact(
-        body[0], radius, approach, load, peak, lambda r: at_points(pressure, body, [r], radius)
+        body[0],
+        radius,
+        approach,
+        load,
+        peak,
+        lambda r: at_points(flat.pressure_of_body, body, [r], radius, kind),
     )
 
 
@@ -236,7 +235,7 @@ def rounded_punch(
     if name == "contact_radius" and value <= flat_radius:
         raise ValueError(f"contact_radius is {value!r}; expected more than the flat radius {flat_radius!r}")
     body = effective_modulus, flat_radius, edge_radius
-    return _contact(flat.rounded_punch, flat.rounded_punch_pressure, body, name, value)
+    return _contact(_ROUNDED_PUNCH, body, name, value)
 
 
 def axisymmetric(
@@ -258,7 +257,7 @@ def axisymmetric(
     **given
         `Given`: exactly one of ``normal_load``, ``approach``, ``contact_radius``.
     scale : float
-        A radius (m) at which the profile is defined; the search for the contact radius starts there.
+        First guess (m) of the contact radius; the profile is defined there.
 
     Returns
     -------
@@ -309,6 +308,6 @@ def axisymmetric(
 
 
 def _gauss(n: int) -> tuple[Array, Array]:
-    """Nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
+    """Return nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
     node, weight = scipy.special.roots_legendre(n)
     return 0.5 * (node + 1.0), 0.5 * weight

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
+from ..variables import BULK_STRESS, INTERFACE
 from .elliptic import EllipticContact, hertz_ellipse
 
 if TYPE_CHECKING:
     import xarray
 
-Array = NDArray[np.float64]
 
 SIMILAR = 1e-9  # |beta| of bodies whose pressure is that of the contact without friction
 
@@ -32,12 +32,18 @@ def friction_of(attributes: Mapping[Any, Any]) -> float:
     return attribute_of(attributes, "friction_coefficient", 0.0)
 
 
-def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
-    """Tell whether the pressure of a result is that of a contact without friction.
+def is_compliant(attributes: Mapping[Any, Any]) -> bool:
+    """Test whether the bodies of a result penetrate each other, so that no closed solution holds."""
+    return INTERFACE[0] in attributes
 
-    It is where there is none, where the bodies are similar (beta = 0), and where shear is not let move it
-    (Goodman's coupling).
-    """
+
+def is_strained(dataset: xarray.Dataset) -> bool:
+    """Test whether there is a bulk stress, for which closed solutions of shear do not hold."""
+    return any(bool(np.any(dataset[name])) for name in BULK_STRESS if name in dataset)
+
+
+def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
+    """Test whether the pressure of a result is that of a contact without friction, see `recognise`."""
     return (
         friction_of(attributes) == 0.0
         or abs(attribute_of(attributes, "dundurs_beta")) <= SIMILAR
@@ -56,7 +62,7 @@ class QuadraticGap:
     hessian : ndarray, shape (2, 2)
         Its second derivatives, 1/m.
     center : tuple of float
-        Where it is smallest, m.
+        Point of its minimum, m.
     """
 
     modulus: float
@@ -65,9 +71,9 @@ class QuadraticGap:
 
     @classmethod
     def of(cls, dataset: xarray.Dataset) -> QuadraticGap | None:
-        """Look at the gap of a result; None if it is of another kind, or the contact is along a line."""
+        """Return the gap of a result; None if Hertz does not hold: another law or shape, a line contact."""
         modulus = dataset.attrs.get("effective_modulus")
-        if modulus is None or "initial_gap" not in dataset:
+        if modulus is None or "initial_gap" not in dataset or is_compliant(dataset.attrs):
             return None
         gap, x, y = (dataset[name].values.ravel() for name in ("initial_gap", "x", "y"))
         if gap.size < 12 or not np.isfinite(gap).all() or not np.ptp(gap) > 0.0:

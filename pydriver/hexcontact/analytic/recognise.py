@@ -1,8 +1,8 @@
-"""Which closed solutions hold for a load step of a result, and what they say about it.
+"""Closed solutions that hold for a load step of a result.
 
-Each is recognized from the deck, the attributes and the history, and holds only where its assumptions are
-those of the case. The pressure is that of a contact without friction where there is none, where the bodies
-are similar (beta = 0), and where shear is not let move it (Goodman's coupling).
+Each is recognized from the deck, the attributes and the history, and holds if its assumptions are those of
+the case. The pressure is that of a contact without friction if there is none, if the bodies are similar (beta
+= 0), and in Goodman's coupling, where shear does not move it.
 """
 
 from __future__ import annotations
@@ -11,41 +11,48 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
+from ..deck.surfaces import Surface
 from ..deck.tables import Deck
 from . import friction
 from .frictionless import AxisymmetricContact, cone, flat_punch, power_law, rounded_punch
-from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of, pressure_is_frictionless
-from .shear import ClosedForms, is_circular, superposed
+from .hertz_gap import (
+    SIMILAR,
+    QuadraticGap,
+    attribute_of,
+    friction_of,
+    is_compliant,
+    is_strained,
+    pressure_is_frictionless,
+)
+from .shear import ClosedForms, is_circular, superposed, turning_points
 
 if TYPE_CHECKING:
     import xarray
 
-    from ..deck.surfaces import Surface
 
-Array = NDArray[np.float64]
-
-_STEADY = 1e-6  # share of the sliding load, or of a motion, that counts as none
+_STEADY = 1e-6  # share of the sliding load, or of a motion, that is none
 
 
 @dataclass(frozen=True)
 class Exact:
-    """What a closed solution says about a load step.
+    """Values and fields of a closed solution for a load step.
 
     Attributes
     ----------
     solution : str
-        Whose solution it is.
+        Name of the solution.
     values : mapping of str to float
         Its values (SI), by the names of the quantities of a result.
     fields : mapping of str to callable
         Fields as functions of x and y (m), by their names.
     scales : mapping of str to float
-        What the errors of the fields are measured against.
+        Scales of the errors of the fields.
     """
 
     solution: str
@@ -69,21 +76,23 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
     load = float(so_far["normal_load"][-1])
     if not load > 0.0:
         return [], "nothing is pressed in this load step"
+    if is_compliant(so_far.attrs):
+        return [], "no closed-form solution is known for a compliant interface"
     known = [
         *_normal(so_far, load),
         *_shear(so_far, number),
         *_torsion(so_far, number),
-        *_dissimilar(so_far, load),
+        *([] if is_strained(so_far) else _dissimilar(so_far, load)),
     ]
     if known:
         from_python = 'shape = "python"' in str(dataset.attrs.get("deck", ""))
         note = "the gap was given in Python; the solutions are those of its values at the nodes"
         return known, note if from_python else ""
     if pressure_is_frictionless(so_far.attrs):
-        return [], "no closed solution is known for these surfaces"
+        return [], "no closed-form solution is known for these surfaces"
     return [], (
-        "no closed solution is known for dissimilar bodies with friction under these loads; there are some "
-        "for similar bodies, for pressing without slip, and for pressing with solver.coupling = goodman"
+        "no closed-form solution is known for dissimilar bodies with friction under these loads; there are "
+        "some for similar bodies, for pressing without slip, and for pressing with solver.coupling = goodman"
     )
 
 
@@ -91,7 +100,7 @@ def closed_solutions(dataset: xarray.Dataset, number: int) -> tuple[list[Exact],
 
 
 def _normal(dataset: xarray.Dataset, load: float) -> list[Exact]:
-    """Return the contact without friction: Hertz where the gap is a quadratic form, else by its shape."""
+    """Return the contact without friction: Hertz for a quadratic gap, else by the shape of the surface."""
     if not pressure_is_frictionless(dataset.attrs):
         return []
     without_friction = friction_of(dataset.attrs) == 0.0  # else shear stores energy, too
@@ -130,7 +139,7 @@ class _Shape:
     Attributes
     ----------
     name : str
-        Whose solution it is.
+        Name of the solution.
     contact : callable
         The contact of a surface of this shape with an effective modulus (Pa) under a load (N).
     energy : callable
@@ -164,11 +173,11 @@ _SHAPES = {
 
 
 def _only_surface(dataset: xarray.Dataset) -> Surface | None:
-    """Return the surface of the case if one of the bodies is flat, as far as the deck tells."""
+    """Return the only surface of the deck that is not flat; None without one."""
     try:
         deck = tomllib.loads(str(dataset.attrs.get("deck", "")))
         bodies = Deck.checked(deck)[0]["body"]
-    except (ValueError, KeyError):  # no deck, or parts that were made in Python
+    except (ValueError, KeyError):  # no deck, or parts from Python
         return None
     curved = [s for s in (bodies.body_1.surface, bodies.body_2.surface) if s is not None]
     return curved[0] if len(curved) == 1 else None
@@ -181,7 +190,7 @@ def _shear(dataset: xarray.Dataset, number: int) -> list[Exact]:
     """Return Cattaneo-Mindlin, or Mindlin-Deresiewicz after reversals."""
     slip = ClosedForms(dataset).partial_slip(number)
     if slip is None:
-        return []
+        return _shear_of_shape(dataset, number)
     radius = slip.contact.contact_radius
     values = {}
     sliding = slip.contact.sliding_load
@@ -200,8 +209,42 @@ def _shear(dataset: xarray.Dataset, number: int) -> list[Exact]:
     return [Exact(slip.name, values, fields, dict.fromkeys(fields, scale))]
 
 
+def _shear_of_shape(dataset: xarray.Dataset, number: int) -> list[Exact]:
+    """Return the superposition of contacts without friction, if the shape of the surface has them."""
+    closed, surface = ClosedForms(dataset), _only_surface(dataset)
+    shape = _SHAPES.get(surface.shape) if surface is not None else None
+    sheared = closed.sheared(number) if surface is not None and shape is not None else None
+    if sheared is None or surface is None or shape is None:
+        return []
+    history, direction, loads = sheared
+    contact = friction.SuperposedContact(
+        closed.friction, history.normal_load, closed.gamma, partial(shape.contact, surface, closed.modulus)
+    )
+    turns = turning_points(loads)
+    if history["twist"].any() or abs(turns[-1]) > (1.0 - _STEADY) * contact.sliding_load:
+        return []
+    swing = turns[0] if len(turns) == 1 else 0.5 * (turns[-1] - turns[-2])
+    shift = float(superposed(contact.shift, turns))
+    values = {
+        f"shift_{axis}": shift * part for axis, part in zip("xy", direction, strict=True) if abs(part) > 1e-9
+    }
+    if not shape.rim:
+        values["stick_radius_fit"] = contact.stick_radius(swing)
+    x0, y0 = surface.offset
+
+    def component(axis: int) -> Callable[[Array, Array], Array]:
+        return lambda x, y: (
+            direction[axis] * superposed(partial(contact.traction, np.hypot(x - x0, y - y0)), turns)
+        )
+
+    peak = contact.pressed(history.normal_load).max_pressure
+    along = [axis for axis in (0, 1) if abs(direction[axis]) > 1e-9 and math.isfinite(peak)]
+    fields = {f"traction_{'xy'[axis]}": component(axis) for axis in along}
+    return [Exact("Jaeger, Ciavarella", values, fields, dict.fromkeys(fields, closed.friction * peak))]
+
+
 def _torsion(dataset: xarray.Dataset, number: int) -> list[Exact]:
-    """Return Lubkin's twist, if the torque up to this step has it and the contact does not slide."""
+    """Return Lubkin's twist, if it holds up to this step and the contact does not slide."""
     torque = float(dataset["torque"][-1]) if "torque" in dataset else 0.0
     loop = ClosedForms(dataset).torsion(number) if torque else None
     if loop is None or abs(loop[1][-1] - torque) > _STEADY * abs(torque):
@@ -213,7 +256,7 @@ def _torsion(dataset: xarray.Dataset, number: int) -> list[Exact]:
 
 
 def _dissimilar(dataset: xarray.Dataset, load: float) -> list[Exact]:
-    """Return what is known of bodies of different moduli that are pressed, ever more, and not sheared."""
+    """Return closed solutions for dissimilar bodies under a growing normal load alone."""
     beta, mu = attribute_of(dataset.attrs, "dundurs_beta"), friction_of(dataset.attrs)
     goodman = dataset.attrs.get("coupling") == "goodman"
     if mu == 0.0 or abs(beta) <= SIMILAR or not _pressed_only(dataset, mu * load):
@@ -240,7 +283,7 @@ def _dissimilar(dataset: xarray.Dataset, load: float) -> list[Exact]:
 
 
 def _pressed_only(dataset: xarray.Dataset, sliding: float) -> bool:
-    """Tell whether the normal load only grew, and nothing else was applied."""
+    """Test whether a growing normal load is the only load."""
     loads = dataset["normal_load"].values
     if (np.diff(loads) < -_STEADY * loads[-1]).any():
         return False

@@ -1,8 +1,8 @@
-"""Closed solutions that belong to a result with friction, recognized from its attributes and its history.
+"""Closed solutions for a result with friction, recognized from its attributes and its history.
 
 Similar bodies (beta = 0) pressed by a constant normal load and then sheared along one line: Cattaneo-Mindlin,
-and after each reversal Mindlin-Deresiewicz. Spheres twisted about their common normal: Lubkin. Where the
-history is of another kind there is no closed solution, and the functions here return None.
+and after each reversal Mindlin-Deresiewicz. Spheres twisted about their common normal: Lubkin. For other
+histories there is no closed solution, and the functions return None.
 """
 
 from __future__ import annotations
@@ -15,35 +15,31 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..core.analytic import flat
+from .elliptic import EllipticContact
 from .friction import LubkinTorsion, MindlinContact
-from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of
+from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of, is_strained
 
 if TYPE_CHECKING:
     import xarray
 
-    from .elliptic import EllipticContact
 
-Array = NDArray[np.float64]
-
-CIRCULAR = 0.999  # least ratio of the axes of a contact that counts as circular
-_SMALL = 1e-6  # share of the sliding load that counts as no load, and as no change of a load
-_ASIDE = (
-    1e-3  # share of the sliding load, or shift, beside the line of the load that still counts as on the line
-)
+CIRCULAR = 0.999  # least ratio of the axes of a circular contact
+_SMALL = 1e-6  # share of the sliding load that is no load, and no change of a load
+_ASIDE = 1e-3  # largest distance from the line of the load, as a share of the sliding load, or shift
 _BEFORE_SLIDING = (
-    0.999  # share of the sliding load beyond which the rigid motion is not determined by the load
+    0.999  # share of the sliding load beyond which the rigid motion does not follow from the load
 )
 _FINE = 24  # points of a curve between two load steps
 
 
 def turning_points(loads: Iterable[float]) -> list[float]:
-    """Return the turning points of a load history that a contact of constant size remembers.
+    """Return the turning points of a load history that determine a contact of constant size.
 
-    The last is the load now. A contact in partial slip follows Masing's rules: a new slip zone that has grown
-    as large as an older one wipes out the memory of it.
+    The last is the present load. A contact in partial slip follows Masing's rules: a new slip zone that is as
+    large as an older one removes its turning points.
 
     Parameters
     ----------
@@ -57,15 +53,15 @@ def turning_points(loads: Iterable[float]) -> list[float]:
     return [float(load) for load in turns[:count]]
 
 
-def superposed(first: Callable[[float], Array], turns: Sequence[float]) -> Array:
+def superposed(first: Callable[[float], Array | float], turns: Sequence[float]) -> Array:
     """Return a traction or motion after reversals: f(Q1) + 2 f((Q2 - Q1)/2) + 2 f((Q3 - Q2)/2) + ...
 
     Parameters
     ----------
     first : callable
-        f, an odd function: what belongs to a load under first loading.
+        f, an odd function of a first load.
     turns : sequence of float
-        The remembered turning points Q1, Q2, ..., the last being the load now.
+        The turning points Q1, Q2, ..., the last one is the present load.
     """
     total = np.asarray(first(turns[0]))
     for before, after in itertools.pairwise(turns):
@@ -90,9 +86,9 @@ class PartialSlip:
     direction : tuple of float
         Unit vector of the tangential load.
     turns : tuple of float
-        Remembered turning points of the tangential load along `direction`, N; the last is the load now.
+        Turning points of the tangential load along `direction`, N; the last is the present load.
     loads : tuple of float
-        All loads along `direction` so far, N, from the first one on.
+        All loads along `direction`, N.
     """
 
     contact: MindlinContact
@@ -104,7 +100,7 @@ class PartialSlip:
 
     @property
     def name(self) -> str:
-        """Whose solution it is."""
+        """Name of the solution."""
         return "Cattaneo–Mindlin" if len(self.turns) == 1 else "Mindlin–Deresiewicz"
 
     @property
@@ -114,7 +110,7 @@ class PartialSlip:
         return float(self.contact.stick_radius(swing)) / self.contact.contact_radius
 
     def traction(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Shear traction on body 1 along x and y (Pa) at points (m)."""
+        """Return the shear traction on body 1 along x and y (Pa) at points (m)."""
         way = np.hypot(*self.ellipse.local(x - self.center[0], y - self.center[1]))
         radius = way * self.contact.contact_radius
         size = superposed(lambda load: self.contact.traction(radius, load), self.turns)
@@ -122,7 +118,7 @@ class PartialSlip:
 
 
 class ClosedForms:
-    """The closed solutions that belong to a result.
+    """The closed solutions for a result.
 
     Parameters
     ----------
@@ -137,41 +133,55 @@ class ClosedForms:
         self.gamma = attribute_of(dataset.attrs, "tangential_compliance_ratio")
         self.static = dataset.attrs.get("algorithm") == "static"
         similar = abs(attribute_of(dataset.attrs, "dundurs_beta")) <= SIMILAR
-        self.apply = similar and 0.0 < self.friction < math.inf
+        self.apply = similar and 0.0 < self.friction < math.inf and not is_strained(dataset)
 
     @cached_property
     def _gap(self) -> QuadraticGap | None:
         return QuadraticGap.of(self.dataset)
 
     def partial_slip(self, number: int) -> PartialSlip | None:
-        """Return the closed solution of a step that sheared the contact, None if there is none.
+        """Return the closed solution of a step with shear, None if there is none.
 
         Parameters
         ----------
         number : int
             Number of the step, from 1.
         """
-        history = _History(self.dataset, number, self.static)
-        scale = self.friction * history.normal_load
-        load = np.stack([history[f"tangential_load_{axis}"] for axis in "xy"])
-        direction = line_of(load, _SMALL * scale, _ASIDE * scale) if self.apply else None
-        if direction is None:
+        sheared = self.sheared(number)
+        if sheared is None or self._gap is None:
             return None
-        loads = history.at_constant_pressure(np.array(direction) @ load, scale)
-        if loads is None or self._gap is None:
-            return None
+        history, direction, loads = sheared
         hertz = self._gap.contact(history.normal_load)
         contact = MindlinContact(
-            self.friction,
-            history.normal_load,
-            hertz.radius,
-            4.0 / self.modulus * (1.0 + 0.5 * self.gamma),
+            self.friction, history.normal_load, hertz.radius, 4.0 / self.modulus * (1.0 + 0.5 * self.gamma)
         )
         if np.abs(history["twist"]).max() * contact.contact_radius > _ASIDE * contact.sliding_shift:
             return None
         return PartialSlip(
             contact, hertz, self._gap.center, direction, tuple(turning_points(loads)), tuple(loads.tolist())
         )
+
+    def sheared(self, number: int) -> tuple[History, tuple[float, float], Array] | None:
+        """Return the history of a step if similar bodies are sheared along a line at a constant normal load.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+
+        Returns
+        -------
+        tuple or None
+            The history, the unit vector of the line, and the loads (N) along it from the first one on.
+        """
+        history = History(self.dataset, number, self.static)
+        scale = self.friction * history.normal_load
+        load = np.stack([history[f"tangential_load_{axis}"] for axis in "xy"])
+        direction = line_of(load, _SMALL * scale, _ASIDE * scale) if self.apply else None
+        if direction is None:
+            return None
+        loads = history.at_constant_pressure(np.array(direction) @ load, scale)
+        return None if loads is None else (history, direction, loads)
 
     def shear_loop(self) -> tuple[Array, Array] | None:
         """Return the curve of the shift (m) over the tangential load (N) along its direction, for spheres.
@@ -209,7 +219,7 @@ class ClosedForms:
         """
         if not self.apply or self._gap is None:
             return None
-        history = _History(self.dataset, number, self.static)
+        history = History(self.dataset, number, self.static)
         shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
         if not history.normal_load > 0.0 or shear > _ASIDE * self.friction * history.normal_load:
             return None
@@ -232,8 +242,7 @@ def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | No
     load : ndarray, shape (2, n)
         The loads, N.
     least, aside : float
-        Size of the largest load and distance from the line (N) up to which there is no load, and a load is on
-        the line.
+        Largest size of no load, and largest distance from the line (N).
 
     Returns
     -------
@@ -248,8 +257,8 @@ def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | No
     return (float(x), float(y)) if np.abs(x * load[1] - y * load[0]).max() <= aside else None
 
 
-class _History:
-    """What led to a load step: all steps up to it, or itself alone if each step stands alone (static)."""
+class History:
+    """The history of a load step: all steps up to it, or itself alone if it is static."""
 
     def __init__(self, dataset: xarray.Dataset, number: int, static: bool) -> None:
         last = int(np.flatnonzero(dataset["step"].values == number)[0])
@@ -263,7 +272,7 @@ class _History:
         return np.asarray(self.dataset[name].values[self.steps], dtype=float)
 
     def at_constant_pressure(self, loads: Array, sliding: float) -> Array | None:
-        """Return the loads from the first one on, if the normal load is constant from just before it."""
+        """Return the loads from the first one on, if the normal load is constant from the step before it."""
         if not np.isfinite(loads).all() or np.abs(loads).max() > (1.0 + _ASIDE) * sliding:
             return None
         begun = np.flatnonzero(np.abs(loads) > _SMALL * sliding)
@@ -273,23 +282,23 @@ class _History:
         if np.ptp(pressed) > _SMALL * pressed[-1]:
             return None
         loads = np.clip(loads[begun[0] :], -sliding, sliding)
-        moved = np.abs(np.diff(loads, prepend=0.0)) > _SMALL * sliding  # a load that is held does not turn
+        moved = np.abs(np.diff(loads, prepend=0.0)) > _SMALL * sliding  # a constant load has no turning point
         return np.asarray(loads[moved])
 
 
 def _until_sliding(loads: Sequence[float], sliding: float) -> list[float]:
-    """Return the loads up to the sliding load, beyond which they do not determine the motion."""
+    """Return the loads up to the sliding load, beyond which the motion does not follow from them."""
     reached = next((k for k, load in enumerate(loads) if abs(load) >= _BEFORE_SLIDING * sliding), None)
     return [*loads] if reached is None else [*loads[:reached], math.copysign(sliding, loads[reached])]
 
 
 def is_circular(hertz: EllipticContact) -> bool:
-    """Tell whether an ellipse counts as a circle."""
+    """Test whether an ellipse is a circle."""
     return hertz.semi_minor >= CIRCULAR * hertz.semi_major
 
 
 def _lubkin(contact: LubkinTorsion, largest: float) -> Callable[[float], Array]:
-    """Twist under a first torque up to the largest one, by a table that is exact at its points."""
+    """Return the twist under a first torque up to the largest one, by a table that is exact at its points."""
     stick = np.linspace(contact.contact_radius, contact.stick_radius(largest), 8 * _FINE)[1:]
     torque = np.array([0.0, *(contact.torque(c) for c in stick)])
     twist = np.array([0.0, *(contact.twist(c) for c in stick)])
@@ -302,6 +311,6 @@ def _curve(loads: Sequence[float], first: Callable[[float], Array]) -> tuple[Arr
     fine = np.concatenate([[0.0], *branches])
     motion, turns = [0.0], [0.0]
     for load in fine[1:]:
-        turns = turning_points([*turns, float(load)])  # what is remembered stands for the whole history
+        turns = turning_points([*turns, float(load)])  # they stand for the whole history
         motion.append(float(superposed(first, turns)))
     return np.array(motion), fine

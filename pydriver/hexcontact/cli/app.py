@@ -1,6 +1,6 @@
-"""The command ``hexcontact``: its sub-commands, each in a module with those of its kind.
+"""The command ``hexcontact`` and the list of the modules that hold its sub-commands.
 
-Every command imports what it needs when it runs, so that ``hexcontact --help`` comes at once.
+Every sub-command imports what it needs when it runs, so that ``hexcontact --help`` is fast.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ for _name in ("run", "deck", "study", "show", "plot", "verify"):  # in the order
 
 def main() -> None:
     """Entry point of the command."""
-    # Threads that wait spin by default, which on a busy machine takes the core from those that work.
+    # By default waiting threads spin, which on a busy machine takes cores from working threads.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     interruption.ends_process = True
     warn_plainly()
@@ -38,8 +38,7 @@ def _print_version(wanted: bool) -> None:
 @app.callback(epilog="Example: hexcontact new sphere, then hexcontact run sphere.toml --plot")
 def _hexcontact(
     version: Annotated[
-        bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Elastic contact in 3-D from a deck in TOML: pressure, shear traction, stick and slip, approach, shift.

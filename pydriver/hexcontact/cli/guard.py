@@ -1,4 +1,4 @@
-"""The frame of every command: registration, messages, exit codes, standard streams."""
+"""The frame of every sub-command: registration, messages, exit codes, standard streams."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ if TYPE_CHECKING:
     from ..errors import Fault
 
 P = ParamSpec("P")
-# of the system, of threads and of the netCDF library
+# of the loader, of threads and of the netCDF library
 _NO_MEMORY = ("failed to map segment", "can't start new thread", "Memory allocation (malloc) failure")
 Content = Mapping[str, Any] | None
 """The object that a command prints with ``--json``; None without it."""
 
 
 class Failure(HexcontactError):
-    """A failure whose exit code is known from elsewhere: of a case of a study, of a signal."""
+    """A failure with a given exit code: that of a case of a study, or of a signal."""
 
     def __init__(self, message: str, exit_code: int) -> None:
         super().__init__(message)
         self.exit_code = exit_code
 
 
-class _Answer(NamedTuple):
-    """The message of an error, and what programs learn about it."""
+class _Report(NamedTuple):
+    """The message of an error, its exit code, and details for ``--json``."""
 
     message: str
     exit_code: int
@@ -51,10 +51,9 @@ class _Answer(NamedTuple):
 
 
 def guarded(command: Callable[P, Content]) -> Callable[P, None]:
-    """Turn what goes wrong into a sentence and an exit code; HEXCONTACT_DEBUG=1 shows tracebacks instead.
+    """Turn exceptions into a sentence and an exit code; HEXCONTACT_DEBUG=1 shows tracebacks instead.
 
-    With ``--json`` the command returns its content instead of printing it, and an object is printed whatever
-    happens.
+    With ``--json`` the command returns its content, and an object is printed in any case.
     """
 
     @functools.wraps(command)
@@ -67,40 +66,41 @@ def guarded(command: Callable[P, Content]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except (Exception, KeyboardInterrupt) as error:
-            answer = None if os.environ.get("HEXCONTACT_DEBUG") else _answer_to(error)
-            if answer is not None:
-                complain(answer.message)
+            report = None if os.environ.get("HEXCONTACT_DEBUG") else _report_of(error)
+            if report is not None:
+                print_error(report.message)
             if name:
-                unforeseen = _Answer(f"{type(error).__name__}: {error}", HexcontactError.exit_code)
-                (answer or unforeseen).print_json(name)
-            if answer is None:
+                unforeseen = _Report(f"{type(error).__name__}: {error}", HexcontactError.exit_code)
+                (report or unforeseen).print_json(name)
+            if report is None:
                 raise
-            raise typer.Exit(answer.exit_code) from None
+            raise typer.Exit(report.exit_code) from None
         if content and content.get("exit_code"):
             raise typer.Exit(content["exit_code"])
 
     return wrapped
 
 
-def _answer_to(error: BaseException) -> _Answer | None:
-    """Return the answer to an error; None if it is a mistake of the program."""
+def _report_of(error: BaseException) -> _Report | None:
+    """Return the report of an error; None if it is a mistake of the program."""
     if isinstance(error, KeyboardInterrupt):
-        return _Answer("interrupted", 130)
+        return _Report("interrupted", 130)
     if isinstance(error, HexcontactError):
-        message = "\n".join([str(error), *getattr(error, "__notes__", ())])
-        return _Answer(
-            message, error.exit_code, getattr(error, "faults", ()), getattr(error, "details", None)
+        message, faults = (
+            "\n".join([str(error), *getattr(error, "__notes__", ())]),
+            getattr(error, "faults", ()),
         )
+        return _Report(message, error.exit_code, faults, getattr(error, "details", None))
     if isinstance(error, UnicodeEncodeError):  # bytes of a name or an argument that are no text
-        return _Answer(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
+        return _Report(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
-        return _Answer("the machine has not enough memory for this", ResourceError.exit_code)
+        return _Report("the machine has not enough memory for this", ResourceError.exit_code)
     if isinstance(error, OSError) and error.strerror:
         named = f"{error.filename}: " if error.filename else ""
         kind = ResourceError if error.errno in LACKING else DeckError
-        return _Answer(named + error.strerror, kind.exit_code)
+        return _Report(named + error.strerror, kind.exit_code)
     if isinstance(error, RuntimeError | OSError) and "NetCDF" in str(error):
-        return _Answer(f"the result file is damaged ({error})", DeckError.exit_code)
+        return _Report(f"the result file is damaged ({error})", DeckError.exit_code)
     return None
 
 
@@ -108,7 +108,7 @@ def _answer_to(error: BaseException) -> _Answer | None:
 
 
 class _Outlet(io.FileIO):
-    """Standard output or error; once it cannot be written any more, what is printed goes nowhere."""
+    """Standard output or error; after a write has failed, further text is dropped."""
 
     lost: OSError | None = None
 
@@ -124,16 +124,16 @@ class _Outlet(io.FileIO):
 
 @contextlib.contextmanager
 def standard_streams() -> Iterator[None]:
-    """Let a command end as it would, though its standard streams are closed, full or not read any more.
+    """Let a command end normally although its standard streams are closed, full or no longer read.
 
     Raises
     ------
     SystemExit
-        With the code of lacking resources if all went well but what was printed is lost; who closes a pipe
-        has read enough.
+        With the exit code of lacking resources if the command succeeded but its output is lost, unless the
+        reader has closed the pipe.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
-        pass  # else the next files got the numbers of the closed ones, and what libraries print
+        pass  # otherwise the next files would get the numbers of closed streams, and the output of libraries
     os.close(descriptor)
     output, error = _Outlet(1, "w", closefd=False), _Outlet(2, "w", closefd=False)
     for name, outlet in (("stdout", output), ("stderr", error)):
@@ -153,29 +153,29 @@ def standard_streams() -> Iterator[None]:
     except SystemExit as ending:
         sys.stdout.flush()
         if output.lost and output.lost.errno != errno.EPIPE and not ending.code:
-            complain(f"cannot write to standard output: {output.lost.strerror}")
+            print_error(f"cannot write to standard output: {output.lost.strerror}")
             raise SystemExit(ResourceError.exit_code) from None
         raise
 
 
-def complain(message: str) -> None:
-    """Print a message on standard error, each line marked as ours."""
-    for line in message.splitlines() or [""]:
+def print_error(message: str) -> None:
+    """Print a message on standard error, each line marked; files of this folder without its name."""
+    for line in json_output.seen_from_here(message).splitlines() or [""]:
         print(f"hexcontact: {visible(line)}", file=sys.stderr)
 
 
-def say(message: str) -> None:
+def print_output(message: str) -> None:
     """Print a message on standard output."""
     print(visible(message))
 
 
 def warn_plainly() -> None:
-    """From now on print warnings that are meant for users like other messages."""
+    """Print warnings for users like other messages from now on."""
     shown = warnings.showwarning
 
     def show(message: Warning | str, category: type[Warning], *more: Any, **options: Any) -> None:
         if issubclass(category, KernelFolderWarning | PathWarning):
-            complain(f"warning: {message}")
+            print_error(f"warning: {message}")
         else:
             shown(message, category, *more, **options)
 
@@ -186,7 +186,7 @@ def warn_plainly() -> None:
 
 
 class Commands(TyperGroup):
-    """The sub-commands; programs learn of wrong options and arguments, too."""
+    """The sub-commands; with ``--json`` wrong options and arguments give an object, too."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
         """Run the command that the arguments name."""
@@ -194,10 +194,10 @@ class Commands(TyperGroup):
         try:
             return super().main(args, *more, **options)
         except SystemExit as ending:
-            usage = getattr(ending.__context__, "format_message", None)  # what typer has shown before
+            usage = getattr(ending.__context__, "format_message", None)  # printed by typer before
             if "--json" in given and usage is not None:
                 name = next((word for word in given if word in self.commands), "")
-                _Answer(usage(), DeckError.exit_code).print_json(name)
+                _Report(usage(), DeckError.exit_code).print_json(name)
             raise
 
 
@@ -216,9 +216,9 @@ def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Ca
     Parameters
     ----------
     example : str
-        A line that the help shows as an example.
+        Example in the help.
     **options
-        What `typer.Typer.command` takes besides.
+        Further arguments of `typer.Typer.command`.
     """
 
     def register(function: Callable[P, Content]) -> Callable[P, None]:

@@ -1,9 +1,11 @@
-"""One object on standard output with ``--json``, whatever happens; docs/running.md."""
+"""The object on standard output with ``--json``, also after failures; see docs/running.md."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ _KINDS = {
     ConvergenceError.exit_code: "convergence",
     ResourceError.exit_code: "resources",
 }
-_SIGNAL = 128  # exit codes above are those of signals
+_SIGNAL = 128  # plus the number of a signal
 
 
 def write(command: str, content: Mapping[str, Any]) -> None:
@@ -26,29 +28,36 @@ def write(command: str, content: Mapping[str, Any]) -> None:
     Parameters
     ----------
     command : str
-        Its name.
+        Name of the command.
     content : mapping
-        The rest of the object; `plain` makes JSON of it.
+        Further entries of the object, see `jsonable`.
     """
     whole = {"hexcontact": __version__, "command": command, "exit_code": 0, **content}
-    print(visible(json.dumps(plain(whole), ensure_ascii=False, allow_nan=False)), flush=True)
+    print(visible(json.dumps(jsonable(whole), ensure_ascii=False, allow_nan=False)), flush=True)
 
 
-def plain(value: Any) -> Any:
-    """Return a value as JSON has it: null for NaN, text for infinity, paths and whatever else there is."""
+def jsonable(value: Any) -> Any:
+    """Return a value for JSON: null for NaN; text for infinity, paths and objects of other types."""
     if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
+        return {str(key): jsonable(entry) for key, entry in value.items()}
     if isinstance(value, str | bool | int | None):
         return value
     if isinstance(value, Path):
         return str(value)
     if hasattr(value, "tolist"):  # of numpy
-        return plain(value.tolist())
+        return jsonable(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None if math.isnan(value) else str(value)
     if isinstance(value, Sequence):
-        return [plain(entry) for entry in value]
+        return [jsonable(entry) for entry in value]
     return str(value)
+
+
+def seen_from_here(message: str) -> str:
+    """Return a message with the files of the current folder named without it."""
+    with contextlib.suppress(OSError):  # the folder was deleted
+        return message.replace(os.path.join(os.getcwd(), ""), "")
+    return message
 
 
 def error(
@@ -59,18 +68,18 @@ def error(
     Parameters
     ----------
     message : str
-        What standard error says.
+        Message on standard error.
     exit_code : int
         Exit code of the command.
     faults : sequence of Fault
-        The parts of a deck that are wrong.
+        Faults of a deck.
     details : mapping, optional
         Further entries.
     """
     kind = "interrupted" if exit_code > _SIGNAL else _KINDS.get(exit_code, "other")
     found = {
         "kind": kind,
-        "message": message,
+        "message": seen_from_here(message),
         "exit_code": exit_code,
         "faults": [{name: part or None for name, part in fault._asdict().items()} for fault in faults],
         **(details or {}),

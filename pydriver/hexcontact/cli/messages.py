@@ -1,4 +1,4 @@
-"""What a command that solves says: progress, log, the tables or the object at its end."""
+"""The messages of a command that solves: progress, log, and tables or an object at its end."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 from ..errors import AccuracyWarning, DeckError
+from ..files import require_replaceable
 from ..result.store import open_result
 from ..solve import log
 from ..solve import run as solving
@@ -20,13 +21,13 @@ from ..solve.interruption import Interrupted, in_background
 from ..solve.progress import reporter
 from ..text import visible
 from . import json_output, tables
-from .guard import complain, say
+from .guard import print_error, print_output
 from .options import LogLevel
 from .plot import picture_of
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
-    from ..result.result import Step
+    from ..result.step import Step
     from ..result.store import Store
 
 
@@ -39,7 +40,7 @@ class Messages:
     command : str
         Name of the command.
     quiet, as_json : bool
-        Print nothing but errors; print an object in the end instead of tables.
+        Print errors only; print an object instead of tables at the end.
     log_file, log_level : Path, LogLevel or None
         Options of the log.
     """
@@ -55,21 +56,21 @@ class Messages:
             raise DeckError("--log-level: expected --log-file with it, since --quiet prints nothing")
 
     def logging(self, *spare: Path) -> contextlib.AbstractContextManager[None]:
-        """Write the log, but never into one of the files that the command reads or writes."""
+        """Write the log, but not into the files `spare` that the command reads or writes."""
         return log.kept(self.log_file, self.log_level, spare)
 
     @property
     def silent(self) -> bool:
-        """Whether no progress is shown: if quiet, or where the log is shown instead."""
+        """Whether no progress is shown: if quiet, or if the log is shown instead."""
         return self.quiet or (self.log_level is not None and self.log_file is None)
 
-    def interrupted(self, signaled: Interrupted, kept: str, **about: Any) -> NoReturn:
-        """Say what is kept after a signal and end the process, whatever the core is doing."""
-        message = f"interrupted; {kept}"
-        with contextlib.suppress(OSError):  # standard error is closed
+    def interrupted(self, signaled: Interrupted, saved: str, **about: Any) -> NoReturn:
+        """Report what is saved after a signal and end the process, also while the core computes."""
+        message = f"interrupted; {saved}"
+        with contextlib.suppress(OSError):  # standard error may be closed
             log.logger.error(log.words("stopped", reason=f"interrupted ({signaled.name})", **about))
-            log.logger.disabled = True  # for what is still at work
-            complain(message)
+            log.logger.disabled = True  # for threads that still run
+            print_error(message)
             if self.as_json:
                 json_output.write(self.command, json_output.error(message, signaled.exit_code))
             sys.stdout.flush()
@@ -84,12 +85,12 @@ class Messages:
         picture: Path | None,
         warnings: Sequence[str] = (),
     ) -> dict[str, Any] | None:
-        """Print, or return, what came out; complain of an accuracy that was not reached."""
+        """Print or return the result of a run, with a message on an accuracy that was not reached."""
         refined = open_result(target) if case.accuracy else None
         summary = tables.Summary.of_run(case, histories, refined)
         shortfall = refined.shortfall if refined is not None else ""
         if shortfall:
-            complain(shortfall)
+            print_error(shortfall)
         if self.as_json:
             code = AccuracyWarning.exit_code if shortfall else 0
             notes = [*warnings, *summary.remarks, *([shortfall] if shortfall else [])]
@@ -104,14 +105,14 @@ class Messages:
         return None
 
     def was_finished(self, file: Path, picture: Path | None) -> dict[str, Any] | None:
-        """Say, or return, that nothing was left to do."""
+        """Print or return that all load steps were finished before."""
         if self.as_json:
             summary = tables.Summary.of_result(open_result(file))
             written = {"output": file, "picture": picture, "warnings": summary.remarks}
             return written | summary.as_run()
         if not self.quiet:
             drawn = f"; written: {picture}" if picture else ""
-            say(f"{file} is finished, all its load steps are there{drawn}")
+            print_output(f"{file} is finished, all its load steps are there{drawn}")
         return None
 
 
@@ -147,4 +148,11 @@ def solved(
 
 def overview(path: Path) -> Path:
     """Draw a result beside its file."""
-    return picture_of([open_result(path)], "overview", path.with_suffix(".png"), {})
+    return picture_of([open_result(path)], "overview", picture_beside(path), {})
+
+
+def picture_beside(path: Path) -> Path:
+    """Return the picture beside a result; DeckError if another file has its name."""
+    picture = path.with_suffix(".png")
+    require_replaceable(picture)
+    return picture

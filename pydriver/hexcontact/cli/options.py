@@ -1,46 +1,64 @@
-"""Arguments and options that several commands have, and what they stand for."""
+"""Arguments and options that several commands share, and their values."""
 
 from __future__ import annotations
 
 import enum
+import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import DeckError
+from ..text import listed
 
 if TYPE_CHECKING:
     from ..case import Case
     from ..problem.problem import Problem
+    from ..result.result import Result
 
 _PICTURES = (".png", ".pdf", ".svg")
 
-DeckFile = Annotated[Path, typer.Argument(metavar="DECK", help="The deck, a TOML file.", show_default=False)]
-ResultFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="The result, a netCDF file.", show_default=False)
-]
+
+def argument(metavar: str, help: str) -> Any:
+    """Return an argument of a command, without its default in the help."""
+    return typer.Argument(metavar=metavar, help=help, show_default=False)
+
+
+def output_to(help: str) -> Any:
+    """Return the option for the file or folder to write."""
+    return typer.Option("--output", "-o", help=help)
+
+
+def steps_option(help: str) -> Any:
+    """Return the option that selects load steps."""
+    return typer.Option("--step", "-s", metavar="N,...", help=help)
+
+
+def settings_option(help: str) -> Any:
+    """Return the option that replaces keys."""
+    return typer.Option("--set", metavar="KEY=VALUE", help=f"{help}. Repeatable.")
+
+
+def flag(name: str, help: str) -> Any:
+    """Return an option without a value."""
+    return typer.Option(f"--{name}", help=help)
+
+
+DeckFile = Annotated[Path, argument("DECK", "The deck, a TOML file.")]
+ResultFile = Annotated[Path, argument("FILE", "The result, a netCDF file.")]
 Settings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="Replace a key of the deck, as grid.spacing='0.05 mm'. Repeatable."
-    ),
+    list[str] | None, settings_option("Replace a key of the deck, as grid.spacing='0.05 mm'")
 ]
-Plot = Annotated[bool, typer.Option("--plot", help="Draw the result beside the output (.png).")]
+Plot = Annotated[bool, flag("plot", "Draw the result beside the output (.png).")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-AsJson = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object for programs, errors too; docs/running.md.")
-]
+AsJson = Annotated[bool, flag("json", "Print one JSON object for programs, errors too; docs/running.md.")]
 
 
-class LogLevel(enum.StrEnum):
-    """What a log holds."""
-
-    debug = "debug"
-    info = "info"
-    warning = "warning"
-    error = "error"
+LogLevel = enum.StrEnum("LogLevel", ["debug", "info", "warning", "error"])
+"""Levels of a log."""
 
 
 LogFile = Annotated[
@@ -49,12 +67,12 @@ LogFile = Annotated[
 ]
 Level = Annotated[
     LogLevel | None,
-    typer.Option("--log-level", help="What the log holds; without LOG it goes to standard error."),
+    typer.Option("--log-level", help="Least level of the log; without LOG it goes to standard error."),
 ]
 
 
 def setting(text: str) -> tuple[str, Any]:
-    """Split KEY=VALUE; a value that is not TOML is text, so that units need no quotes."""
+    """Return key and value of KEY=VALUE; a value that is not TOML is text, so that units need no quotes."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise DeckError(f"--set {text}: expected KEY=VALUE, such as load.1.normal_load='20 N'")
@@ -64,29 +82,61 @@ def setting(text: str) -> tuple[str, Any]:
         return key.strip(), value.strip()
 
 
-def steps_of(text: str) -> list[int]:
-    """Read numbers of load steps: "20" or "10,20,30"."""
-    try:
-        return [int(part) for part in text.split(",")]
-    except ValueError:
-        raise DeckError(f"--step {text}: expected a number of a load step, or several as 10,20,30") from None
+def steps_of(text: str, labels: Sequence[str], option: str = "step") -> list[int]:
+    """Return numbers of load steps from "20", "10,20,30", "109-135", "all", or a label.
+
+    A label selects the last step of its segments.
+
+    Parameters
+    ----------
+    text : str
+        Value of the option.
+    labels : sequence of str
+        Label of each load step; empty texts for cycles.
+    option : str
+        Name of the option.
+    """
+    words = [text.strip()] if text.strip() in labels else [word.strip() for word in text.split(",")]
+    numbers: list[int] = []
+    for word in words:
+        if word and word in labels:
+            ends = zip(labels, [*labels[1:], ""], strict=True)
+            numbers += [k for k, (own, after) in enumerate(ends, start=1) if own == word != after]
+        elif found := re.fullmatch(r"(\d+) *- *(\d+)", word):
+            numbers += range(int(found[1]), int(found[2]) + 1)
+        elif word == "all":
+            numbers += range(1, len(labels) + 1)
+        elif re.fullmatch(r"-?\d+", word):
+            numbers.append(int(word))
+    if len(numbers) < len(words):
+        known = [f'"{label}"' for label in dict.fromkeys(labels) if label]
+        one = "load step" if option == "step" else option
+        expected = [f"a number of a {one}", "several as 10,20,30 or 10-30", "all"]
+        expected += [f"a label ({listed(known, 'or')})"] if known else []
+        raise DeckError(f"--{option} {text}: expected {listed(expected, 'or')}")
+    return numbers
+
+
+def labels_of(result: Result) -> list[str]:
+    """Return the label of each load step."""
+    return [str(label) for label in result["label"].values] if "label" in result else [""] * len(result)
 
 
 def beside(file: Path, ending: str) -> Path:
-    """Return the name of a file beside a result; a result may be the current folder, a journal."""
+    """Return the name of a file beside a result, which may be the current folder (a journal)."""
     there = file if file.name not in ("", "..") else file.resolve()
     return there.parent / f"{there.stem}{ending}"
 
 
 def case_of(deck: Path, settings: list[str] | None) -> Case:
-    """Read a deck with the keys that ``--set`` replaces."""
+    """Return the case of a deck with the keys that ``--set`` replaces."""
     from ..case import Case
 
     return Case.from_toml(deck, overrides=dict(map(setting, settings or ())))
 
 
 def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:
-    """Return the file that a run writes: from the option, else from the deck, else from the deck's name."""
+    """Return the file that a run writes: that of the option or the deck, else one named after the deck."""
     target = output or case.output.file or Path(f"{deck.stem}.nc")
     if target.suffix in _PICTURES:
         raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")

@@ -1,4 +1,4 @@
-"""The command that draws: ``hexcontact plot``; the figures stand in `hexcontact.plotting`."""
+"""The command that draws figures of `hexcontact.plotting`: ``hexcontact plot``."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from typer.core import TyperCommand
 
 from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError
+from ..files import MADE_BY, require_replaceable
 from ..text import did_you_mean, listed
-from .guard import command, say
-from .options import beside, steps_of
+from .guard import command, print_output
+from .options import argument, beside, labels_of, output_to, steps_of, steps_option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,32 +24,23 @@ if TYPE_CHECKING:
     from ..plotting.registry import Entry
     from ..result.result import Result
 
-_DRAWS = "Draw a result, or what the influence functions and load shapes look like."
+_DRAWS = "Draw a result, or the influence functions and load shapes."
 _ALL = "all"
 
 
-class Kind(enum.StrEnum):
-    """Kinds of pictures."""
+Format = enum.StrEnum("Format", ["png", "pdf", "svg"])
+"""Formats of pictures."""
 
-    png = "png"
-    pdf = "pdf"
-    svg = "svg"
-
-
-class Arrows(enum.StrEnum):
-    """Arrows that a zone map may have."""
-
-    none = "none"
-    traction = "traction"
-    slip = "slip"
+Arrows = enum.StrEnum("Arrows", ["none", "traction", "slip"])
+"""Arrows on zone maps."""
 
 
 class _Plot(TyperCommand):
-    """The command; its help names the figures, for which the packages that draw are imported."""
+    """The command; its help lists the figures, which imports the packages that draw."""
 
     @property
     def help(self) -> str:
-        """What it does, and a line for each figure."""
+        """Description of the command, and a line for each figure."""
         return _help()
 
     @help.setter
@@ -60,7 +52,7 @@ def _help() -> str:
     from ..plotting.registry import entries
 
     choices = [(entry.of_a_result, name, entry.help) for name, entry in entries().items()]
-    choices.append((True, _ALL, "each that there is, in a file of its own"))
+    choices.append((True, _ALL, "every figure of the result, each in its own file"))
     width = 2 + max(len(name) for _, name, _ in choices)
     of_a_result, of_none = (
         "\n".join(f"{name:<{width}}{words}" for of_one, name, words in choices if of_one == kind)
@@ -68,7 +60,7 @@ def _help() -> str:
     )
     return (
         f"{_DRAWS}\n\n"
-        "Closed solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn beside where they "
+        "Closed-form solutions (Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz, Lubkin) are drawn where they "
         f"apply.\n\n\b\nChoices of --what:\n{of_a_result}\n\n\b\nWithout FILE:\n{of_none}"
     )
 
@@ -81,21 +73,14 @@ def _help() -> str:
 def plot(
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE",
-            help="The result, a netCDF file; several for zones, outlines and compliance.",
-            show_default=False,
-        ),
+        argument("FILE", "The result, a netCDF file; several for zones, outlines and compliance."),
     ] = None,
     what: Annotated[str, typer.Option("--what", "-w", help="Which picture; see above.")] = "overview",
     step: Annotated[
         str | None,
-        typer.Option(
-            "--step",
-            "-s",
-            metavar="N,...",
-            help="Load step, the first is 1; -1, the default: the last. Some "
-            "pictures show several: 10,20,30.",
+        steps_option(
+            "Load step, the first is 1; -1, the default: the last. Some pictures show several: "
+            "10,20,30 or 10-30 or all. The label of a segment is its last step."
         ),
     ] = None,
     angle: Annotated[
@@ -106,24 +91,25 @@ def plot(
         str | None,
         typer.Option(metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."),
     ] = None,
+    cycle: Annotated[
+        str | None,
+        typer.Option(metavar="N,...", help="Cycles of loop and torsion: 2, or 1,2, or all; -1: the last."),
+    ] = None,
     over: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="What the history is drawn over, as tangential_load_x."),
+        typer.Option(metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
     ] = None,
     arrows: Annotated[
         Arrows | None, typer.Option(help="Arrows on zone maps: shear traction, or slip in the step.")
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE."
-        ),
+        Path | None, output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE.")
     ] = None,
-    kind: Annotated[
-        Kind | None, typer.Option("--format", "-f", help="Kind of picture where --output names none.")
+    format: Annotated[
+        Format | None, typer.Option("--format", "-f", help="Format where --output names none.")
     ] = None,
 ) -> None:
-    """Draw a result, or what belongs to none; the help is made of the figures that there are."""
+    """Draw a result, or a figure without a result; `_help` makes the help from the figures."""
     from ..plotting.registry import entries
     from ..result.store import open_result
 
@@ -134,32 +120,35 @@ def plot(
     if bool(files) != (what == _ALL or figures[what].of_a_result):
         expected = "expected no FILE" if files else "expected the FILE of a result"
         raise DeckError(f"--what {what}: {expected}")
+    results = [open_result(file) for file in files]
+    cycles = len(results[0].cycles) if cycle is not None and results else 0
     given = {
-        "step": None if step is None else steps_of(step),
+        "step": None if step is None else steps_of(step, labels_of(results[0]) if results else [""]),
+        "cycle": None if cycle is None else steps_of(cycle, [""] * cycles, "cycle"),
         "angle": None if angle is None else angle_of(angle),
         "through": None if through is None else point_of(through),
         "over": over,
         "arrows": None if arrows is None else arrows.value,
     }
     chosen = {name: value for name, value in given.items() if value is not None}
-    if output and kind:
-        raise DeckError(f"--format {kind}: the name of --output {output} says what kind of picture it is")
-    suffix = f".{kind or 'png'}"
+    if output and format:
+        raise DeckError(f"--format {format}: the name of --output {output} has a format already")
+    suffix = f".{format or 'png'}"
     if what == _ALL:
         if len(files) > 1:
             raise DeckError(f"--what all shows one result; expected one FILE, not {len(files)}")
         first = output or beside(files[0], suffix)
-        say("\n".join(all_pictures(open_result(files[0]), first, chosen)))
+        print_output("\n".join(all_pictures(results[0], first, chosen)))
         return
     default = beside(files[0], f"_{what}{suffix}") if files else Path(f"{what}{suffix}")
-    say(f"written: {picture_of([open_result(file) for file in files], what, output or default, chosen)}")
+    print_output(f"written: {picture_of(results, what, output or default, chosen)}")
 
 
 # --- options ----------------------------------------------------------------------------------------
 
 
 def angle_of(text: str) -> float:
-    """Read an angle to rad: a bare number is in degrees."""
+    """Return an angle (rad) from text; a bare number is in degrees."""
     try:
         number = _number_or_text(text)
         return to_si(number, ANGLE) if isinstance(number, str) else math.radians(number)
@@ -168,7 +157,7 @@ def angle_of(text: str) -> float:
 
 
 def point_of(text: str) -> tuple[float, float]:
-    """Read a point to m: "10um,0um"."""
+    """Return a point (m) from text such as "10um,0um"."""
     try:
         x, y = (to_si(_number_or_text(part), LENGTH) for part in text.split(","))
     except (UnitError, ValueError) as error:
@@ -188,13 +177,13 @@ def _because(error: ValueError) -> str:
 
 
 def _arguments(entry: Entry, files: int, chosen: Mapping[str, Any]) -> dict[str, Any]:
-    """Turn the options that were given into the arguments of a figure."""
+    """Return the arguments of a figure from the given options."""
     if files > 1 and not entry.of_several:
         raise DeckError(f"--what {entry.name} shows one result; expected one FILE, not {files}")
     arguments: dict[str, Any] = {}
     for option, value in chosen.items():
-        if option == "step" and "steps" in entry.options:
-            arguments["steps"] = value
+        if f"{option}s" in entry.options:
+            arguments[f"{option}s"] = value
         elif option not in entry.options:
             raise DeckError(f"--{option}: not an option of --what {entry.name}")
         elif option == "step":
@@ -211,7 +200,7 @@ def _arguments(entry: Entry, files: int, chosen: Mapping[str, Any]) -> dict[str,
 
 
 def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapping[str, Any]) -> Path:
-    """Draw one picture of a result, of several, or of none.
+    """Draw a picture of one result, of several, or of none.
 
     Parameters
     ----------
@@ -222,12 +211,12 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
     picture : Path
         File to write.
     chosen : mapping
-        Values of the options that were given, by their names: step (a list), angle, through, over, arrows.
+        Values of the given options by name: step (a list), angle, through, over, arrows.
 
     Raises
     ------
     DeckError
-        If the figure has no such option, the result has nothing to show in it, or it cannot be written.
+        If the figure has no such option, the result lacks data for it, or the file cannot be written.
     """
     from ..plotting.registry import entries
 
@@ -238,27 +227,27 @@ def picture_of(results: Sequence[Result], what: str, picture: Path, chosen: Mapp
     about = f"{what} of {named}" if named else what
     try:
         figure = entry.draw(*shown, **arguments)
-    except (IndexError, ValueError) as error:  # no such step, nothing in contact
+    except (IndexError, ValueError) as error:  # such as no such step, nothing in contact
         raise DeckError(f"cannot draw {about}: {error}") from error
     return _save(figure, about, picture)
 
 
 def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list[str]:
-    """Draw every picture that the result has something to show in; return a line about each.
+    """Draw every figure for which the result has data; return a line about each.
 
     Parameters
     ----------
     result : Result
         The result.
     first : Path
-        File whose name all files get, with the name of the picture behind it.
+        File to whose name the name of each figure is appended.
     chosen : mapping
-        Values of the options that were given; each picture takes those that it knows.
+        Values of the given options; each figure takes those that it has.
 
     Raises
     ------
     DeckError
-        If none can be drawn or one cannot be written.
+        If no figure can be drawn, or a file cannot be written.
     """
     from ..plotting.registry import SEVERAL_RUNS, entries
 
@@ -283,9 +272,10 @@ def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list
 
 
 def _save(figure: Figure, about: str, picture: Path) -> Path:
-    """Write a picture."""
+    """Write a picture, which may replace an earlier one."""
+    require_replaceable(picture)
     try:
-        figure.savefig(picture, dpi=200)
-    except ValueError as error:  # no such kind of file
+        figure.savefig(picture, dpi=200, metadata={"Creator": MADE_BY})
+    except ValueError as error:  # unknown format
         raise DeckError(f"cannot draw {about}: {error}") from error
     return picture

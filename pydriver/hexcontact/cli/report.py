@@ -1,38 +1,43 @@
-"""A page that shows a result: one HTML file that needs nothing else, neither a network nor this program.
+"""The report of a result: one HTML page that needs neither a network nor this program.
 
-Its tables are made here, what it draws in `hexcontact.plotting.report_data`; how it looks and moves is in
-data/report.html, which draws from numbers and small pictures in the file itself.
+This module makes its tables, `hexcontact.plotting.report_data` the data of its charts and maps; layout and
+scripts are in the template data/report.html.
 """
 
 from __future__ import annotations
 
+import base64
 import datetime
 import hashlib
+import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import jinja2
+import numpy as np
 
 from .._version import __version__
+from ..deck.below import Fatigue, Stress
 from ..errors import DeckError
-from ..files import replacing
+from ..files import MADE_BY, replacing, require_replaceable
+from ..interior.tables import tables_of
 from ..plotting.report_data import drawn_data, kept_steps
 from ..problem.overview import case_rows
-from ..result.history import RESIDUALS, load_or_motion, worth_showing
+from ..result.history import energy_table, load_or_motion, worth_showing
 from ..text import quantity, visible
-from ..variables import label_of
+from ..variables import RESIDUALS, label_of
 from . import tables
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
     from ..result.result import Result
 
-History = Mapping[str, Any]
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]  # headers and rows
 
+_MOST_PARTS = 200  # segments, and cycles, in the table of energies
 _DATA = resources.files("hexcontact").joinpath("data")
 
 
@@ -44,7 +49,7 @@ def write_report(result: Result, target: Path) -> Path:
     result : Result
         The result, of a finished run or not.
     target : Path
-        File to write, ``.html``; replaced as a whole if it is there.
+        File to write, ``.html``; an earlier page is replaced.
 
     Returns
     -------
@@ -54,17 +59,18 @@ def write_report(result: Result, target: Path) -> Path:
     Raises
     ------
     DeckError
-        If the name is not that of a page.
+        If the name has another ending, or the file is no page of hexcontact.
     """
     if target.suffix.lower() not in (".html", ".htm"):
         raise DeckError(f"--output {target}: expected a page, such as {target.with_suffix('.html')}")
+    require_replaceable(target)
     with replacing(target) as temporary:
         temporary.write_text(report(result), encoding="utf-8")
     return target
 
 
 def report(result: Result) -> str:
-    """Return the page of a result as text.
+    """Return the page of a result as HTML.
 
     Parameters
     ----------
@@ -77,7 +83,7 @@ def report(result: Result) -> str:
     data = drawn_data(result, histories, numbers)
     title = result.case_title or Path(result.path).stem or "hexcontact result"
     environment = jinja2.Environment(
-        # PackageLoader does not find the folder of an editable installation
+        # PackageLoader does not find the folder of an editable installation.
         loader=jinja2.FunctionLoader(lambda name: _DATA.joinpath(name).read_text(encoding="utf-8")),
         undefined=jinja2.StrictUndefined,
         autoescape=True,
@@ -86,10 +92,14 @@ def report(result: Result) -> str:
     )
     return environment.get_template("report.html").render(
         title=title,
+        made_by=MADE_BY,
         notes=[_unfinished(result), *summary.remarks],
         kept=_kept(len(numbers), len(histories)),
         inputs=_inputs(result, summary.case),
         loads=_loads(histories),
+        energies=energy_table(histories, _MOST_PARTS),
+        below=_below(result),
+        pictures=list(_pictures(result)) if numbers else [],
         deck=result.deck,
         hertz=(tables.HERTZ_HEADERS, tables.hertz_rows(summary.hertz, histories[-1])),
         accuracy=(tables.TRIAL_HEADERS, tables.trial_rows(result)),
@@ -116,41 +126,31 @@ def _kept(shown: int, steps: int) -> str:
         return ""
     if shown == 0:
         return "The fields of this run were not kept (output.fields), so that there are no maps."
-    return (
-        f"Maps of {shown} of {steps} load steps: those kept in the result, evenly chosen if there are many."
-    )
+    return f"Maps of {shown} of {steps} load steps: those in the result, evenly chosen if there are many."
 
 
 def _inputs(result: Result, case: Problem | None) -> list[tuple[str, ...]]:
     attributes, sizes = result.dataset.attrs, result.dataset.sizes
     left_out = {"window", "memory", "load steps"}
+    spacing = "spacing", quantity(float(attributes["lattice_spacing"]), "m")
     rows: list[tuple[str, ...]] = []
-    if case is not None and case.accuracy:
-        left_out |= {"spacing", "accuracy", "work"}  # those of the first lattice, and guesses
-        rows = [("spacing", quantity(float(attributes["lattice_spacing"]), "m"))]
     if case is not None:
-        rows = [row for row in case_rows(case) if row[0] not in left_out] + rows
+        refined = (
+            {"spacing", "accuracy", "work"} if case.accuracy else set()
+        )  # of the first lattice, estimates
+        rows = [row for row in case_rows(case) if row[0] not in left_out | refined]
+        rows += [spacing] if refined else []
     elif "effective_modulus" in attributes:
-        rows = [
-            (
-                "pair",
-                f"E* = {quantity(float(attributes['effective_modulus']), 'Pa')}, "
-                f"beta = {float(attributes['dundurs_beta']):.4g}, "
-                f"gamma = {float(attributes['tangential_compliance_ratio']):.4g}",
-            ),
-            ("algorithm", tables.algorithm(attributes)),
-            ("spacing", quantity(float(attributes["lattice_spacing"]), "m")),
-        ]
-    window = f"{sizes['row']} x {sizes['col']} nodes at the end"
+        modulus = quantity(float(attributes["effective_modulus"]), "Pa")
+        beta, gamma = (float(attributes[n]) for n in ("dundurs_beta", "tangential_compliance_ratio"))
+        pair = f"E* = {modulus}, beta = {beta:.4g}, gamma = {gamma:.4g}"
+        rows = [("pair", pair), ("algorithm", tables.algorithm(attributes)), spacing]
     planned = int(attributes["planned_steps"])
-    return [
-        *rows,
-        ("window", window),
-        ("load steps", f"{len(result)}" + (f" of {planned}" if planned else "")),
-    ]
+    steps = f"{len(result)}" + (f" of {planned}" if planned else "")
+    return [*rows, ("window", f"{sizes['row']} x {sizes['col']} nodes at the end"), ("load steps", steps)]
 
 
-def _provenance(result: Result, histories: Sequence[History]) -> list[tuple[str, ...]]:
+def _provenance(result: Result, histories: Sequence[tables.History]) -> list[tuple[str, ...]]:
     attributes, deck = result.dataset.attrs, result.deck
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     return [
@@ -166,8 +166,8 @@ def _provenance(result: Result, histories: Sequence[History]) -> list[tuple[str,
     ]
 
 
-def _loads(histories: Sequence[History]) -> Table:
-    """Return the load history: where each segment ends."""
+def _loads(histories: Sequence[tables.History]) -> Table:
+    """Return the loads at the end of each segment as a table."""
     ends = {int(history.get("segment", 1)): history for history in histories}
     names = worth_showing(histories)
     rows, before = [], 0
@@ -181,7 +181,38 @@ def _loads(histories: Sequence[History]) -> Table:
     return ("segment", "label", "steps", *symbols), rows
 
 
-def _residuals(histories: Sequence[History]) -> Table:
+def _below(result: Result) -> Table:
+    """Return the tables [[stress]] and [[fatigue]] of the deck, with their files, as a table."""
+    rows = []
+    for name, table in tables_of(result.deck).items():
+        chosen = table.parameters if isinstance(table, Fatigue) else table.components
+        labels = table.segment if isinstance(table, Fatigue) else None
+        steps = labels or ("last",) if table.steps is None else np.atleast_1d(table.steps)
+        file = Path(result.path or "output").stem + f"_{name}.nc"
+        rows.append((file, ", ".join(chosen) or "stress", str(table.body), ", ".join(map(str, steps))))
+    return ("file", "quantities", "body", "load steps"), rows
+
+
+def _pictures(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield title and data (PNG, base64) of a picture of each kind of what `_below` lists."""
+    from ..plotting.fatigue import fatigue
+    from ..plotting.stress import stress
+
+    kinds = {type(table) for table in tables_of(result.deck).values()}
+    for kind, draw, title in (
+        (Stress, stress, "Stress of von Mises below the contact"),
+        (Fatigue, fatigue, "Fatigue parameter"),
+    ):
+        if kind in kinds:
+            try:
+                canvas, data = draw(result), io.BytesIO()
+            except ValueError:  # fields that were not kept, tables of points alone
+                continue
+            canvas.savefig(data, format="png", dpi=160)
+            yield title, base64.b64encode(data.getvalue()).decode()
+
+
+def _residuals(histories: Sequence[tables.History]) -> Table:
     signs = [sign for sign, name in RESIDUALS.items() if name in histories[0]]
     rows = [
         (

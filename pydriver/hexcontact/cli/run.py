@@ -1,15 +1,31 @@
-"""Commands that solve: run and resume."""
+"""Commands that solve: run, resume."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..solve.interruption import signal_pipe
-from .guard import Content, command, complain
-from .options import AsJson, DeckFile, Level, LogFile, Plot, Quiet, Settings, case_of, setting, target_of
+from .guard import Content, command, print_error
+from .options import (
+    AsJson,
+    DeckFile,
+    Level,
+    LogFile,
+    Plot,
+    Quiet,
+    Settings,
+    argument,
+    case_of,
+    flag,
+    output_to,
+    setting,
+    settings_option,
+    target_of,
+)
 
 
 @command("hexcontact run cases/hertz_spheres.toml --plot")
@@ -17,12 +33,9 @@ def run(
     context: typer.Context,
     deck: DeckFile,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="File to write; default: the deck's output.file, or DECK.nc here."
-        ),
+        Path | None, output_to("File to write; default: the deck's output.file, or DECK.nc here.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an output that is there.")] = False,
+    overwrite: Annotated[bool, flag("overwrite", "Replace an existing output.")] = False,
     plot: Plot = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -30,59 +43,60 @@ def run(
     log_level: Level = None,
     settings: Settings = None,
 ) -> Content:
-    """Solve a deck; each load step is safe on the disk before the next begins."""
+    """Solve a deck; each load step is written to the disk before the next begins."""
     from ..result.store import Store
     from ..solve import log
     from ..solve.run import metadata_of
-    from .messages import Messages, overview, solved
+    from .messages import Messages, overview, picture_beside, solved
 
     messages = Messages("run", quiet, as_json, log_file, log_level)
     with messages.logging(deck, *([output] if output else [])):
         case = case_of(deck, settings)
         target = target_of(case, deck, output)
         log.refuse_same(log_file, [target])
-        pipe = context.with_resource(signal_pipe())  # up to the end: a complete output stays, whatever comes
+        if plot:  # refuses before the run
+            picture_beside(target)
+        pipe = context.with_resource(signal_pipe())  # up to the end, so that a complete output stays
         with Store(target, metadata_of(case), overwrite) as store:
             histories = solved(case, store, pipe, deck.stem, messages)
-        picture = overview(store.path) if plot else None
+        picture = overview(target) if plot else None
     return messages.conclude(case, histories, target, picture)
 
 
 @command("hexcontact resume fretting.nc")
 def resume(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The output of the run.", show_default=False)],
+    file: Annotated[Path, argument("FILE", "The output of the run.")],
     plot: Plot = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
     log_file: LogFile = None,
     log_level: Level = None,
     settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Change how the further steps are solved, as solver.tolerance=1e-7. Repeatable.",
-        ),
+        list[str] | None, settings_option("Change the solver for the further steps, as solver.tolerance=1e-7")
     ] = None,
 ) -> Content:
-    """Go on with a run that was interrupted or killed, met a full disk or did not converge.
+    """Resume a run that was interrupted or killed, ran out of disk or did not converge.
 
-    The result is to the bit that of a run in one go, on the same machine with as many threads.
+    The result is bit-identical to that of a run in one go, on the same machine with as many threads.
     """
     from ..solve import restart
-    from .messages import Messages, overview, solved
+    from .messages import Messages, overview, picture_beside, solved
 
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))
     pipe = context.with_resource(signal_pipe())
     with messages.logging(file), restart.reopened(file, overrides=overrides) as again:
         if again is not None:
+            if plot:
+                picture_beside(again.store.path)
             if again.warning:
-                complain(f"warning: {again.warning}")
+                print_error(f"warning: {again.warning}")
             histories = solved(again.case, again.store, pipe, file.stem, messages, again.before)
     path = again.store.path if again is not None else file
+    path = path if file.is_absolute() else Path(os.path.relpath(path))
     picture = overview(path) if plot else None
     if again is None:
+        restart.complete(file)
         return messages.was_finished(file, picture)
     return messages.conclude(again.case, histories, path, picture, [again.warning] * bool(again.warning))

@@ -1,4 +1,4 @@
-"""The command that runs many cases: ``hexcontact study``, here or as a Slurm job array."""
+"""The command that runs the cases of a study: ``hexcontact study``."""
 
 from __future__ import annotations
 
@@ -12,30 +12,25 @@ import typer
 
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
-from .guard import Content, Failure, command, complain, say
-from .options import AsJson, Level, LogFile, Quiet
+from ..text import shown, text_table
+from .guard import Content, Failure, command, print_error, print_output
+from .options import AsJson, Level, LogFile, Quiet, argument, flag, output_to
 
 if TYPE_CHECKING:
+    from ..study.plan import CheckLevel
     from ..study.study import Outcome, PlannedCase, Study
     from .messages import Messages
 
-FAILED = 3  # exit code of a study of which some cases failed
+_SOME_FAILED = 3  # exit code of a study with failed or missing cases
 _MOST_NAMED = 20  # failures listed at the end
 
 
 @command("hexcontact study cases/study_friction.toml --jobs 4")
 def study(
     context: typer.Context,
-    file: Annotated[
-        Path, typer.Argument(metavar="STUDY", help="The study, a TOML file.", show_default=False)
-    ],
+    file: Annotated[Path, argument("STUDY", "The study, a TOML file.")],
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="Result; default: the study's output, or STUDY.nc here. Cases go beside it.",
-        ),
+        Path | None, output_to("Result; default: the study's output, or STUDY.nc here. Cases go beside it.")
     ] = None,
     jobs: Annotated[
         int | None, typer.Option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
@@ -43,32 +38,43 @@ def study(
     dask: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786.")
     ] = None,
-    slurm: Annotated[bool, typer.Option("--slurm", help="Print a job array for sbatch instead.")] = False,
+    slurm: Annotated[bool, flag("slurm", "Run nothing; print a job array for sbatch.")] = False,
     case: Annotated[
-        int | None, typer.Option(metavar="N", help="Run only case N (what a job array does).")
+        int | None, typer.Option(metavar="N", help="Run only case N, as a job array does.")
     ] = None,
-    collect: Annotated[
-        bool, typer.Option("--collect", help="Run nothing, put together what is there.")
+    collect: Annotated[bool, flag("collect", "Run nothing; combine the finished cases.")] = False,
+    plan: Annotated[
+        bool, typer.Option("--plan", "--dry-run", help="Run nothing; print all cases and their states.")
     ] = False,
-    retry: Annotated[bool, typer.Option("--retry", help="Run cases that failed again.")] = False,
+    skip_invalid: Annotated[
+        bool, typer.Option("--skip-invalid", help="Leave out invalid cases, and name each.")
+    ] = False,
+    retry: Annotated[bool, flag("retry", "Repeat cases that failed.")] = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
     log_file: LogFile = None,
     log_level: Level = None,
 ) -> Content:
-    """Run the missing ones of many cases that differ in keys of one deck; exit code 3 if some failed."""
+    """Run the missing cases of a study, a deck with several values of keys; exit code 3 if any failed."""
     from ..study.progress import study_reporter
     from ..study.study import Study
     from .messages import Messages
 
-    if sum([slurm, case is not None, collect, dask is not None, jobs is not None]) > 1:
-        raise DeckError("expected only one of --jobs, --dask, --slurm, --case and --collect")
+    if sum([slurm, case is not None, collect, plan, dask is not None, jobs is not None]) > 1:
+        raise DeckError("expected only one of --jobs, --dask, --slurm, --case, --collect and --plan")
     if slurm and as_json:
         raise DeckError("--json: expected no --slurm, which prints a script")
     messages = Messages("study", quiet, as_json, log_file, log_level)
-    planned = Study.from_toml(file, output, check=case is None and not collect)
+    unchecked = case is not None or (collect and not skip_invalid)
+    check: CheckLevel = "nothing" if unchecked else "decks" if plan else "windows"
+    planned = Study.from_toml(file, output, check, skip_invalid)
+    for wrong in planned.invalid:
+        number = planned.folder.number(wrong)
+        print_error(f"case {number} ({wrong}) is invalid and left out: {wrong.fault.splitlines()[0]}")
+    if plan:
+        return _plan(planned, as_json)
     if slurm:
-        print(slurm_script(planned, file, retry) or "# no case is missing")
+        print(slurm_script(planned, file, retry))
         return None
     with messages.logging(file, planned.output):
         if case is not None:
@@ -83,8 +89,8 @@ def study(
         if collect:
             planned.collect()
         else:
-            shown = study_reporter(messages.silent)
-            _run_missing(planned, context, jobs=jobs, dask=dask, retry=retry, listener=shown)
+            listener = study_reporter(messages.silent)
+            _run_missing(planned, context, jobs=jobs, dask=dask, retry=retry, listener=listener)
     state = _State.of(planned)
     state.report(quiet or as_json)
     if as_json:
@@ -94,9 +100,27 @@ def study(
     return None
 
 
+def _plan(study: Study, as_json: bool) -> Content:
+    """Print the cases of a study with their parameters and states; nothing is solved or written."""
+    states = study.states()
+    cases = list(zip(map(study.folder.number, study.cases), study.cases, states, strict=True))
+    if as_json:
+        content = [{"case": n, "parameters": case.settings, "state": state} for n, case, state in cases]
+        return {"title": study.title, "output": study.output, "cases": content}
+    headers = ("case", *(axis.name for axis in study.plan.axes), "state")
+    rows = [
+        (str(number), *(shown(case.settings.get(axis.key, "-")) for axis in study.plan.axes), state)
+        for number, case, state in cases
+    ]
+    print(text_table(headers, rows))
+    counts = [f"{states.count(state)} {state}" for state in dict.fromkeys(states)]
+    print_output(f"{study.title}: {len(study)} cases, {', '.join(counts)}")
+    return None
+
+
 @dataclass(frozen=True)
 class _State:
-    """How far a study is: finished cases, those that failed, and the number of those that were not run."""
+    """State of a study: numbers of finished and of missing cases, and the failed cases."""
 
     study: Study
     done: int
@@ -105,33 +129,33 @@ class _State:
 
     @classmethod
     def of(cls, study: Study) -> _State:
-        """Look at the files of the cases."""
+        """Return the state from the files of the cases."""
         done, failures = sum(study.folder.done(case) for case in study.cases), study.failures()
-        return cls(study, done, failures, len(study) - done - len(failures))
+        return cls(study, done, failures, len(study) - done - len(failures) - len(study.invalid))
 
     @property
     def exit_code(self) -> int:
         """Exit code of the command."""
-        return FAILED if self.done < len(self.study) else 0
+        return _SOME_FAILED if self.failures or self.missing else 0
 
     def report(self, quiet: bool) -> None:
-        """Say what is there, what failed and why."""
+        """Print the number of finished cases, and why cases failed."""
         study = self.study
         number = study.folder.number
         if not quiet:
             files = f"their files in {study.folder.folder}/"
-            say(f"written: {study.output}, {self.done} of {len(study)} cases ({files})")
+            print_output(f"written: {study.output}, {self.done} of {len(study)} cases ({files})")
         for case, outcome in self.failures[:_MOST_NAMED]:
-            complain(f"case {number(case)} ({case}) failed: {outcome.message.splitlines()[0]}")
+            print_error(f"case {number(case)} ({case}) failed: {outcome.message.splitlines()[0]}")
         if len(self.failures) > _MOST_NAMED:
-            complain(f"... and {len(self.failures) - _MOST_NAMED} more; all are in {study.output}")
+            print_error(f"... and {len(self.failures) - _MOST_NAMED} more; all are in {study.output}")
         if self.missing:
-            complain(f"{self.missing} of {len(study)} cases have not been run")
+            print_error(f"{self.missing} of {len(study)} cases have not been run")
         if any(outcome.lasting for _, outcome in self.failures):
-            complain("--retry runs cases again that failed by themselves")
+            print_error("--retry runs cases again that failed by themselves")
 
     def content(self) -> dict[str, Any]:
-        """Return the same for programs."""
+        """Return the state as the object that ``study --json`` prints."""
         study = self.study
         return {
             "title": study.title,
@@ -140,6 +164,7 @@ class _State:
             "cases": len(study),
             "done": self.done,
             "missing": self.missing,
+            "invalid": [{"parameters": case.settings, "message": case.fault} for case in study.invalid],
             "failed": [
                 {
                     "case": study.folder.number(case),
@@ -153,20 +178,20 @@ class _State:
 
 
 def _run_case(study: Study, number: int, retry: bool, messages: Messages, context: typer.Context) -> Outcome:
-    """Run one case for a job array; signals end the process unless it is done, and finished steps stay."""
+    """Run one case for a job array; signals end the process unless the case is done; finished steps stay."""
     from ..solve.progress import reporter
 
     outcomes: list[Outcome] = []
-    shown = reporter(messages.silent)
+    listener = reporter(messages.silent)
     try:
         in_background(
-            lambda: outcomes.append(study.run_case(number, retry, shown)),
+            lambda: outcomes.append(study.run_case(number, retry, listener)),
             context.with_resource(signal_pipe()),
             lambda _: not (outcomes or study.has(number)),
         )
     except Interrupted as signaled:
-        kept = f"the finished load steps of case {number} are kept; the same command goes on after them"
-        messages.interrupted(signaled, kept)
+        saved = f"the finished load steps of case {number} are recorded; the same command resumes after them"
+        messages.interrupted(signaled, saved)
     return outcomes[0]
 
 
@@ -191,15 +216,15 @@ def _run_missing(study: Study, context: typer.Context, **options: Any) -> None:
     try:
         in_background(work, context.with_resource(signal_pipe()), ends)
     except Interrupted as signaled:
-        kept = f"{_State.of(study).done} of {len(study)} cases are finished and kept"
-        message = f"interrupted; {kept} in {study.folder.folder}/; the same command runs the rest"
+        saved = f"{_State.of(study).done} of {len(study)} cases are finished and recorded"
+        message = f"interrupted; {saved} in {study.folder.folder}/; the same command runs the rest"
         raise Failure(message, signaled.exit_code) from None
 
 
 def slurm_script(study: Study, path: Path, retry: bool) -> str:
-    """Return a job array that runs the missing cases; empty if there are none."""
+    """Return the script of a job array that runs the missing cases, of an empty job if there are none."""
     from ..study.backend import BACKENDS
 
     numbers = sorted(study.folder.number(case) for case in study.missing(retry))
     array = BACKENDS["slurm"](study.file.slurm, len(study))
-    return array.script(numbers, path, study.output, retry) if numbers else ""
+    return array.script(numbers, path, study.output, retry)

@@ -1,27 +1,35 @@
-"""What came out of a run or stands in a file, beside Hertz: as tables for the terminal, and for programs."""
+"""Results as tables for the terminal and as objects for programs, compared with Hertz."""
 
 from __future__ import annotations
 
 import functools
+import io
 import math
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
 from ..errors import HexcontactError
 from ..result.history import (
+    contact_size,
+    cycles,
+    energy_table,
     error_of,
     fitted,
+    half_axes,
     is_frictional,
     load_or_motion,
     remarks,
     residuals,
+    segments,
+    some_steps,
     step_rows,
     stick_share,
     worth_showing,
 )
-from ..text import PREFIXES, percent, quantity, rich_table
+from ..text import percent, quantity, rich_table
 from ..variables import VARIABLES, label_of, spelled
 
 if TYPE_CHECKING:
@@ -38,15 +46,24 @@ _MOST_ROWS = 24  # steps shown of a long history
 
 
 def console() -> Console:
-    """Return the console on standard output: colors on a terminal, plain wide text elsewhere."""
+    """Return the console on standard output: with colors on a terminal, plain wide text elsewhere."""
     from rich.console import Console
 
-    width = None if sys.stdout.isatty() else 130
-    return Console(highlight=False, markup=False, emoji=False, width=width)
+    piped = not sys.stdout.isatty()
+    width, file = (130, cast(IO[str], _Unpadded())) if piped else (None, None)
+    return Console(file=file, highlight=False, markup=False, emoji=False, width=width)
+
+
+class _Unpadded(io.TextIOBase):
+    """Standard output without blanks at the ends of lines."""
+
+    def write(self, text: str) -> int:
+        """Write text."""
+        return sys.stdout.write(re.sub(r" +(?=\n)", "", text))
 
 
 def pairs(title: str, rows: Iterable[Row]) -> Table:
-    """Return a table of names and what belongs to them."""
+    """Return a table of names and values."""
     return rich_table(title, ("", ""), rows)
 
 
@@ -55,7 +72,7 @@ def pairs(title: str, rows: Iterable[Row]) -> Table:
 
 @dataclass(frozen=True)
 class Summary:
-    """The load steps of a run or a file, to be shown as tables or handed to programs.
+    """The load steps of a run or a file.
 
     Attributes
     ----------
@@ -64,9 +81,9 @@ class Summary:
     histories : sequence of mapping
         History of each load step.
     parameters : mapping
-        How they were solved: parameters of the case, or attributes of the result.
+        Parameters of the case, or attributes of the result.
     case : Problem or None
-        The case, if it is known; without it there is nothing about Hertz.
+        The case, if it is known; without it there is no comparison with Hertz.
     result : Result or None
         The result, if it was read from a file.
     """
@@ -79,7 +96,7 @@ class Summary:
 
     @classmethod
     def of_run(cls, case: Problem, histories: Sequence[History], refined: Result | None) -> Summary:
-        """Summarize a run; of a refined lattice the finest one, with errors, is in its file."""
+        """Summarize a run; the finest lattice of a refined one, with errors, is read from its result."""
         from ..problem.overview import parameters_of
 
         found = histories_of(refined) if refined is not None else histories
@@ -88,27 +105,26 @@ class Summary:
     @classmethod
     def of_result(cls, result: Result) -> Summary:
         """Summarize a file."""
-        return cls(
-            result.case_title, histories_of(result), result.dataset.attrs, case_of(result.deck), result
-        )
+        histories, attributes = histories_of(result), result.dataset.attrs
+        return cls(result.case_title, histories, attributes, _recorded_case(result.deck), result)
 
     @property
     def remarks(self) -> list[str]:
-        """Sentences about steps that need one."""
+        """Sentences about doubtful steps."""
         return remarks(self.histories, self.parameters)
 
     @property
     def hertz(self) -> list[tuple[str, float, float, str]]:
-        """The last step beside Hertz, see `against_hertz`."""
+        """The last step compared with Hertz, see `against_hertz`."""
         return against_hertz(self.case, self.histories[-1]) if self.case is not None else []
 
     def print(self, whole_file: bool = False) -> None:
-        """Print the history, the last step, how it compares with Hertz, lattices and errors.
+        """Print the history, the last step, its comparison with Hertz, lattices and errors.
 
         Parameters
         ----------
         whole_file : bool
-            Also where the result comes from.
+            Also print the origin of the result.
         """
         shown, last, named = console(), self.histories[-1], ""
         if whole_file and self.result is not None:
@@ -117,20 +133,27 @@ class Summary:
             named = f" of {self.title!r}"
         if whole_file or len(self.histories) > 1:
             shown.print(history_table(self.histories, shown))
+        headers, energies = energy_table(self.histories, _MOST_ROWS)
+        if energies:
+            shown.print(rich_table("Dissipated energy", headers, energies))
         shown.print(pairs(f"Last load step{named}", step_rows(last)))
         if rows := hertz_rows(self.hertz, last):
             shown.print(rich_table("Against Hertz", HERTZ_HEADERS, rows))
         if self.result is not None and (rows := trial_rows(self.result)):
             shown.print(rich_table("Accuracy", TRIAL_HEADERS, rows))
+        printed = (
+            [] if whole_file else str(self.parameters.get("warnings", "")).splitlines()
+        )  # before the run
         for remark in self.remarks:
-            shown.print(f"note: {remark}", soft_wrap=True)
+            if remark not in printed:
+                shown.print(f"note: {remark}", soft_wrap=True)
 
     def steps(self) -> list[dict[str, Any]]:
-        """Return the histories for programs, each with its number."""
+        """Return the histories, each with the number of its step."""
         return [{"step": number, **history} for number, history in enumerate(self.histories, start=1)]
 
     def as_run(self) -> dict[str, Any]:
-        """Return for programs what came out of a run that is complete."""
+        """Return a complete run as the object that ``run --json`` prints."""
         worst = [residual for history in self.histories for residual in residuals(history).values()]
         return {
             "title": self.title,
@@ -140,12 +163,17 @@ class Summary:
             "operator_applications": math.fsum(h["operator_applications"] for h in self.histories),
             "largest_residual": max(worst, default=math.nan),
             "hertz": {name: {"exact": exact, "computed": value} for name, exact, value, _ in self.hertz},
+            **self.parts(),
             "steps": self.steps(),
         }
 
+    def parts(self) -> dict[str, Any]:
+        """Return segments and cycles of the history, with the energy that friction dissipated in each."""
+        return {"segments": segments(self.histories), "cycles": cycles(self.histories)}
+
 
 def file_content(result: Result) -> dict[str, Any]:
-    """Return for programs what a result holds: its attributes, size and fields, and its history."""
+    """Return a result as the object that ``info --json`` prints: attributes, size, fields, history."""
     summary, sizes = Summary.of_result(result), result.dataset.sizes
     return {
         "file": result.path,
@@ -155,6 +183,7 @@ def file_content(result: Result) -> dict[str, Any]:
         "columns": sizes["col"],
         "fields": fields_of(result),
         "warnings": summary.remarks,
+        **summary.parts(),
         "steps": summary.steps(),
     }
 
@@ -165,17 +194,17 @@ def histories_of(result: Result) -> list[dict[str, Any]]:
 
 
 def fields_of(result: Result) -> list[str]:
-    """Return the names of the fields that a result holds at each step."""
+    """Return the names of the fields in a result."""
     return [str(name) for name, values in result.dataset.data_vars.items() if values.ndim == 3]
 
 
-def case_of(deck: str) -> Problem | None:
-    """Return the case of a deck that stands in a result, if it tells all of it."""
+def _recorded_case(deck: str) -> Problem | None:
+    """Return the case of the deck in a result; None if parts of it were made in Python."""
     from ..problem.problem import Problem
 
     try:
         return Problem.from_text(deck) if deck else None
-    except HexcontactError:  # a deck with parts that were made in Python
+    except HexcontactError:
         return None
 
 
@@ -183,26 +212,26 @@ def case_of(deck: str) -> Problem | None:
 
 
 def history_table(histories: Sequence[History], console: Console) -> Table:
-    """Return a table of the load steps; of a long history only some steps, the last among them.
+    """Return a table of the load steps; of a long history only ends of segments, peaks and the last step.
 
-    The residual is the largest of a step. What a narrow console has no room for is left out, estimated errors
-    as the last.
+    The residual is the largest of a step. On a narrow console columns are left out, estimated errors last.
     """
-    stride = max(1, math.ceil(len(histories) / _MOST_ROWS))
-    chosen = [k for k in range(len(histories)) if (len(histories) - 1 - k) % stride == 0]
+    several = len(histories) > _MOST_ROWS
+    chosen = some_steps(histories, _MOST_ROWS) if several else range(len(histories))
+    title = f"History, {len(chosen)} of {len(histories)} load steps" if several else "History"
     for with_errors in (True, False):
         columns = _columns(histories, with_errors)
         for spare in ("", "time", "label", "residual"):
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
-            shown = rich_table("History", ("step", *columns), rows, tight=True)
+            shown = rich_table(title, ("step", *columns), rows, tight=True)
             if console.measure(shown, options=console.options.update_width(1000)).maximum <= console.width:
                 return shown
     return shown
 
 
 def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Callable[[History], str]]:
-    """Return the columns of a table of load steps by their header, with estimated errors if there is room."""
+    """Return the columns of a table of load steps by their headers, with or without estimated errors."""
 
     def column(entry: Callable[[History], str], name: str) -> Callable[[History], str]:
         return lambda history: entry(history) + (error_of(name, history) if with_errors else "")
@@ -214,7 +243,10 @@ def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Calla
         columns["stick"] = column(stick_share, "stick_area")
     else:
         columns["p_max"] = column(lambda h: quantity(h["max_pressure"], "Pa"), "max_pressure")
-        columns["radius"] = column(lambda h: quantity(fitted("contact_radius", h), "m"), "contact_radius")
+        if any(half_axes(history) for history in histories):
+            columns["half-axes"] = lambda h: contact_size(h)[1]
+        else:
+            columns["radius"] = column(lambda h: quantity(fitted("contact_radius", h), "m"), "contact_radius")
     columns["residual"] = lambda h: f"{max(residuals(h).values(), default=math.nan):.1e}"
     columns["time"] = lambda h: quantity(h["seconds"], "s", 3)
     return columns
@@ -236,14 +268,14 @@ def against_hertz(case: Problem, history: History) -> list[tuple[str, float, flo
     Returns
     -------
     list of (str, float, float, str)
-        Quantity as in histories, Hertz, computed, unit; empty where Hertz does not apply: with friction, with
-        surfaces that are not quadratic or touch along a line, without load.
+        Name of the quantity in histories, Hertz, computed, unit; empty where Hertz does not apply: with
+        friction, a compliant interface, surfaces that are not quadratic or touch along a line, without load.
     """
     load = float(history["normal_load"])
     surfaces = [body.surface for body in (case.body_1, case.body_2) if body.surface is not None]
     curvatures = [curvature for surface in surfaces if (curvature := surface.curvature) is not None]
     quadratic = len(curvatures) == len(surfaces)
-    if case.frictional or load <= 0 or not quadratic:
+    if case.deck.interface or case.frictional or load <= 0 or not quadratic:
         return []
     import numpy as np
 
@@ -255,12 +287,11 @@ def against_hertz(case: Problem, history: History) -> list[tuple[str, float, flo
     except ValueError:  # contact along a line or all over, or a gap given in Python
         return []
     radius = math.sqrt(hertz.semi_major * hertz.semi_minor)
-    known = {
-        "max_pressure": (hertz.max_pressure, "Pa"),
-        "approach": (hertz.approach, "m"),
-        "contact_radius_fit": (radius, "m"),
-        "contact_radius": (radius, "m"),
-    }
+    known = {"max_pressure": (hertz.max_pressure, "Pa"), "approach": (hertz.approach, "m")}
+    if half_axes(history):
+        known |= {f"contact_semi_{n}": (getattr(hertz, f"semi_{n}"), "m") for n in ("major", "minor")}
+    else:
+        known |= {"contact_radius_fit": (radius, "m"), "contact_radius": (radius, "m")}
     return [
         (name, exact, float(history[name]), unit)
         for name, (exact, unit) in known.items()
@@ -269,10 +300,12 @@ def against_hertz(case: Problem, history: History) -> list[tuple[str, float, flo
 
 
 def hertz_rows(compared: Sequence[tuple[str, float, float, str]], history: History) -> list[Row]:
-    """Return what `against_hertz` found as rows: quantity, Hertz, computed, difference."""
+    """Return the output of `against_hertz` as rows: quantity, Hertz, computed, difference."""
     named = {
         "contact_radius_fit": "contact radius (to the edge)",
         "contact_radius": "contact radius (area of the nodes)",
+        "contact_semi_major": "larger half-axis of the contact",
+        "contact_semi_minor": "smaller half-axis of the contact",
     }
     rows: list[Row] = []
     for name, exact, value, unit in compared:
@@ -289,19 +322,11 @@ HERTZ_HEADERS = ("", "Hertz", "computed", "difference")
 # --- accuracy -------------------------------------------------------------------------------------
 
 
-def _value(value: float, unit: str) -> str:
-    """Write a number to five digits; prefixes of squares are squared, too."""
-    if unit != "m2" or value <= 0.0:
-        return quantity(value, unit, 5)
-    power = 3 * math.floor((math.log10(value) + 1) / 6)  # from 0.1 of a unit on
-    return f"{value / 10.0 ** (2 * power):#.5g} ".replace(". ", " ") + f"{PREFIXES[power]}m²"
-
-
 TRIAL_HEADERS = ("", "first lattice", "last but one", "last", "largest error")
 
 
 def trial_rows(result: Result) -> list[Row]:
-    """Return what decides about the accuracy of a result that was refined, at the last load step.
+    """Return the quantities that decide about the accuracy of a refined result, at the last load step.
 
     Parameters
     ----------
@@ -311,8 +336,8 @@ def trial_rows(result: Result) -> list[Row]:
     Returns
     -------
     list of rows
-        Quantity, on three of the lattices, largest error of all load steps in its largest value; empty if
-        the lattice was not refined.
+        Quantity, its values on three of the lattices, largest error of all load steps over its largest value;
+        empty if the lattice was not refined.
     """
     from ..solve.accuracy import JUDGED, relative_errors
 
@@ -331,7 +356,7 @@ def trial_rows(result: Result) -> list[Row]:
     ]
     for name in names:
         values = own[f"trial_{name}"].isel(step=-1)
-        values_shown = (_value(float(values[k]), VARIABLES[name].units) for k in shown)
+        values_shown = (quantity(float(values[k]), VARIABLES[name].units, 5) for k in shown)
         rows.append((spelled(name.removesuffix("_fit")), *values_shown, percent(relative[name])))
     return [*rows, ("target", "", "", "", percent(float(data.attrs["accuracy_target"])))]
 
@@ -340,7 +365,7 @@ def trial_rows(result: Result) -> list[Row]:
 
 
 def file_rows(result: Result) -> list[Row]:
-    """Return where a result comes from and how large it is."""
+    """Return origin, size and state of a result as rows."""
     attributes, sizes = result.dataset.attrs, result.dataset.sizes
     planned = int(attributes["planned_steps"])
     plan = f"{planned} were planned" if planned else "their number was open"
@@ -359,7 +384,7 @@ def file_rows(result: Result) -> list[Row]:
 
 
 def _reached(attributes: Mapping[str, Any]) -> str:
-    """Say whether the target of the accuracy is reached."""
+    """Return a sentence on the target of the accuracy."""
     if "accuracy_shortfall" in attributes:
         return str(attributes["accuracy_shortfall"])
     error, target = (percent(float(attributes[f"accuracy_{name}"])) for name in ("estimate", "target"))
@@ -367,10 +392,11 @@ def _reached(attributes: Mapping[str, Any]) -> str:
 
 
 def algorithm(attributes: Mapping[str, Any]) -> str:
-    """Say from the attributes of a result how it was computed."""
+    """Return the words for the algorithm and the friction law in the attributes of a result."""
     words = str(attributes.get("algorithm", "unknown"))
     if words in ("static", "incremental"):
-        words += f", friction coefficient {float(attributes['friction_coefficient']):g}"
+        law = attributes.get("friction_law", f"coefficient {float(attributes['friction_coefficient']):g}")
+        words += f", friction {law}"
     if words.startswith("incremental"):
         words += ", entry interpolated" * (attributes.get("entry") == "interpolated")
     return words + ", coupling goodman" * (attributes.get("coupling") == "goodman")

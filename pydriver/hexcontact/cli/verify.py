@@ -1,7 +1,7 @@
 """The command that tests an installation: ``hexcontact verify`` compares quick contacts with known solutions.
 
-Decks, quantities, references, tolerances and sources stand in ``data/self_test.toml``. The long comparisons
-with published, analytic and converged solutions are a program of the repository: tests/validation.
+Decks, quantities, references, tolerances and sources are in ``data/self_test.toml``; the long comparisons
+with published, analytic and converged solutions are in tests/validation of the repository.
 """
 
 from __future__ import annotations
@@ -19,16 +19,13 @@ import typer
 
 from ..errors import DeckError
 from .guard import Content, command
-from .options import AsJson
+from .options import AsJson, argument, flag
 
 
 @command("hexcontact verify")
 def verify(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Which comparisons; default: all.", show_default=False),
-    ] = None,
-    listing: Annotated[bool, typer.Option("--list", help="List the comparisons.")] = False,
+    names: Annotated[list[str] | None, argument("[NAME]...", "Which comparisons; default: all.")] = None,
+    listing: Annotated[bool, flag("list", "List the comparisons.")] = False,
     as_json: AsJson = False,
 ) -> Content:
     """Test the installation: solve a few contacts and compare them with known solutions.
@@ -45,25 +42,14 @@ def verify(
     return {"exit_code": int(not passed), "passed": passed, "checks": found}
 
 
-# display unit -> SI
-UNITS = {
-    "-": 1.0,
-    "s": 1.0,
-    "N": 1.0,
-    "m": 1.0,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "Pa": 1.0,
-    "MPa": 1e6,
-    "GPa": 1e9,
-    "rad": 1.0,
-    "deg": math.pi / 180.0,
-}
+UNITS = dict.fromkeys(("-", "s", "N", "m", "Pa", "rad"), 1.0)
+UNITS |= {"mm": 1e-3, "um": 1e-6, "MPa": 1e6, "GPa": 1e9, "deg": math.pi / 180.0}
+"""SI values of the units of tables."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One compared quantity, SI; nan where there is no such value, tolerance nan: reported, not judged."""
+    """A compared quantity in SI; absent values are NaN; without a tolerance it is reported, not judged."""
 
     case: str
     quantity: str
@@ -78,7 +64,7 @@ class Row:
 
     @property
     def difference(self) -> float:
-        """Difference from the judge, relative unless ``absolute``; nan without a judge."""
+        """Difference from the value of the judge, relative unless ``absolute``; NaN without one."""
         against = {"reference": self.reference, "analytic": self.analytic}[self.judge]
         if self.absolute:
             return self.computed - against
@@ -89,12 +75,12 @@ class Row:
         """Whether the difference is within the tolerance; None if the row is not judged."""
         if math.isnan(self.tolerance):
             return None
-        return bool(abs(self.difference) <= self.tolerance)  # a nan fails
+        return bool(abs(self.difference) <= self.tolerance)  # NaN fails
 
 
 @dataclass
 class Comparison:
-    """The rows of one check, and sentences that belong under its table."""
+    """The rows of a check, and sentences below its table."""
 
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -105,7 +91,7 @@ class Comparison:
         return all(row.passed is not False for row in self.rows)
 
     def content(self, check: Check) -> dict[str, Any]:
-        """Return the comparison of a check for programs: in SI, relative differences unless absolute."""
+        """Return the comparison of a check as an object: in SI, relative differences unless absolute."""
         values = ("computed", "published", "reference", "analytic", "judge", "difference", "tolerance")
         shown = ("case", "quantity", *values, "absolute", "passed")
         return {
@@ -119,7 +105,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Check:
-    """A named check: what it shows, and how to make its comparison."""
+    """A named check, with title, text and the function that makes its comparison."""
 
     name: str
     title: str
@@ -127,23 +113,14 @@ class Check:
     run: Callable[[], Comparison]
 
 
-# ----------------------------------------------------------------------------------- what is printed
+# --- tables ---------------------------------------------------------------------------------------
 
-HEADERS = (
-    "case",
-    "quantity",
-    "published",
-    "reference",
-    "analytic",
-    "computed",
-    "difference",
-    "tolerance",
-    "",
-)
+_VALUES = ("published", "reference", "analytic", "computed")
+HEADERS = ("case", "quantity", *_VALUES, "difference", "tolerance", "")
 
 
 def cells_of(row: Row) -> list[str]:
-    """Return a row as texts in the order of `HEADERS`."""
+    """Return the cells of a row in the order of `HEADERS`."""
     factor = UNITS[row.unit]
     unit = "" if row.unit == "-" else row.unit.replace("um", "µm")
     known = [value for value in (row.computed, row.reference, row.analytic) if not math.isnan(value)]
@@ -163,7 +140,7 @@ def cells_of(row: Row) -> list[str]:
     return [
         row.case,
         row.quantity + (f" ({unit})" if unit else ""),
-        *map(number, (row.published, row.reference, row.analytic, row.computed)),
+        *(number(getattr(row, name)) for name in _VALUES),
         deviation(row.difference, "+.1e"),
         deviation(row.tolerance, ".0e"),
         {True: "ok", False: "FAIL", None: ""}[row.passed],
@@ -171,18 +148,19 @@ def cells_of(row: Row) -> list[str]:
 
 
 def judge_column(row: Row) -> int:
-    """Return the position of the value that judges a row among its cells; -1 if it is not judged."""
+    """Return the column of the value that judges a row; -1 if it is not judged."""
     return HEADERS.index(row.judge) if row.passed is not None else -1
 
 
 def show(check: Check, comparison: Comparison) -> None:
     """Print a check as a table for terminals."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    screen = Console(highlight=False)
+    from .tables import console
+
+    screen = console()
     screen.width = max(screen.width, 150)  # a narrow terminal wraps lines, it does not lose digits
     shown = Table(
         title=Text(check.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
@@ -212,7 +190,7 @@ def main(
     output: Callable[[Check, Comparison], None] = show,
     listing: bool = False,
 ) -> int:
-    """Run checks and print what they find.
+    """Run checks and print their comparisons.
 
     Parameters
     ----------
@@ -223,7 +201,7 @@ def main(
     output : callable
         Prints a check with its comparison.
     listing : bool
-        Only list the checks.
+        List the checks without running them.
 
     Returns
     -------
@@ -233,7 +211,7 @@ def main(
     Raises
     ------
     DeckError
-        If there is no check of some name.
+        If there is no check of a name.
     """
     chosen = _chosen(names, self_test() if checks is None else checks)
     if listing:
@@ -253,13 +231,13 @@ def main(
 
 
 def _chosen(names: Sequence[str], known: Mapping[str, Check]) -> list[Check]:
-    """Return the checks of these names, all if there are none."""
+    """Return the checks of some names, all checks without names."""
     if unknown := [name for name in names if name not in known]:
         raise DeckError(f"verify has no check {unknown[0]!r}; expected one of {', '.join(known)}")
     return [known[name] for name in names] if names else list(known.values())
 
 
-# ------------------------------------------------------------------------------- the self-test
+# --- the self-test --------------------------------------------------------------------------------
 
 
 @functools.cache
@@ -273,7 +251,7 @@ def self_test() -> dict[str, Check]:
 
 
 def _solve(entry: Mapping[str, Any]) -> Comparison:
-    """Run a deck and compare the history of its result with the values beside it."""
+    """Run a deck and compare the history of its result with the values of its entry."""
     from ..case import Case
 
     history = Case.from_text(entry["deck"]).run().dataset

@@ -6,11 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from . import _core
-
-Array = NDArray[np.float64]
 
 flat = _core.hc_f2py_analytic
 axisymmetric = _core.hc_f2py_axisymmetric
@@ -19,12 +17,13 @@ axisymmetric = _core.hc_f2py_axisymmetric
 def at_points(
     procedure: Callable[..., Any], contact: tuple[float, ...], points: Sequence[Array], *others: float
 ) -> Array:
-    """Evaluate a contact at all points; the result has their shape behind that of one value.
+    """Evaluate a contact at points; the result has the shape of one value, then that of the points.
 
     Parameters
     ----------
     procedure : callable
-        One of `flat`: of the components of a contact, the coordinates of points, and other numbers.
+        One of `flat`, a function of the components of a contact, the coordinates of points, and other
+        numbers.
     contact : tuple of float
         Components of the contact.
     points : sequence of ndarray

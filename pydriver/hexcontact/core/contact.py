@@ -1,51 +1,42 @@
-"""The compiled core as Python objects: arrays are checked here, failures become exceptions.
-
-Nothing is computed in this module, and nothing below it knows Python.
-"""
+"""The compiled core as Python objects, with checks of arrays and exceptions for failures."""
 
 from __future__ import annotations
 
-import weakref
+import warnings
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import integer, number, reals, word
-from ..errors import ConvergenceError, DeckError, HexcontactError, ResourceError
-from . import _core, kernel_cache
+from ..arrays import Array, Mask, integer, number, reals, word
+from ..errors import DeckError, RimWarning
+from . import _core
+from .calls import Handle, called
 from .lattice import Lattice
 
 _api = _core.hc_f2py_normal
 
 Method = Literal["direct", "fft"]
-MOST_IN_CONTACT = 10**8  # nodes of which memory is asked; the square of more would overflow, and fits nowhere
+Interface = tuple[float, float, float]
+"""Coefficient c (Pa/m^m) and exponent m of an interface, p = c (-gap)^m, and the stiffness (Pa/m) of its
+tangential springs, 0 without."""
+UNILATERAL: Interface = (0.0, 0.0, 0.0)  # bodies that do not penetrate
+MOST_IN_CONTACT = 10**8  # largest number of nodes for estimates of memory, whose square does not overflow
+_SHAPE = " (rows, columns)"
 _METHODS = {"direct": 0, "fft": 1}
 _STOPPED = (  # in the order of fortran/contact_state.f90
     "nothing was solved",
-    "",  # within the tolerance
+    "",  # converged
     "all iterations that are allowed were made",
     "no iteration brings the residuals further down",
     "no node sticks, and a load cannot be carried",
     "the contact reaches the rim of the window before the end of the step",
     "numbers are not finite",
 )
-_ERRORS: dict[int, type[HexcontactError]] = {
-    1: DeckError,
-    2: ConvergenceError,
-    3: ResourceError,
-    4: HexcontactError,
-}
 
 
-def raise_for(code: int, message: bytes) -> None:
-    """Raise the exception that belongs to a status of the core; 0 means success."""
-    if code:
-        raise _ERRORS.get(code, HexcontactError)(message.decode().strip())
-
-
-def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
+def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> Array:
     """Return finite values over the window as one contiguous vector."""
     array = np.ascontiguousarray(shaped(values, lattice, name))
     if not np.isfinite(array).all():
@@ -53,21 +44,24 @@ def checked_field(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.
     return array.ravel()
 
 
-def checked_mask(candidate: ArrayLike | None, lattice: Lattice) -> NDArray[np.bool_]:
+def checked_interface(interface: Interface) -> Array:
+    """Return the three numbers of an interface as an array."""
+    numbers = reals(interface, "interface")
+    if numbers.shape != (3,):
+        raise DeckError(f"interface = {interface!r}: expected a coefficient, an exponent and a stiffness")
+    return numbers
+
+
+def checked_mask(candidate: ArrayLike | None, lattice: Lattice) -> Mask:
     """Return the nodes that may touch; None means all."""
-    mask = np.ones(lattice.shape, dtype=bool) if candidate is None else reals(candidate, "candidate") != 0
-    if mask.shape != lattice.shape:
-        raise DeckError(
-            f"candidate: an array of shape {mask.shape}, expected {lattice.shape} (rows, columns)"
-        )
-    return mask
+    if candidate is None:
+        return np.ones(lattice.shape, dtype=bool)
+    return reals(candidate, "candidate", lattice.shape, _SHAPE) != 0
 
 
-def shaped(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64]:
-    """Return values over the window, whatever they are; of an xarray.DataArray x and y must be its nodes."""
-    array = reals(values, name)
-    if array.shape != lattice.shape:
-        raise DeckError(f"{name}: an array of shape {array.shape}, expected {lattice.shape} (rows, columns)")
+def shaped(values: ArrayLike, lattice: Lattice, name: str) -> Array:
+    """Return values over the window; x and y of an xarray.DataArray must be those of the nodes."""
+    array = reals(values, name, lattice.shape, _SHAPE)
     labeled: Any = values if hasattr(values, "coords") else None
     for key in ("x", "y"):
         if labeled is not None and key in labeled.coords:
@@ -78,10 +72,8 @@ def shaped(values: ArrayLike, lattice: Lattice, name: str) -> NDArray[np.float64
 
 
 def checked_tolerance(tolerance: float) -> None:
-    """Refuse what can be no bound of residuals."""
-    kind = "a number between 0 and 1"
-    if not 0 < number(tolerance, "tolerance", kind) < 1:
-        raise DeckError(f"tolerance = {tolerance!r}: expected {kind}")
+    """Refuse a bound of residuals that is not between 0 and 1."""
+    number(tolerance, "tolerance", "a number between 0 and 1", lambda found: 0 < found < 1)
 
 
 def method_code(name: str) -> int:
@@ -90,12 +82,12 @@ def method_code(name: str) -> int:
 
 
 def thread_count(threads: int) -> int:
-    """Return a number of threads as the core takes it; the core knows how many there may be."""
+    """Return a number of threads; the core checks its bounds."""
     return integer(threads, "threads", "an integer of at least 0")
 
 
 def why_stopped(code: int) -> str:
-    """Say in words why a solver stopped short of the tolerance; empty if it met it."""
+    """Return the reason why a solver stopped above the tolerance; empty if it converged."""
     return _STOPPED[code]
 
 
@@ -148,13 +140,12 @@ class ElasticPair:
             A number out of its range, or two rigid bodies.
         """
         bodies = [(young_modulus_1, poisson_ratio_1), (young_modulus_2, poisson_ratio_2)]
-        rigid = [young is None for young, _ in bodies]
-        constants, code, message = _api.elastic_constants(
+        constants = called(
+            _api.elastic_constants,
             [0.0 if young is None else number(young, "young_modulus") for young, _ in bodies],
             [0.0 if poisson is None else number(poisson, "poisson_ratio") for _, poisson in bodies],
-            rigid,
+            [young is None for young, _ in bodies],
         )
-        raise_for(code, message)
         return cls(*constants.tolist())
 
     @property
@@ -172,13 +163,13 @@ class ElasticPair:
         """Ratio of the additional tangential to the normal compliance."""
         return self.lambda_5 / self.lambda_1
 
-    def as_array(self) -> NDArray[np.float64]:
+    def as_array(self) -> Array:
         """Return the three constants as an array [1/Pa]."""
         return np.array([self.lambda_1, self.lambda_2, self.lambda_5])
 
 
-class FlexibilityOperator:
-    """Tractions on the lattice to relative surface displacements.
+class FlexibilityOperator(Handle):
+    """Operator from tractions on the lattice to relative surface displacements.
 
     Parameters
     ----------
@@ -189,23 +180,17 @@ class FlexibilityOperator:
     method
         ``"fft"`` for convolutions, ``"direct"`` for an explicit matrix.
     threads
-        Threads to use; 0: as many as OpenMP would take.
+        Threads to use; 0: the default of OpenMP.
     """
 
     def __init__(self, lattice: Lattice, pair: ElasticPair, method: Method = "fft", threads: int = 0) -> None:
         self.lattice = lattice
-        extent = [lattice.n_col, lattice.n_row]
-        kernel_cache.take_settings()
-        self._handle, code, message = _api.create_operator(
-            method_code(method), lattice.basis.T, extent, pair.as_array(), thread_count(threads)
-        )
-        raise_for(code, message)
-        weakref.finalize(self, _api.free_handle, self._handle)
-        kernel_cache.warn_of_faults()
+        where = method_code(method), lattice.basis.T, lattice.extent
+        self._create(_api.create_operator, *where, pair.as_array(), thread_count(threads))
 
     def apply(
         self, pressure: ArrayLike, traction_x: ArrayLike | None = None, traction_y: ArrayLike | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array]:
         """Return the closing of the gap and the displacement of body 1 over body 2 along x and y.
 
         Parameters
@@ -224,14 +209,12 @@ class FlexibilityOperator:
             checked_field(zero if value is None else value, self.lattice, name)
             for name, value in named.items()
         ]
-        traction = np.array(columns).T
-        displacement, code, message = _api.apply_operator(self._handle, traction)
-        raise_for(code, message)
+        displacement = called(_api.apply_operator, self._handle, np.array(columns).T)
         w, s_x, s_y = (column.reshape(self.lattice.shape) for column in displacement.T)
         return w, s_x, s_y
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class NormalSolution:
     """Solution of a frictionless contact problem, with its residuals.
 
@@ -250,29 +233,60 @@ class NormalSolution:
     touches_rim
         There is contact at the rim of the window; a larger window may have another solution.
     stopped
-        Why the solver stopped, in words; empty if it converged.
+        Reason why the solver stopped; empty if it converged.
     sweeps
-        Active sets that were tried on the finest lattice.
+        Active sets on the finest lattice.
     operator_applications
         All work, coarse lattices and preconditioner included, in applications of the full 3x3 operator.
     """
 
-    pressure: NDArray[np.float64]
-    gap: NDArray[np.float64]
+    pressure: Array
+    gap: Array
     zone: NDArray[np.int8]
-    normal_load: float
-    approach: float
-    residual_normal: float
-    residual_force: float
-    converged: bool
-    sweeps: int
-    operator_applications: float
+    normal_load: float = 0.0
+    approach: float = 0.0
+    residual_normal: float = 0.0
+    residual_force: float = 0.0
+    converged: bool = True
     touches_rim: bool = False
+    sweeps: int = 0
+    operator_applications: float = 0.0
     stopped: str = ""
 
 
-class NormalContact:
-    """A frictionless contact problem; `solve` may be called for many loads.
+class Contact(Handle):
+    """A contact problem of the core: its lattice, initial gap, and nodes that can touch."""
+
+    def __init__(
+        self,
+        lattice: Lattice,
+        pair: ElasticPair,
+        initial_gap: ArrayLike,
+        candidate: ArrayLike | None,
+        rim_warning: bool,
+    ) -> None:
+        self.lattice, self._pair, self._rim_warning = lattice, pair, rim_warning
+        self._mask = checked_mask(candidate, lattice)
+        self._gap = shaped(initial_gap, lattice, "initial_gap")
+
+    @property
+    def _surfaces(self) -> tuple[Array, ...]:
+        """Materials, gap and nodes that can touch, as the core takes them; the gap of others is 0."""
+        gap = checked_field(np.where(self._mask, self._gap, 0.0), self.lattice, "initial_gap")
+        return self._pair.as_array(), gap, self._mask.ravel().astype(np.int32)
+
+    def _warn_of_rim(self, found: NormalSolution) -> None:
+        """Warn of contact at the rim of the window, unless the bodies end there: all nodes touch that can."""
+        if not (self._rim_warning and found.converged and found.touches_rim):
+            return
+        if not self._mask.all() and (found.zone[self._mask] > 0).all():
+            return
+        words = "contact at the rim of the window (touches_rim): a larger window may have another solution"
+        warnings.warn(words, RimWarning, stacklevel=3)
+
+
+class NormalContact(Contact):
+    """A frictionless contact problem, which `solve` solves for any number of loads.
 
     Parameters
     ----------
@@ -283,11 +297,17 @@ class NormalContact:
     initial_gap
         Gap before loading, shape ``(n_row, n_col)`` [m].
     candidate
-        False where a node can never touch, shape ``(n_row, n_col)``; default: all may.
+        False where a node cannot touch, shape ``(n_row, n_col)``; default: all can.
     method
         ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
     threads
-        Threads to use; 0: as many as OpenMP would take.
+        Threads to use; 0: the default of OpenMP.
+    interface
+        Coefficient c [Pa/m^m] and exponent m of a compliant interface, p = c (-gap)^m, and the stiffness of
+        its tangential springs [Pa/m], 0 without them; default: bodies do not penetrate.
+    rim_warning
+        Warn (`hexcontact.RimWarning`) of a solution with contact at the rim of the window, unless all
+        nodes touch that can and others cannot: the body ends there, like a punch.
     """
 
     def __init__(
@@ -298,28 +318,19 @@ class NormalContact:
         candidate: ArrayLike | None = None,
         method: Method = "fft",
         threads: int = 0,
+        *,
+        rim_warning: bool = True,
+        interface: Interface = UNILATERAL,
     ) -> None:
-        self.lattice = lattice
-        mask = checked_mask(candidate, lattice)
-        # nodes that can never touch may have any gap, also none at all
-        given = shaped(initial_gap, lattice, "initial_gap")
-        gap = np.where(mask, given, 0.0)
-        self._mask = mask
-        self._outside = given[~mask]
-        kernel_cache.take_settings()
-        self._handle, code, message = _api.create_normal_contact(
-            method_code(method),
-            lattice.basis.T,
-            [lattice.col_first, lattice.row_first],
-            [lattice.n_col, lattice.n_row],
-            pair.as_array(),
-            checked_field(gap, lattice, "initial_gap"),
-            mask.ravel().astype(np.int32),
+        super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
+        where = method_code(method), lattice.basis.T, lattice.first, lattice.extent
+        self._create(
+            _api.create_normal_contact,
+            *where,
+            *self._surfaces,
+            checked_interface(interface),
             thread_count(threads),
         )
-        raise_for(code, message)
-        weakref.finalize(self, _api.free_handle, self._handle)
-        kernel_cache.warn_of_faults()
 
     def solve(
         self,
@@ -340,40 +351,28 @@ class NormalContact:
         tolerance
             Bound of the residuals.
         max_sweeps
-            Iterations that may be made on each lattice (direct: active sets).
+            Iterations on each lattice at most (direct: active sets).
 
         Returns
         -------
         NormalSolution
-            Look at ``converged``: a solution that is not is returned, too.
+            Check ``converged``, since other solutions are returned, too, and ``touches_rim``.
         """
         if (normal_load is None) == (approach is None):
             raise DeckError("expected either a normal load or an approach")
         if normal_load is not None:
             kind = "a number not below zero"
-            target = number(normal_load, "normal_load", kind)
-            if not 0 <= target < np.inf:
-                raise DeckError(f"normal_load = {normal_load!r}: expected {kind}")
+            control, target = 1, number(normal_load, "normal_load", kind, lambda load: 0 <= load < np.inf)
         else:
-            target = number(approach, "approach")
-            if not np.isfinite(target):
-                raise DeckError(f"approach = {approach!r}: expected a number")
+            control, target = 2, number(approach, "approach", fits=np.isfinite)
         checked_tolerance(tolerance)
-        out: Any = _api.solve_normal_contact(
-            self._handle,
-            1 if approach is None else 2,
-            target,
-            tolerance,
-            integer(max_sweeps, "max_sweeps"),
-            self.lattice.size,
-        )
-        pressure, gap, zone, load, delta, residuals, sweeps, work, flags, code, message = out
-        kernel_cache.warn_of_faults()
-        raise_for(code, message)
+        limits = tolerance, integer(max_sweeps, "max_sweeps"), self.lattice.size
+        out = self._solve(_api.solve_normal_contact, control, target, *limits)
+        pressure, gap, zone, load, delta, residuals, sweeps, work, flags = out
         shape = self.lattice.shape
         gap = gap.reshape(shape)
-        gap[~self._mask] += self._outside
-        return NormalSolution(
+        gap[~self._mask] += self._gap[~self._mask]
+        solution = NormalSolution(
             pressure=pressure.reshape(shape),
             gap=gap,
             zone=zone.reshape(shape).astype(np.int8),
@@ -387,6 +386,8 @@ class NormalContact:
             touches_rim=bool(flags[1]),
             stopped=why_stopped(flags[2]),
         )
+        self._warn_of_rim(solution)
+        return solution
 
 
 def memory_needed(
@@ -398,7 +399,7 @@ def memory_needed(
     part: Literal["problem", "operator", "set-up of the operator"] = "problem",
     threads: int = 1,
 ) -> int:
-    """Return the bytes that a frictionless problem takes on a window of the given size.
+    """Return the memory (bytes) of a frictionless problem on a window.
 
     Parameters
     ----------
@@ -409,11 +410,17 @@ def memory_needed(
     contact
         Nodes in contact; default: all.
     part
-        The whole problem; the full 3x3 flexibility operator alone; or what that takes besides at its set-up.
+        The whole problem; the full 3x3 flexibility operator; or the additional memory of its set-up.
     threads
-        Threads that will be used.
+        Number of threads.
     """
     code = ("problem", "operator", "set-up of the operator").index(part)
+    window = window_size(method, n_row, n_col, contact)
+    return int(_api.memory_needed(*window, code, thread_count(threads)))
+
+
+def window_size(method: str, n_row: int, n_col: int, contact: int | None) -> tuple[int, list[int], int]:
+    """Return method, extent and number of nodes in contact as the core takes them."""
     extent = [integer(n_col, "n_col"), integer(n_row, "n_row")]
     nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
-    return int(_api.memory_needed(method_code(method), extent, nodes, code, thread_count(threads)))
+    return method_code(method), extent, nodes

@@ -1,6 +1,6 @@
-"""Edges of contact and stick areas between the nodes, as the core finds them.
+"""Edges of contact and stick areas between the nodes, by the core.
 
-How tractions vanish there tells the distance of a node from the edge: see fortran/contact/contact_edges.f90.
+The distance of a node from the edge follows from the decay of tractions: fortran/measures/contact_edges.f90.
 Lattice arrays have shape (n_row, n_col).
 """
 
@@ -11,13 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array, Mask
 from . import _core
-from .contact import raise_for
+from .calls import called
+from .contact import ElasticPair
+from .estimators import Ellipse
 
-_api = _core.hc_f2py_measures
+_api = _core.hc_f2py_edges
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+_Zone = tuple[Array, NDArray[np.int32], bool]  # fields and zones of the core; whether it is the stick area
 
 
 @dataclass(frozen=True)
@@ -33,14 +35,46 @@ class Edge:
     length : float
         Length of the edge, m.
     segments : ndarray, shape (n, 2, 2)
-        Pieces of the edge, each from a point to a point (m), in no order; none where the zone ends at nodes
-        that can never touch.
+        Unordered pieces of the edge, each from a point to a point (m); none where the zone ends at nodes that
+        cannot touch.
+    ellipse : Ellipse
+        Ellipse with the second moments of the area; of an elliptic area it is the edge.
     """
 
     area: float
     radius: float
     length: float
     segments: Array
+    ellipse: Ellipse
+
+
+@dataclass(frozen=True)
+class ZoneMesh:
+    """Triangles that fill an area of the plane up to its edge between the nodes, and a field there.
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,)
+        Corners, m.
+    values : ndarray, shape (n,)
+        The field there.
+    triangles : ndarray of int, shape (m, 3)
+        Corners of each triangle, counterclockwise.
+    """
+
+    x: Array
+    y: Array
+    values: Array
+    triangles: NDArray[np.intp]
+
+    def outlines(self) -> list[Array]:
+        """Return closed polygons of shape (n, 2), m, counterclockwise around the area."""
+        if not self.triangles.size:
+            return []
+        corners, number, count = _core.hc_f2py_lattice.outline_of_zone(self.triangles.T + 1, self.x.size)
+        points = np.stack([self.x, self.y], axis=1)[corners[:count] - 1]
+        polygons = np.split(points, np.flatnonzero(np.diff(number[:count])) + 1)
+        return [np.append(polygon, polygon[:1], axis=0) for polygon in polygons]
 
 
 class ContactEdges:
@@ -51,12 +85,12 @@ class ContactEdges:
     pressure : ndarray, shape (n_row, n_col)
         Contact pressure, Pa.
     gap : ndarray, shape (n_row, n_col)
-        Gap, m; what stands at nodes that can never touch does not matter.
+        Gap, m; that of nodes that cannot touch has no effect.
     contact : ndarray of bool, shape (n_row, n_col)
         Nodes in contact.
     candidate : ndarray of bool, shape (n_row, n_col)
         Nodes that can touch. Where a contact ends at others, as at the rim of a punch, its pressure does not
-        vanish; there the cells of its nodes count.
+        vanish, and its edge is that of the cells of its nodes.
     basis : ndarray, shape (2, 2)
         Basis vectors of the (equilateral) lattice as rows, m.
     start : tuple of float
@@ -73,13 +107,11 @@ class ContactEdges:
         start: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self._basis, self._start = basis.T, start
-        # converted once: the core takes zones as integers
-        self._fields = pressure.T, gap.T, contact.T.astype(np.int32), candidate.T.astype(np.int32)
+        self._fields, self._zones = (pressure, gap), (contact, candidate)
 
     def contact(self) -> Edge:
         """Return the contact area."""
-        pressure, _, contact, _ = self._fields
-        return self._edge(False, contact, pressure)
+        return self._edge(self._whole())
 
     def stick(self, stick: Mask, reserve: Array) -> Edge:
         """Return the part of the contact area that sticks.
@@ -89,31 +121,95 @@ class ContactEdges:
         stick : ndarray of bool, shape (n_row, n_col)
             Nodes that stick, all in contact.
         reserve : ndarray, shape (n_row, n_col)
-            What friction could carry beyond the shear traction, mu p - |q| (Pa); only its values at
-            these nodes matter.
+            Reserve of friction beyond the shear traction, mu p - |q| (Pa), at these nodes.
         """
-        return self._edge(True, stick.T.astype(np.int32), reserve.T)
+        return self._edge(self._zone(stick, reserve, True))
+
+    def contact_mesh(self, field: Array, vanishes: bool) -> ZoneMesh:
+        """Return a mesh of the contact area, with a field up to its edge.
+
+        Parameters
+        ----------
+        field : ndarray, shape (n_row, n_col)
+            Values at the nodes in contact.
+        vanishes : bool
+            Whether it is zero at the edge, like tractions; else it is linear from the nodes inside.
+        """
+        return self._mesh(self._whole(), field, vanishes)
+
+    def stick_mesh(self, stick: Mask, reserve: Array) -> ZoneMesh:
+        """Return a mesh of the part of the contact area that sticks, see `stick`."""
+        return self._mesh(self._zone(stick, reserve, True), reserve, False)
+
+    def contact_distances(self) -> Array:
+        """Return the distances of the nodes from the edge of the contact, in spacings, positive inside."""
+        return self._distances(self._whole())
+
+    def stick_distances(self, stick: Mask, reserve: Array) -> Array:
+        """Return the distances of the nodes from the edge of the part that sticks, see `stick`."""
+        return self._distances(self._zone(stick, reserve, True))
 
     def squares(self) -> Array:
-        """Return squares of the pressure (Pa^2) that are good to interpolate linearly, shape (n_row, n_col).
+        """Return squares of the pressure (Pa^2) for linear interpolation, shape (n_row, n_col).
 
-        At nodes in contact the layer of the lattice next to the edge is taken off; beyond the edge the
-        squares go on below zero. They are NaN away from the edge, and where nothing is known about it.
+        At nodes in contact the layer of the lattice next to the edge is subtracted; beyond the edge the
+        squares are negative. They are NaN away from the edge, and where it is unknown.
         """
-        squares, code, message = _api.pressure_squares(self._basis, *self._fields)
-        raise_for(code, message)
-        return np.asarray(squares.T)
+        fields, zones, _ = self._whole()
+        return np.asarray(called(_api.pressure_squares, self._basis, fields, zones).T)
 
-    def _edge(self, of_stick: bool, zone: NDArray[np.int32], reserve: Array) -> Edge:
-        numbers, segments, count, code, message = _api.edge_of_zone(
-            self._basis,
-            self._start,
-            *self._fields,
-            of_stick,
-            zone,
-            reserve,
-            _api.count_cut_triangles(zone),
+    def tractions(self, shear: Array, stick: Mask, friction: Array, pair: ElasticPair) -> Array:
+        """Return pressure and shear tractions corrected at the edges of the contact and of the stick area.
+
+        Parameters
+        ----------
+        shear : ndarray, shape (2, n_row, n_col)
+            Shear traction along x and y, Pa.
+        stick : ndarray of bool, shape (n_row, n_col)
+            Nodes that stick, all in contact.
+        friction : ndarray, shape (n_row, n_col)
+            Coefficient of friction; unless it is positive and finite, the shear traction does not change.
+        pair : ElasticPair
+            The two bodies.
+
+        Returns
+        -------
+        ndarray, shape (3, n_row, n_col)
+            With the loads of the nodal tractions, Pa. Nodes next to the edge but outside carry small values.
+        """
+        pressure, gap = self._fields
+        _, zones, _ = self._zone(stick, gap, True)
+        given = np.stack([pressure, *shear]).T
+        lambdas = pair.as_array()
+        return np.asarray(
+            called(_api.tractions_to_edges, self._basis, lambdas, gap.T, zones, friction.T, given, 0).T
         )
-        raise_for(code, message)
-        area, radius, length = numbers.tolist()
-        return Edge(area, radius, length, segments.T[:count])
+
+    def _whole(self) -> _Zone:
+        return self._zone(self._zones[0], self._fields[0], False)
+
+    def _zone(self, nodes: Mask, reserve: Array, sticks: bool) -> _Zone:
+        fields, zones = np.stack([*self._fields, reserve]), np.stack([*self._zones, nodes])
+        return fields.T, zones.T.astype(np.int32), sticks
+
+    def _edge(self, zone: _Zone) -> Edge:
+        numbers, segments, count = called(
+            _api.edge_of_zone,
+            *(self._basis, self._start, *zone),
+            _api.count_cut_triangles(zone[1][..., 2]),
+        )
+        area, radius, length, major, minor, angle, x, y = numbers.tolist()
+        return Edge(area, radius, length, segments.T[:count], Ellipse(major, minor, angle, (x, y)))
+
+    def _mesh(self, zone: _Zone, field: Array, vanishes: bool) -> ZoneMesh:
+        inside = zone[1][..., 2]
+        nodes, cut = int(inside.sum()), _api.count_cut_triangles(inside)
+        room = nodes + 3 * cut, 2 * nodes + 3 * cut  # a cut triangle has at most three points and parts
+        points, values, triangles, (n_point, n_triangle) = called(
+            _api.mesh_of_zone, self._basis, self._start, *zone, field.T, vanishes, *room
+        )
+        x, y = points[:, :n_point]
+        return ZoneMesh(x, y, values[:n_point], triangles.T[:n_triangle].astype(np.intp) - 1)
+
+    def _distances(self, zone: _Zone) -> Array:
+        return np.asarray(called(_api.distances_of_zone, self._basis, *zone).T)

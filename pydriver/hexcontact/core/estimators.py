@@ -1,4 +1,4 @@
-"""Size and shape of a contact or stick zone from its nodes, and errors of lattices, as the core finds them.
+"""Size and shape of a contact or stick zone from its nodes, and errors of lattices, by the core.
 
 Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i+-1), (j+-1, i), (j+-1, i-+1).
 """
@@ -8,15 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array, Mask
 from . import _core
-from .contact import raise_for
+from .calls import called
 
 _api = _core.hc_f2py_measures
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class Ellipse:
 
 
 def boundary(zone: Mask) -> Mask:
-    """Nodes of ``zone`` that have a neighbor outside it (or outside the window)."""
+    """Return the nodes of ``zone`` with a neighbor outside it (or outside the window)."""
     return np.asarray(_api.zone_boundary(zone.T) != 0).T
 
 
@@ -82,14 +79,14 @@ def boundary_circle(
 
 
 def area_radius(zone: Mask, cell_area: float) -> float:
-    """Radius (m) of the circle with as much area as the cells of the nodes in ``zone``; cell area in m^2."""
+    """Return the radius (m) of the circle with the area of the cells of a zone; cell area in m^2."""
     return float(_api.radius_of_area(np.count_nonzero(zone), cell_area))
 
 
 def edge_radius(
     x: Array, y: Array, pressure: Array, spacing: float, center: tuple[float, float] = (0.0, 0.0)
 ) -> float:
-    """Radius at which the pressure vanishes, to a fraction of the spacing.
+    """Return the radius at which the pressure vanishes, to a fraction of the spacing.
 
     Near the edge p^2 is linear in r^2 (p grows like the square root of the distance). A straight line through
     the nodes with a_A - 6 l_e <= r <= a_A - l_e gives the zero; the outermost nodes, which carry most of the
@@ -121,7 +118,7 @@ def pressure_center(x: Array, y: Array, pressure: Array) -> tuple[float, float]:
 
 
 def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
-    """Ellipse with the second moments of the nodes of a zone (a uniform ellipse has variance a^2/4 along a).
+    """Return the ellipse with the second moments of the nodes of a zone (variance a^2/4 along a).
 
     Parameters
     ----------
@@ -138,7 +135,7 @@ def moment_ellipse(x: Array, y: Array, zone: Mask) -> Ellipse:
 
 
 def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse:
-    """Ellipse on which the pressure vanishes, to a fraction of the spacing.
+    """Return the ellipse on which the pressure vanishes, to a fraction of the spacing.
 
     The square of the pressure is a quadratic polynomial near the edge; it is fitted to the nodes between
     1 - 6 l_e/b and 1 - l_e/b of the way from the center to the moment ellipse with the minor semi-axis b.
@@ -161,16 +158,16 @@ def edge_ellipse(x: Array, y: Array, pressure: Array, spacing: float) -> Ellipse
     ValueError
         If there are fewer than six nodes to fit, or the fit is no ellipse.
     """
-    numbers, code, message = _api.ellipse_of_pressure(x.T, y.T, pressure.T, spacing)
-    raise_for(code, message)
-    return _ellipse(numbers)
+    return _ellipse(called(_api.ellipse_of_pressure, x.T, y.T, pressure.T, spacing))
 
 
-def limits_of_error(spacings: Array, values: Array) -> Array:
-    """Estimate how far values on the first, finest lattice are from their limit for a vanishing spacing.
+def limits_of_error(
+    spacings: Array, values: Array, rough: Mask | None = None, unresolved: Mask | None = None
+) -> Array:
+    """Estimate the error of values on the first, finest lattice against their limit for a vanishing spacing.
 
     A trend c h^p with p from 1 to 2 and a scatter in proportion to h are fitted: docs/theory/error_bars.md,
-    (A1), (A2).
+    (A1) to (A3).
 
     Parameters
     ----------
@@ -178,15 +175,92 @@ def limits_of_error(spacings: Array, values: Array) -> Array:
         Spacings in units of the first.
     values : ndarray, (n, m)
         m quantities, on each of the lattices.
+    rough : ndarray of bool, (m,), optional
+        Quantities that depend on a few nodes at the edge of a zone: an order of 1/2 is possible, too.
+    unresolved : ndarray of bool, (m,), optional
+        Quantities that depend on a slip zone narrower than the lattice resolves: still slower orders are.
 
     Returns
     -------
     ndarray, (m,)
-        What hardly any error exceeds; NaN where a value is.
+        Bounds that hardly any error exceeds; NaN for NaN.
     """
-    errors, code, message = _api.errors_of_limits(spacings, values)
-    raise_for(code, message)
-    return np.asarray(errors)
+    rough, unresolved = (
+        np.zeros(values.shape[1], dtype=bool) if mask is None else mask for mask in (rough, unresolved)
+    )
+    return np.asarray(called(_api.errors_of_limits, spacings, values, rough, unresolved))
+
+
+def unresolved_slip_zones(
+    spacing: float, contact_area: Array, stick_area: Array, max_traction: Array, max_pressure: Array
+) -> Mask:
+    """Test whether the slip zones of load steps are narrower than the lattice resolves.
+
+    Parameters
+    ----------
+    spacing : float
+        Spacing (m).
+    contact_area, stick_area : ndarray, (n,)
+        Areas to the edge between the nodes (m2).
+    max_traction, max_pressure : ndarray, (n,)
+        Largest shear tractions and pressures (Pa).
+    """
+    areas, tractions = (contact_area, stick_area), (max_traction, max_pressure)
+    return np.asarray(called(_api.unresolved_slip_zones, spacing, *areas, *tractions)) != 0
+
+
+LATTICE_ERRORS = ("max_pressure", "contact_area", "stick_area", "dissipated_energy")
+
+
+def expected_lattice_errors(spacings: float, load_ratio: float, goal: float) -> tuple[Array, float]:
+    """Estimate the largest relative errors of a lattice; docs/theory/expected_errors.md, (X1), (X2).
+
+    Parameters
+    ----------
+    spacings : float
+        Spacings in the radius.
+    load_ratio : float
+        Tangential load Q/mu P; 0: nothing slips.
+    goal : float
+        Target of the error.
+
+    Returns
+    -------
+    errors : ndarray, (4,)
+        Of `LATTICE_ERRORS`.
+    needed : float
+        Spacings for the goal.
+    """
+    errors, needed = _core.hc_f2py_steps.errors_of_lattice(spacings, load_ratio, goal)
+    return np.asarray(errors), float(needed)
+
+
+def expected_entry_error(
+    before: Array, after: Array, stick: float, load_ratio: float | None, goal: float
+) -> tuple[float, float, float]:
+    """Estimate the error of the shear tractions by nodes that enter a growing contact, (X3)-(X5).
+
+    Parameters
+    ----------
+    before, after : ndarray, (n,)
+        Contact radius (m) before and after each of the load steps in which it grows.
+    stick : float
+        mu/abs(beta); 0: the materials are alike.
+    load_ratio : float or None
+        Q/mu P of a tangential load that grows at the same time.
+    goal : float
+        Target of the error.
+
+    Returns
+    -------
+    error, steps, needed : float
+        The error as a share of all shear tractions; effective number of steps; number for the goal.
+    """
+    ratio = -1.0 if load_ratio is None else load_ratio
+    steps, error, needed = _core.hc_f2py_steps.errors_of_entry(
+        before, after, min(stick, np.finfo(float).max), ratio, goal
+    )
+    return float(error), float(steps), float(needed)
 
 
 def _ellipse(numbers: Array) -> Ellipse:

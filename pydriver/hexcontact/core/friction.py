@@ -1,54 +1,95 @@
-"""The compiled frictional contact as Python objects; arrays are checked here, failures become exceptions.
-
-Nothing is computed in this module.
-"""
+"""The compiled frictional contact as Python objects, with checks of arrays and exceptions for failures."""
 
 from __future__ import annotations
 
 import dataclasses
-import weakref
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import integer, number, reals, word
+from ..arrays import Array, has_entries, integer, number, reals, word
 from ..errors import DeckError
-from ..variables import CORE
-from . import _core, kernel_cache
+from ..variables import BULK_STRAIN, CORE
+from . import _core
+from .calls import called
 from .contact import (
-    MOST_IN_CONTACT,
+    UNILATERAL,
+    Contact,
     ElasticPair,
+    Interface,
     Method,
+    NormalSolution,
     checked_field,
-    checked_mask,
+    checked_interface,
     checked_tolerance,
     method_code,
-    raise_for,
     shaped,
     thread_count,
     why_stopped,
+    window_size,
 )
 from .lattice import Lattice
 
 _api = _core.hc_f2py_friction
 
-Array = NDArray[np.float64]
 Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS, _NUMBERS, _RESIDUALS = (CORE[name] for name in ("fields", "numbers", "residuals"))
+MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
+"""Motions of the remote parts, in the order of the core."""
 
 
 @dataclass(frozen=True)
-class ContactState:
-    """The end of a load step, and all that the next one needs.
+class FrictionLaw:
+    """Friction at the nodes of a window: no traction is above min(mu p^k, limit).
 
-    Arrays have the shape ``(n_row, n_col)``; the names are those of `hexcontact.variables`, where
-    each is explained.
+    Attributes
+    ----------
+    coefficient : float or ndarray, (n_row, n_col)
+        Coefficient of friction mu, everywhere or at each node; ``inf``: no slip. With a direction, the
+        geometric mean of the two coefficients.
+    shear_limit : float
+        Bound of the shear traction [Pa]; ``inf``: none. With a direction, of the geometric mean of the
+        half-axes of the ellipse.
+    power : float
+        Power k of the pressure.
+    ratio : float
+        Coefficient along a direction over that across it: the tractions that it allows are an ellipse.
+    angle : float
+        Angle of that direction from x [rad].
+    """
+
+    coefficient: float | Array
+    shear_limit: float = math.inf
+    power: float = 1.0
+    ratio: float = 1.0
+    angle: float = 0.0
+
+    def as_arguments(self) -> tuple[Array, list[float]]:
+        """Return coefficients and other numbers as the core takes them, with a largest number for inf."""
+        most = np.finfo(float).max
+        law = [min(self.shear_limit, most), self.power, self.ratio, self.angle]
+        return np.minimum(np.ravel(self.coefficient), most), law
+
+    def bound_at(self, row: int, col: int, pressure: float, traction: tuple[float, float]) -> float:
+        """Return the largest traction of a node in the direction of a given one (Pa)."""
+        mu = self.coefficient[row, col] if isinstance(self.coefficient, np.ndarray) else self.coefficient
+        turned = math.atan2(traction[1], traction[0]) - self.angle
+        length = math.hypot(math.cos(turned) / self.ratio**0.5, math.sin(turned) * self.ratio**0.5)
+        return min(float(mu) * pressure**self.power, self.shear_limit) / length
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactState(NormalSolution):
+    """The end of a load step, from which the next one starts.
+
+    Arrays have the shape ``(n_row, n_col)``; names are those of `hexcontact.variables`.
 
     Attributes
     ----------
@@ -59,67 +100,63 @@ class ContactState:
     relative_displacement_x, relative_displacement_y : ndarray
         Displacement of body 1 relative to body 2, less the rigid motion [m].
     slip_increment_x, slip_increment_y, accumulated_slip : ndarray
-        Slip of the step, and length of the slip path so far [m].
+        Slip of the step, and length of the whole slip path [m].
+    dissipation_density : ndarray
+        Dissipated energy by area [J/m2].
     zone : ndarray of int8
         0 separated, 1 stick, 2 slip.
     normal_load, tangential_load_x, tangential_load_y, torque : float
         Resultants of the tractions [N], [N m].
     approach, shift_x, shift_y, twist : float
         Rigid motions of the remote parts [m], [rad].
+    bulk_strain_xx, bulk_strain_yy, bulk_strain_xy : float
+        Bulk strain of body 1 less that of body 2.
     dissipated_energy : float
-        Energy that friction took so far [J].
+        Dissipated energy [J].
     residual_normal, residual_tangential, residual_force, residual_shear_force, residual_torque : float
         Residuals of the contact conditions and of the prescribed loads. That of the friction conditions is
-        of the slip of the whole step: if the step was halved, it may be above the tolerance.
+        for the slip of the whole step, and may be above the tolerance after halving.
     converged : bool
         All residuals are within the tolerance, in each part of a step that was halved.
     sliding : bool
-        The tangential loads are more than full sliding carries.
+        The tangential loads are larger than at full sliding.
     touches_rim : bool
         There is contact at the rim of the window, at the end of the step or of a part of it.
     stopped : str
-        Why the solver stopped, in words; empty if it converged.
+        Reason why the solver stopped; empty if it converged.
     sweeps, cuts : int
-        Active sets that were tried; times that the step was halved.
+        Number of active sets, and of halvings of the step.
     operator_applications : float
         All work of the step, in applications of the full operator.
     """
 
-    pressure: Array
     traction_x: Array
     traction_y: Array
-    gap: Array
     relative_displacement_x: Array
     relative_displacement_y: Array
     slip_increment_x: Array
     slip_increment_y: Array
     accumulated_slip: Array
-    zone: NDArray[np.int8]
-    normal_load: float = 0.0
+    dissipation_density: Array
     tangential_load_x: float = 0.0
     tangential_load_y: float = 0.0
     torque: float = 0.0
-    approach: float = 0.0
     shift_x: float = 0.0
     shift_y: float = 0.0
     twist: float = 0.0
+    bulk_strain_xx: float = 0.0
+    bulk_strain_yy: float = 0.0
+    bulk_strain_xy: float = 0.0
     dissipated_energy: float = 0.0
-    residual_normal: float = 0.0
     residual_tangential: float = 0.0
-    residual_force: float = 0.0
     residual_shear_force: float = 0.0
     residual_torque: float = 0.0
-    converged: bool = True
     sliding: bool = False
-    touches_rim: bool = False
-    sweeps: int = 0
     cuts: int = 0
-    operator_applications: float = 0.0
-    stopped: str = ""
 
 
-class FrictionalContact:
-    """A contact problem with friction; `advance` leads from one load to the next.
+class FrictionalContact(Contact):
+    """A contact problem with friction; `advance` solves the step from one load to the next.
 
     Parameters
     ----------
@@ -130,15 +167,24 @@ class FrictionalContact:
     initial_gap
         Gap before loading, shape ``(n_row, n_col)`` [m].
     candidate
-        False where a node can never touch, shape ``(n_row, n_col)``; default: all may.
+        False where a node cannot touch, shape ``(n_row, n_col)``; default: all can.
     friction_coefficient
-        Coefficient of friction, at least 0; ``inf``: no slip.
+        Coefficient of friction mu, at least 0; ``inf``: no slip; or one for each node, ``(n_row, n_col)``;
+        or a `FrictionLaw`.
+    shear_limit
+        Bound of the shear traction, which is at most ``min(mu * pressure, shear_limit)`` [Pa].
     coupling
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
     method
         ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
     threads
-        Threads to use; 0: as many as OpenMP would take.
+        Threads to use; 0: the default of OpenMP.
+    interface
+        Coefficient c [Pa/m^m] and exponent m of a compliant interface, p = c (-gap)^m, and the stiffness of
+        its tangential springs [Pa/m], 0 without them; default: bodies do not penetrate.
+    rim_warning
+        Warn (`hexcontact.RimWarning`) of a solution with contact at the rim of the window, unless all
+        nodes touch that can and others cannot: the body ends there, like a punch.
     """
 
     def __init__(
@@ -148,37 +194,26 @@ class FrictionalContact:
         initial_gap: ArrayLike,
         candidate: ArrayLike | None = None,
         *,
-        friction_coefficient: float,
+        friction_coefficient: ArrayLike | FrictionLaw,
+        shear_limit: float = math.inf,
         coupling: Coupling = "full",
         method: Method = "fft",
         threads: int = 0,
+        interface: Interface = UNILATERAL,
+        rim_warning: bool = True,
     ) -> None:
-        self.lattice = lattice
-        mask = checked_mask(candidate, lattice)
-        kind = "a number of at least 0, or inf"
-        if not number(friction_coefficient, "friction_coefficient", kind) >= 0:
-            raise DeckError(f"friction_coefficient = {friction_coefficient!r}: expected {kind}")
+        super().__init__(lattice, pair, initial_gap, candidate, rim_warning)
+        law = _checked_law(friction_coefficient, shear_limit, lattice)
         word(coupling, "coupling", ("full", "goodman"))
-        # nodes that can never touch may have any gap, also none at all
-        self._mask = mask
-        self._gap = shaped(initial_gap, lattice, "initial_gap")
-        kernel_cache.take_settings()
-        self._handle, code, message = _api.create_frictional_contact(
-            method_code(method),
-            lattice.basis.T,
-            [lattice.col_first, lattice.row_first],
-            [lattice.n_col, lattice.n_row],
-            lattice.origin,
-            pair.as_array(),
-            checked_field(np.where(mask, self._gap, 0.0), lattice, "initial_gap"),
-            mask.ravel().astype(np.int32),
-            min(friction_coefficient, np.finfo(float).max),
-            int(coupling == "goodman"),
+        self._create(
+            _api.create_frictional_contact,
+            *(method_code(method), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
+            *self._surfaces,
+            *law.as_arguments(),
+            checked_interface(interface),
+            coupling == "goodman",
             thread_count(threads),
         )
-        raise_for(code, message)
-        weakref.finalize(self, _api_free, self._handle)
-        kernel_cache.warn_of_faults()
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
@@ -193,6 +228,8 @@ class FrictionalContact:
         control: Sequence[str],
         value: Sequence[float],
         *,
+        bulk_strain: ArrayLike | None = None,
+        guess: tuple[ArrayLike, Sequence[float]] | None = None,
         static: bool = False,
         entry: Entry = "implicit",
         tolerance: float = 1e-8,
@@ -204,29 +241,34 @@ class FrictionalContact:
         Parameters
         ----------
         state
-            State to go on from; it is left as it is.
+            First state, which does not change.
         control
             ``"force"`` or ``"displacement"`` for each of z, x, y and the twist about z.
         value
             Normal load, tangential loads [N] and torque [N m], or approach, shifts [m] and twist [rad].
+        bulk_strain
+            Bulk strain xx, yy, xy of body 1 less that of body 2 at the end; default: that of `state`.
+        guess
+            Tractions on body 1, ``(3, n_row, n_col)`` [Pa], and motions (as `MOTION`) that the step is
+            likely to end with: it is tried from there first.
         static
-            The load is applied to the undeformed bodies at once; `state` only serves as a start.
+            The load is applied to the undeformed bodies at once; `state` is the first guess.
         entry
-            What the slip of a node that comes into contact counts from: ``"implicit"``: the beginning of
-            the step; ``"interpolated"``: where it stood when its gap closed. A static load knows neither.
+            Origin of the slip of a node that enters the contact: ``"implicit"``: its place at the beginning
+            of the step; ``"interpolated"``: when its gap closed. Without effect on a static load.
         tolerance
             Bound of all residuals.
         max_sweeps
-            Active sets that may be tried before a step is halved.
+            Active sets before a step is halved.
         max_cuts
-            Times that a step may be halved.
+            Halvings of a step at most.
 
         Returns
         -------
         ContactState
-            Look at ``converged`` (if not, the residuals are those of the attempt that failed, and ``stopped``
-            says why) and at ``touches_rim`` (contact at the rim of the window, where the advance ends, be it
-            in a part of the step, and is not converged: go on from the old state on a larger one).
+            Check ``converged`` (if not, the residuals are those of the failed attempt, and ``stopped`` is the
+            reason) and ``touches_rim`` (contact at the rim of the window, also in a part of the step, where
+            the advance ends without convergence: repeat it from the first state on a larger window).
         """
         known = isinstance(control, list | tuple) and len(control) == 4
         if not known or not all(isinstance(kind, str) and kind in _CONTROLS for kind in control):
@@ -236,39 +278,28 @@ class FrictionalContact:
             raise DeckError(f"value = {value!r}: expected four finite numbers")
         if control[0] == "force" and targets[0] < 0:
             raise DeckError(f"normal_load = {targets[0]:g}: expected a number not below zero")
+        kept = [getattr(state, name) for name in BULK_STRAIN]
+        strain = reals(kept if bulk_strain is None else bulk_strain, "bulk_strain", (3,))
         word(entry, "entry", ("implicit", "interpolated"))
         checked_tolerance(tolerance)
-        fields = np.empty((self.lattice.size, len(_FIELDS)), order="F")
-        for column, name in enumerate(_FIELDS):
-            values = getattr(state, name)
-            fields[:, column] = checked_field(
-                np.where(self._mask, shaped(values, self.lattice, name), 0.0) if name == "gap" else values,
-                self.lattice,
-                name,
-            )
-        numbers = [number(getattr(state, name), name) for name in _NUMBERS]
-        out: Any = _api.advance_friction(
-            self._handle,
-            [_CONTROLS[word] for word in control],
-            targets,
-            int(static),
-            int(entry == "interpolated"),
-            tolerance,
-            integer(max_sweeps, "max_sweeps"),
-            integer(max_cuts, "max_cuts"),
-            fields,
-            numbers,
+        if guess is not None:
+            traction = np.reshape(np.asarray(guess[0], dtype=float), (3, self.lattice.size))
+            called(_api.set_guess, self._handle, traction.T, [*guess[1]])
+        out = self._solve(
+            _api.advance_friction,
+            *([_CONTROLS[word] for word in control], [*targets, *strain], static, entry == "interpolated"),
+            *(tolerance, integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
+            self._columns(state),
+            [number(getattr(state, name), name) for name in _NUMBERS],
         )
-        new_fields, zone, new_numbers, residuals, sweeps, cuts, work, flags, code, message = out
-        kernel_cache.warn_of_faults()
-        raise_for(code, message)
+        new_fields, zone, new_numbers, residuals, sweeps, cuts, work, flags = out
         shape = self.lattice.shape
         arrays: dict[str, Any] = {
             name: np.ascontiguousarray(new_fields[:, column]).reshape(shape)
             for column, name in enumerate(_FIELDS)
         }
         arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
-        return ContactState(
+        found = ContactState(
             **arrays,
             zone=zone.reshape(shape).astype(np.int8),
             **dict(zip(_NUMBERS, new_numbers.tolist(), strict=True)),
@@ -281,12 +312,49 @@ class FrictionalContact:
             cuts=cuts,
             operator_applications=work,
         )
+        self._warn_of_rim(found)
+        return found
+
+    def joined(self, first: ContactState, last: ContactState) -> ContactState:
+        """Join two steps to one, with the end of the second.
+
+        Parameters
+        ----------
+        first, last
+            Ends of the first and of the second step.
+
+        Returns
+        -------
+        ContactState
+            The end of the second step with the slip of both, and the residual of the friction conditions for
+            this slip; the work is that of the second.
+        """
+        slip, residual = called(_api.record_steps, self._handle, self._columns(first), self._columns(last))
+        slip_x, slip_y = (np.ascontiguousarray(column).reshape(self.lattice.shape) for column in slip.T)
+        return dataclasses.replace(
+            last,
+            slip_increment_x=slip_x,
+            slip_increment_y=slip_y,
+            residual_tangential=residual,
+            cuts=first.cuts + last.cuts,
+        )
+
+    def _columns(self, state: ContactState) -> Array:
+        """Return the fields of a state as columns of one array."""
+        columns = np.empty((self.lattice.size, len(_FIELDS)), order="F")
+        for column, name in enumerate(_FIELDS):
+            values = getattr(state, name)
+            columns[:, column] = checked_field(
+                np.where(self._mask, shaped(values, self.lattice, name), 0.0) if name == "gap" else values,
+                self.lattice,
+                name,
+            )
+        return columns
 
     def extended(self, state: ContactState, lattice: Lattice) -> ContactState:
-        """Return a state that lives on a smaller window on the window of this problem.
+        """Return a state of a smaller window on the window of this problem.
 
-        At nodes that are new, the relative displacement follows from the tractions and the rigid
-        motions, so that no history is lost.
+        At new nodes the relative displacement follows from the tractions and the rigid motions.
 
         Parameters
         ----------
@@ -300,14 +368,10 @@ class FrictionalContact:
         }
         loaded = bool(np.any(state.pressure > 0))
         known = lattice.embed(np.ones(lattice.shape), self.lattice, 0.0).astype(bool)
-        moved = any((state.approach, state.shift_x, state.shift_y, state.twist))
-        if loaded or moved:
-            traction = np.stack([arrays[name].ravel() for name in _FIELDS[:3]], axis=1)
-            motion = [state.approach, state.shift_x, state.shift_y, state.twist]
-            displacement, code, message = _api.relative_displacement(
-                self._handle, np.asfortranarray(traction), motion
-            )
-            raise_for(code, message)
+        motion = [getattr(state, name) for name in MOTION]
+        if loaded or any(motion):
+            traction = np.asfortranarray(np.stack([arrays[name].ravel() for name in _FIELDS[:3]], axis=1))
+            displacement = called(_api.relative_displacement, self._handle, traction, motion)
             closing, s_x, s_y = (column.reshape(self.lattice.shape) for column in displacement.T)
             arrays["gap"] = np.where(known, arrays["gap"], self._gap + closing)
             arrays["relative_displacement_x"] = np.where(known, arrays["relative_displacement_x"], s_x)
@@ -319,8 +383,20 @@ class FrictionalContact:
         return dataclasses.replace(state, **arrays, zone=zone.astype(np.int8), touches_rim=False)
 
 
-def _api_free(handle: int) -> None:
-    _core.hc_f2py_normal.free_handle(handle)
+def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: Lattice) -> FrictionLaw:
+    """Return the law of friction of arguments."""
+    if isinstance(coefficient, FrictionLaw):
+        law = _checked_law(coefficient.coefficient, coefficient.shear_limit, lattice)
+        return dataclasses.replace(coefficient, coefficient=law.coefficient)
+    number(limit, "shear_limit", "a number above 0, or inf", lambda found: found > 0)
+    if has_entries(coefficient):
+        mu = checked_field(coefficient, lattice, "friction_coefficient")
+        if (mu < 0.0).any():
+            raise DeckError(f"friction_coefficient: expected numbers of at least 0, not {mu.min():g}")
+        return FrictionLaw(mu, limit)
+    kind = "a number of at least 0, or inf"
+    found = number(coefficient, "friction_coefficient", kind, lambda found: found >= 0)
+    return FrictionLaw(found, limit)
 
 
 def memory_needed(
@@ -331,9 +407,10 @@ def memory_needed(
     contact: int | None = None,
     loads: int = 4,
     coupled: bool = True,
+    unlike: bool = True,
     threads: int = 1,
 ) -> int:
-    """Return the bytes that a problem with friction takes on a window of the given size.
+    """Return the memory (bytes) of a problem with friction on a window.
 
     Parameters
     ----------
@@ -344,13 +421,13 @@ def memory_needed(
     contact
         Nodes in contact; default: all.
     loads
-        How many loads are prescribed, 1 to 4; the other motions are.
+        Number of prescribed loads, 1 to 4; the other motions are prescribed.
     coupled
-        Whether pressure and shear move each other.
+        Whether pressure and shear are coupled.
+    unlike
+        Whether the materials are dissimilar.
     threads
-        Threads that will be used.
+        Number of threads.
     """
-    extent = [integer(n_col, "n_col"), integer(n_row, "n_row")]
-    nodes = min(extent[0] * extent[1] if contact is None else contact, MOST_IN_CONTACT)
-    count = thread_count(threads)
-    return int(_api.friction_memory_needed(method_code(method), extent, nodes, loads, coupled, count))
+    window = window_size(method, n_row, n_col, contact)
+    return int(_api.friction_memory_needed(*window, loads, coupled, unlike, thread_count(threads)))

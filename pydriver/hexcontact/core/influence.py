@@ -14,38 +14,51 @@ The potential of a unit load at the apex of a pyramid, (3 sqrt(3)/2) ln 3:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, Literal, NamedTuple, TypeVar
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import integer, number, reals
+from ..arrays import Array, broadcast, integer, number, reals, word
 from ..errors import DeckError
 from . import _core
-from .contact import raise_for
+from .calls import called
+from .influence_below import (
+    mesh_displacement,
+    mesh_stress,
+    pyramid_displacement,
+    pyramid_stress,
+    triangle_displacement_below,
+    triangle_stress,
+)
 
 __all__ = [
     "Displacement",
     "PyramidFunctions",
     "PyramidKernels",
     "linear_load_displacement",
+    "mesh_displacement",
+    "mesh_stress",
+    "pyramid_displacement",
     "pyramid_functions",
     "pyramid_kernels",
+    "pyramid_stress",
     "triangle_displacement",
+    "triangle_displacement_below",
     "triangle_integral",
+    "triangle_stress",
 ]
 
-Array = NDArray[np.float64]
 Load = Literal["constant", "linear_x", "linear_y", "bilinear"]
 Direction = Literal["normal", "x", "y"]
-
-_T = TypeVar("_T")
 
 _flat = _core.hc_f2py_influence
 
 _DEGREES = {"constant": (0, 0), "linear_x": (1, 0), "linear_y": (0, 1), "bilinear": (1, 1)}
 _DIRECTIONS = {"x": 1, "y": 2, "normal": 3}
+LOAD_SHAPES = {"point force": 1, "constant on the cell": 2, "pyramid": 3}
+"""Distributions of the load on a node."""
 
 
 class PyramidKernels(NamedTuple):
@@ -101,8 +114,8 @@ class Displacement(NamedTuple):
 def triangle_integral(vertices: ArrayLike, x: ArrayLike, y: ArrayLike, j: int, k: int, m: int) -> Array:
     """Integrate (x - xi)^k (y - eta)^m / rho^j over a triangle, (4.5) and (4.7).
 
-    The field point may lie anywhere: inside, outside, on an edge or its prolongation, at a vertex. The error
-    stays below 1e-13 of the bound I_100 d^(k+m+1-j), d the distance of the farthest vertex, from 0 to 1e5
+    The field point may be inside, outside, on an edge or its prolongation, or at a vertex. The error is
+    below 1e-13 of the bound I_100 d^(k+m+1-j), d the distance of the farthest vertex, from 0 to 1e5
     triangle sizes away and for slivers, too. The order of the vertices does not matter; a triangle without
     area gives 0.
 
@@ -158,7 +171,7 @@ def triangle_displacement(
     load : {"constant", "linear_x", "linear_y", "bilinear"}
         Load 1, x - xi, y - eta or (x - xi)(y - eta), in Pa with lengths in m.
     direction : {"normal", "x", "y"}
-        Direction it acts in; "normal" presses into the body.
+        Direction of the load; "normal" presses into the body.
     shear_modulus : float
         G of the body [Pa].
     poisson_ratio : float
@@ -174,13 +187,13 @@ def triangle_displacement(
     DeckError
         If an argument is not a finite number, has the wrong shape or is out of range.
     """
-    k, m = _choice(load, _DEGREES, "load")
+    k, m = _DEGREES[word(load, "load", _DEGREES)]
     components = _evaluate(
         _flat.triangle_displacement,
         x,
         y,
         vertices=_vertices(vertices),
-        direction=_choice(direction, _DIRECTIONS, "direction"),
+        direction=_DIRECTIONS[word(direction, "direction", _DIRECTIONS)],
         k=k,
         m=m,
         shear_modulus=number(shear_modulus, "shear_modulus"),
@@ -223,9 +236,7 @@ def linear_load_displacement(
     DeckError
         If an argument is not a finite number, has the wrong shape or is out of range.
     """
-    loads = reals(traction, "traction")
-    if loads.shape != (3, 3):
-        raise DeckError(f"traction: an array of shape {loads.shape}, expected (3, 3): x, y, z at each corner")
+    loads = reals(traction, "traction", (3, 3), ": x, y, z at each corner")
     components = _evaluate(
         _flat.linear_triangle_displacement,
         x,
@@ -292,37 +303,74 @@ def pyramid_functions(x: ArrayLike, y: ArrayLike, poisson_ratio: float) -> Pyram
     return PyramidFunctions(k1, kx, ky, kx, k1 + nu_0 * kxx, kxy, ky, kxy, k1 + nu_0 * kernels.Kyy)
 
 
+def load_potential(shape: str, x: ArrayLike, y: ArrayLike) -> Array:
+    """Return the integral of a load on a node over the distance of points, in spacings.
+
+    Parameters
+    ----------
+    shape : str
+        One of `LOAD_SHAPES`; each load has the volume sqrt(3)/2 of the unit pyramid.
+    x, y : array_like
+        Points relative to the node, in spacings.
+    """
+    number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
+    return _evaluate(_flat.potential_of_load, x, y, shape_number=number)
+
+
+def displacement_errors(shape: str, nodes_in_radius: float, x: ArrayLike, y: ArrayLike) -> Array:
+    """Return the error of the displacement when Hertz's pressure at the nodes is spread over the surface.
+
+    Parameters
+    ----------
+    shape : str
+        One of `LOAD_SHAPES`.
+    nodes_in_radius : float
+        Spacings in the contact radius.
+    x, y : array_like
+        Points relative to the center, a node, in spacings.
+
+    Returns
+    -------
+    ndarray
+        Errors over the approach, in the common shape of the points.
+    """
+    number = LOAD_SHAPES[word(shape, "shape", LOAD_SHAPES)]
+    return _evaluate(_flat.errors_of_displacement, x, y, shape_number=number, radius=nodes_in_radius)
+
+
+def pressure_errors(nodes_in_radius: float) -> tuple[float, float]:
+    """Return the largest errors of Hertz's pressure for r < 0.8 a: constant on cells, linear between nodes.
+
+    Parameters
+    ----------
+    nodes_in_radius : float
+        Spacings in the contact radius.
+
+    Returns
+    -------
+    tuple of float
+        Over the largest pressure.
+    """
+    constant, linear = _flat.errors_of_pressure(nodes_in_radius).tolist()
+    return constant, linear
+
+
 def _evaluate(procedure: Callable[..., Any], x: ArrayLike, y: ArrayLike, **arguments: Any) -> Array:
-    """Call the core for all points; the result has the shape of the points behind that of one value."""
-    px, py = reals(x, "x"), reals(y, "y")
-    try:
-        px, py = np.broadcast_arrays(px, py)
-    except ValueError as error:
-        raise DeckError(f"x and y: arrays of shapes {px.shape} and {py.shape} do not broadcast") from error
-    # f2py takes no empty arrays, but the other arguments are to be checked all the same
+    """Evaluate at all points; the result has the shape of one value, then that of the points."""
+    px, py = broadcast(x=x, y=y).values()
+    # f2py takes no empty arrays; one point serves to check the other arguments
     point = {"x": px.ravel(), "y": py.ravel()} if px.size else {"x": np.zeros(1), "y": np.zeros(1)}
-    values, code, message = procedure(**point, **arguments)
-    raise_for(code, message)
+    values = called(procedure, **point, **arguments)
     return np.ascontiguousarray(values[..., : px.size]).reshape(values.shape[:-1] + px.shape)
 
 
 def _vertices(vertices: ArrayLike) -> Array:
     """Return the corners of a triangle as columns."""
-    corners = reals(vertices, "vertices")
-    if corners.shape != (3, 2):
-        raise DeckError(f"vertices: an array of shape {corners.shape}, expected (3, 2): three points")
-    return corners.T
+    return reals(vertices, "vertices", (3, 2), ": three points").T
 
 
 def _exponent(value: int, name: str) -> int:
-    """Return an exponent; the core knows those from 0 to 4."""
+    """Return an exponent; the core checks its bounds from 0 to 4."""
     if abs(found := integer(value, name)) > 99:
         raise DeckError(f"{name} = {found}: an integer from 0 to 4 expected")
     return found
-
-
-def _choice(value: str, known: Mapping[str, _T], name: str) -> _T:
-    """Return what a word stands for."""
-    if not isinstance(value, str) or value not in known:
-        raise DeckError(f"{name} = {value!r}: expected one of {', '.join(map(repr, known))}")
-    return known[value]

@@ -1,18 +1,20 @@
-"""Fields between the nodes of a lattice, as the core finds them."""
+"""Fields between the nodes of a lattice, by the core."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Array
 from . import _core
-from .contact import raise_for
+from .calls import called
+from .lattice import Lattice
 
-_api = _core.hc_f2py_measures
+_api, _flat = _core.hc_f2py_measures, _core.hc_f2py_lattice
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 
@@ -45,24 +47,51 @@ def linear(
 def nearest(
     values: NDArray[Any], basis: Array, start: Point, x: ArrayLike, y: ArrayLike, outside: float
 ) -> Array:
-    """Return the values at the nodes next to some points; parameters as of `linear`."""
-    col, row, inside, code, message = _api.nodes_next_to(
-        basis.T, start, values.shape[::-1], np.ravel(x), np.ravel(y)
-    )
-    raise_for(code, message)
+    """Return the values at the nodes next to points; parameters as of `linear`."""
+    points = np.ravel(x), np.ravel(y)
+    col, row, inside = called(_api.nodes_next_to, basis.T, start, values.shape[::-1], *points)
     return np.where(inside, values[row, col], outside).astype(float).reshape(np.shape(x))
 
 
 def pressure_between(
     pressure: Array, squares: Array, basis: Array, start: Point, x: ArrayLike, y: ArrayLike
 ) -> Array:
-    """Return the pressure (Pa) at some points: the root of its squares, itself where those are NaN."""
+    """Return the pressure (Pa) at points: the root of its squares, itself where those are NaN."""
     return _at_points(_api.pressure_between_nodes, basis, start, (pressure.T, squares.T), x, y)
+
+
+def section_ends(
+    lattice: Lattice, pressure: Array, angle: float, through: Point | None
+) -> tuple[Point, Point, float]:
+    """Return the ends of a line across a contact, and the distance of its zero from the first one (m).
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    pressure : ndarray, shape (n_row, n_col)
+        Contact pressure, Pa.
+    angle : float
+        Direction from x, rad.
+    through : tuple of float, optional
+        A point of the line, m; default: the node next to the centroid of the pressure.
+    """
+    where = lattice.basis.T, lattice.first, lattice.origin, pressure.T
+    point = (0.0, 0.0) if through is None else through
+    ends, zero = called(_flat.section_of_pressure, *where, angle, through is not None, point)
+    (x0, x1), (y0, y1) = ends.tolist()
+    return (x0, y0), (x1, y1), zero
+
+
+def crossings(lattice: Lattice, start: Point, end: Point) -> Array:
+    """Return where a line crosses edges of triangles, as distances from its start (m), with its ends."""
+    most = 8 + int(4.0 * math.dist(start, end) / lattice.spacing)  # rows are sqrt(3)/2 spacings apart
+    distance, count = called(_flat.crossings_of_line, lattice.basis.T, lattice.origin, start, end, most)
+    return np.asarray(distance[:count])
 
 
 def _at_points(
     core: Any, basis: Array, start: Point, fields: tuple[Any, Any], x: ArrayLike, y: ArrayLike
 ) -> Array:
-    found, code, message = core(np.asarray(basis).T, start, *fields, np.ravel(x), np.ravel(y))
-    raise_for(code, message)
+    found = called(core, np.asarray(basis).T, start, *fields, np.ravel(x), np.ravel(y))
     return np.asarray(found.reshape(np.shape(x)))

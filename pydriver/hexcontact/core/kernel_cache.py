@@ -1,17 +1,17 @@
-"""Spectra of influence kernels, kept for the problems to come: in memory, and in a folder if wanted.
+"""Cache of the spectra of influence kernels: in memory, and optionally in a folder.
 
-Setting a problem up means working its influence kernels out and transforming them. The spectra depend on the
-number of rows and columns alone and, with friction, on the ratios ``beta`` and ``gamma`` of the materials;
-not on spacing, moduli, shapes, loads or the coefficient of friction. So problems alike share them. Answers
-are the same to the bit, whether spectra were made or found.
+The set-up of a problem evaluates its influence kernels and transforms them. The spectra depend on the number
+of rows and columns and, with friction, on the ratios ``beta`` and ``gamma`` of the materials; not on spacing,
+moduli, shapes, loads or the coefficient of friction. So similar problems share them. Results are
+bit-identical with computed and cached spectra.
 
-Four environment variables say what is kept; `configure` does the same from Python.
+Four environment variables set the cache; `configure` does the same from Python.
 
 - ``HEXCONTACT_KERNEL_MEMORY``: bytes in memory at most, such as ``1 GB``; 256 MB if not set, 0 for none.
-- ``HEXCONTACT_KERNEL_FOLDER``: a folder for spectra that other processes may use; none if not set.
+- ``HEXCONTACT_KERNEL_FOLDER``: a folder for spectra, which other processes may use; none if not set.
 - ``HEXCONTACT_KERNEL_FOLDER_SIZE``: bytes in it at most; 2 GB if not set.
-- ``HEXCONTACT_KERNEL_FOLDER_SHARED``: ``yes`` to take a folder, and files in it, that other users may have
-  written. Otherwise a folder of somebody else, or one that others may write to, is not used.
+- ``HEXCONTACT_KERNEL_FOLDER_SHARED``: ``yes`` for a folder, and files in it, that other users can write.
+  Otherwise a folder of another user, or one that others can write to, is not used.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ _NOT_OURS = f"other users may write to it (chmod go-w, or {SHARED}=yes if all of
 
 
 class Statistics(NamedTuple):
-    """What the cache of this process holds and has done.
+    """Content and use of the cache of this process.
 
     Attributes
     ----------
     memory : int
-        Bytes of the spectra in memory that are kept; those that a problem uses at the moment count, too.
+        Bytes of the cached spectra in memory, with those in use.
     found, read, made : int
-        Spectra that were found in memory, read from the folder, and made.
+        Spectra that were found in memory, read from the folder, and computed.
     """
 
     memory: int
@@ -74,7 +74,7 @@ class _Settings:
     folder: Path | None = None
     folder_size = 0
     shared = False  # the folder, with other users
-    process = 0  # that the folder was opened by: a fork needs names of its own
+    process = 0  # that opened the folder: a fork needs its own names
 
 
 _settings = _Settings()
@@ -87,30 +87,30 @@ def configure(
     folder_size: int | float | str | None = None,
     folder_shared: bool | None = None,
 ) -> None:
-    """Say what this process keeps; what is not given stays as it is.
+    """Set the cache of this process; settings that are not given do not change.
 
-    Processes that are started from here, as those of a study, go by the environment.
+    Processes that it starts, such as those of a study, use the environment.
 
     Parameters
     ----------
     memory : number or str, optional
-        Bytes of spectra in memory at most, such as ``"1 GB"``; 0: none. The least recently used go first.
+        Bytes of spectra in memory at most, such as ``"1 GB"``; 0: none. The least recently used are dropped.
     folder : path or False, optional
-        Folder for spectra that other processes may use; it is made if it is not there. False: none.
+        Folder for spectra, which other processes may use; created if missing. False: none.
     folder_size : number or str, optional
-        Bytes in the folder at most. When a process begins with more, the oldest go.
+        Bytes in the folder at most. If a process begins with more, the oldest are deleted.
     folder_shared : bool, optional
-        Take a folder, and files in it, that other users may have written.
+        Accept a folder, and files in it, that other users can write.
 
     Raises
     ------
     DeckError
-        If a number of bytes is none.
+        If a value is no number of bytes.
 
     Warns
     -----
     KernelFolderWarning
-        If the folder cannot be used; spectra are kept in memory alone then.
+        If the folder cannot be used; spectra are cached in memory only.
 
     Examples
     --------
@@ -136,20 +136,20 @@ def configure(
 
 
 def bound() -> int:
-    """Return the bytes of spectra in memory at most."""
+    """Return the largest number of bytes of spectra in memory."""
     take_settings()
     return _settings.bound or 0
 
 
 def clear() -> None:
-    """Drop the spectra that are kept in memory; those that a problem uses stay until it is gone."""
+    """Drop the cached spectra in memory; those in use remain with their problems."""
     take_settings()
     _cache.limit_kernels(0)
     _cache.limit_kernels(_settings.bound)
 
 
 def statistics() -> Statistics:
-    """Return what the cache of this process holds and has done.
+    """Return content and use of the cache of this process.
 
     Examples
     --------
@@ -161,13 +161,13 @@ def statistics() -> Statistics:
 
 
 def limit_growth(spare: int) -> None:
-    """Let the cache grow by at most `spare` bytes, or shrink, until the next call; its bound stays."""
+    """Limit the growth of the cache to `spare` bytes until the next call, or shrink it; its bound remains."""
     take_settings()
     _cache.limit_kernels(max(0, min(_settings.bound or 0, statistics().memory + spare)))
 
 
 def take_settings() -> None:
-    """Take the settings from the environment, once; give a forked process names of its own."""
+    """Read the settings from the environment, once; a forked process gets its own names."""
     if _settings.bound is None:
         given = {name: os.environ.get(name, "").strip() for name in (MEMORY, FOLDER, FOLDER_SIZE, SHARED)}
         memory, size = (_bytes(given[name] or _DEFAULTS[name], name) for name in (MEMORY, FOLDER_SIZE))
@@ -185,13 +185,13 @@ def warn_of_faults() -> None:
     """Warn of faults of the folder since the last call."""
     if _settings.folder is None:
         return
-    for line in _cache.kernel_complaint().decode(errors="replace").strip().splitlines():
-        _warn(line)
+    for line in _cache.kernel_message().decode(errors="replace").strip().splitlines():
+        _warn(line, 5)
 
 
-def _warn(message: str) -> None:
+def _warn(message: str, level: int = 4) -> None:
     _LOGGER.warning("kernels warning=%s", json.dumps(message, ensure_ascii=False))
-    warnings.warn(message, KernelFolderWarning, stacklevel=4)
+    warnings.warn(message, KernelFolderWarning, stacklevel=level)
 
 
 def _bytes(value: float | str, name: str) -> int:
@@ -204,7 +204,7 @@ def _bytes(value: float | str, name: str) -> int:
 
 
 def _yes(text: str, name: str) -> bool:
-    """Return whether an environment variable says yes."""
+    """Test whether an environment variable is "yes"."""
     if text.lower() not in ("", "no", "yes"):
         raise DeckError(f"{name} = {text!r}: expected yes or no")
     return text.lower() == "yes"
@@ -214,7 +214,7 @@ def _yes(text: str, name: str) -> bool:
 
 
 def _open_folder() -> None:
-    """Tell the core of the folder, with what room is left in it."""
+    """Pass the folder to the core, with its free bytes."""
     _settings.process = os.getpid()
     folder, room = _settings.folder, 0
     if folder is not None:
@@ -227,13 +227,13 @@ def _open_folder() -> None:
         except OSError as error:
             _settings.folder = folder = None
             _warn(f"no kernels are kept in {error.filename}: {error.strerror}")
-    # the core takes blanks at the end for none
+    # for the core, blanks at the end are no part of a name
     name = b"" if folder is None else os.fsencode(folder) + b"/"
     _cache.use_kernel_folder(name, _maker(), uuid.uuid4().hex[:12], room, _settings.shared)
 
 
 def _pruned(folder: Path, bound: int) -> int:
-    """Remove the oldest spectra of a folder until three quarters of the bound are left; return the bytes."""
+    """Delete the oldest spectra of a folder down to three quarters of its bound; return the bytes."""
     files = []
     for path in filter(lambda path: _FILE.fullmatch(path.name), folder.iterdir()):
         with contextlib.suppress(OSError):  # another process has renamed or removed it
@@ -254,7 +254,7 @@ def _pruned(folder: Path, bound: int) -> int:
 
 
 def _maker() -> str:
-    """Say what the bits of a spectrum depend on: the program, the processor, libraries for mathematics."""
+    """Identify what the bits of a spectrum depend on: program, processor, libraries for mathematics."""
     from .._version import __version__
 
     core = Path(str(_core.__file__)).stat()
@@ -264,7 +264,7 @@ def _maker() -> str:
             r"^(?:model name|flags|Features)\s*:.*$", Path("/proc/cpuinfo").read_text(), re.M
         )
         parts += sorted(set(processor))
-        # of the system, by these names; those that packages bring along have others
+        # of the system, by these names; those of packages have others
         mapped = re.findall(r"/\S*/lib(?:m|fftw3f?|gfortran)\.so\S*", Path("/proc/self/maps").read_text())
         parts += [f"{path} {Path(path).stat().st_size}" for path in sorted(set(mapped))]
     return f"hexcontact {__version__} {hashlib.sha256(os.fsencode('; '.join(parts))).hexdigest()}"

@@ -1,4 +1,4 @@
-"""The lattice of nodes: positions, windows, and moving fields between windows."""
+"""The lattice of nodes: positions, windows, and transfer of fields between windows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import integer, number, reals
+from ..arrays import Array, integer, number, reals
 from ..errors import DeckError
 from . import _core
 
@@ -41,8 +41,7 @@ class Lattice:
 
     def __post_init__(self) -> None:
         kind = "a positive length in meters"
-        if not 0 < number(self.spacing, "spacing", kind) < np.inf:
-            raise DeckError(f"spacing = {self.spacing!r}: expected {kind}")
+        number(self.spacing, "spacing", kind, lambda spacing: 0 < spacing < np.inf)
         for name in ("row_first", "col_first", "n_row", "n_col"):
             integer(getattr(self, name), name)
         origin = reals(self.origin, "origin")
@@ -77,11 +76,9 @@ class Lattice:
         """
         unit = cls(spacing, 0, 0, 1, 1, origin)
         half = 0.5 * np.array([length_x, length_y])
-        corners = (
-            np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)]) * half + np.asarray(center) - origin
-        )
-        indices = corners @ np.linalg.inv(unit.basis)
-        # a rectangle that ends on a row or column keeps it, whatever the rounding
+        signs = np.array([[sx, sy] for sx in (-1, 1) for sy in (-1, 1)])
+        indices = (signs * half + np.asarray(center) - origin) @ np.linalg.inv(unit.basis)
+        # a row or column on the side of the rectangle belongs to it, whatever the rounding
         first = np.floor(indices.min(axis=0) + 1e-9).astype(int)
         last = np.ceil(indices.max(axis=0) - 1e-9).astype(int)
         n_col, n_row = (last - first + 1).tolist()
@@ -89,9 +86,9 @@ class Lattice:
         return cls(spacing, row_first, col_first, n_row, n_col, origin)
 
     @cached_property
-    def basis(self) -> NDArray[np.float64]:
+    def basis(self) -> Array:
         """Basis vectors, one a row [m]."""
-        basis: NDArray[np.float64] = np.ascontiguousarray(_core.hc_f2py_normal.lattice_basis(self.spacing).T)
+        basis: Array = np.ascontiguousarray(_core.hc_f2py_normal.lattice_basis(self.spacing).T)
         return basis
 
     @property
@@ -104,6 +101,16 @@ class Lattice:
     def shape(self) -> tuple[int, int]:
         """Shape of a field over the window."""
         return (self.n_row, self.n_col)
+
+    @property
+    def first(self) -> list[int]:
+        """Smallest column and row index, as the core takes them."""
+        return [self.col_first, self.row_first]
+
+    @property
+    def extent(self) -> list[int]:
+        """Number of columns and of rows, as the core counts them."""
+        return [self.n_col, self.n_row]
 
     @property
     def size(self) -> int:
@@ -121,16 +128,22 @@ class Lattice:
         return np.arange(self.col_first, self.col_first + self.n_col)
 
     @property
-    def x(self) -> NDArray[np.float64]:
+    def x(self) -> Array:
         """Coordinate of each node along x [m]."""
         return self._coordinate(0)
 
     @property
-    def y(self) -> NDArray[np.float64]:
+    def y(self) -> Array:
         """Coordinate of each node along y [m]."""
         return self._coordinate(1)
 
-    def _coordinate(self, axis: int) -> NDArray[np.float64]:
+    @property
+    def start(self) -> tuple[float, float]:
+        """Position of the first node of the window [m]."""
+        alone = replace(self, n_row=1, n_col=1)
+        return alone.x.item(), alone.y.item()
+
+    def _coordinate(self, axis: int) -> Array:
         along = self.cols * self.basis[0, axis]
         across = self.rows * self.basis[1, axis]
         return self.origin[axis] + across[:, None] + along[None, :]
@@ -155,7 +168,7 @@ class Lattice:
         other
             The other window.
         fill
-            Value at the nodes that this window does not have.
+            Value at nodes outside this window.
         """
         result = np.full(other.shape, fill, dtype=field.dtype)
         row, col = self.row_first - other.row_first, self.col_first - other.col_first

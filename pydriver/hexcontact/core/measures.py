@@ -1,71 +1,99 @@
-"""What a state says besides its fields, as the core finds it: nodal residuals, energy, extent of zones."""
+"""Measures of a state by the core: nodal residuals, areas, energy; cycles of a load history."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array, Mask
+from ..variables import CORE, VARIABLES
 from . import _core
-from .contact import ElasticPair, NormalSolution, raise_for
-from .friction import ContactState
+from .calls import called
+from .contact import ElasticPair, Interface, NormalSolution
+from .friction import MOTION, ContactState, FrictionLaw
 from .lattice import Lattice
 
 _api = _core.hc_f2py_measures
-
-Array = NDArray[np.float64]
 
 
 def nodal_residuals(
     lattice: Lattice,
     pair: ElasticPair,
-    friction_coefficient: float,
-    solution: NormalSolution | ContactState,
+    friction: FrictionLaw,
+    interface: Interface,
+    solution: NormalSolution,
     *,
     tangential: bool,
 ) -> Array:
     """Return the residuals at the nodes, R_n or, tangential, R_t: docs/theory/residuals.md."""
     vectors = _vectors(solution, "traction", "slip_increment")
-    residuals, code, message = _api.nodal_residuals(
+    residuals = called(
+        _api.nodal_residuals,
         lattice.basis.T,
         pair.as_array(),
-        min(friction_coefficient, np.finfo(float).max),
+        *friction.as_arguments(),
+        interface,
         tangential,
         solution.pressure.T,
         solution.gap.T,
         vectors,
     )
-    raise_for(code, message)
     return np.asarray(residuals.T)
 
 
-def elastic_energy(lattice: Lattice, initial_gap: Array, solution: NormalSolution | ContactState) -> float:
-    """Return the energy (J) of a deformation; the initial gap (m) counts at nodes in contact only."""
+def bulk_strain(
+    young_modulus: float, poisson_ratio: float, stress: tuple[float, float, float], plane_strain: int
+) -> tuple[Array, Array]:
+    """Return a bulk stress xx, yy, xy (Pa) and its strain: free sides (0), no strain along x (1), y (2)."""
+    found: tuple[Array, Array] = _api.strain_of_bulk((young_modulus, poisson_ratio), plane_strain, stress)
+    return found
+
+
+def measures(
+    lattice: Lattice, friction: FrictionLaw, initial_gap: Array, candidate: Mask, solution: NormalSolution
+) -> dict[str, float]:
+    """Return the measures of a state in the load history, by the names of `hexcontact.variables`.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    friction : FrictionLaw
+        Friction at the nodes.
+    initial_gap : ndarray, shape (n_row, n_col)
+        Gap before loading, m; only that of nodes in contact has effect.
+    candidate : ndarray of bool, shape (n_row, n_col)
+        Nodes that can touch.
+    solution : NormalSolution
+        The state, with friction or without.
+    """
     frictional = isinstance(solution, ContactState)
-    motion = [solution.approach, 0.0, 0.0, 0.0]
-    if isinstance(solution, ContactState):
-        motion[1:] = solution.shift_x, solution.shift_y, solution.twist
-    energy, code, message = _api.energy_of_state(
-        lattice.basis.T,
-        (lattice.x[0, 0], lattice.y[0, 0]),
-        solution.pressure.T,
-        solution.gap.T,
-        initial_gap.T,
-        solution.zone.T,
-        motion,
-        frictional,
+    numbers = called(
+        _api.measures_of_state,
+        *(lattice.basis.T, lattice.first, lattice.origin, *friction.as_arguments(), frictional),
+        *(solution.pressure.T, solution.gap.T, initial_gap.T, solution.zone.T, candidate.T),
+        [getattr(solution, name, 0.0) for name in MOTION],
         _vectors(solution, "traction", "relative_displacement"),
     )
-    raise_for(code, message)
-    return float(energy)
+    found = dict(zip(CORE["measures"], numbers.tolist(), strict=True))
+    return {name: value for name, value in found.items() if frictional or not VARIABLES[name].frictional}
 
 
-def zone_extent(lattice: Lattice, zone: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
-    """Return center of area, smallest and largest x and y (m) of the nodes of a zone; NaN without nodes."""
-    extent: tuple[Array, Array, Array] = _api.extent_of_zone(lattice.x.T, lattice.y.T, zone.T)
-    return extent
+def turning_points(values: Array) -> list[int]:
+    """Return the indices in a history at which a quantity turns back, with its first and last extreme."""
+    return [int(place) for place in np.flatnonzero(_api.turns_of_history(values))]
 
 
-def _vectors(solution: NormalSolution | ContactState, *names: str) -> Array:
+def cycles(motion: Array, load: Array) -> list[tuple[int, int, float]]:
+    """Return the closed cycles of a load over its motion: docs/theory/load_path.md, (L3).
+
+    Each has the indices of its first and last step in the history, and the area of its loop (J).
+    """
+    count, places, areas = _api.cycles_of_history(motion, load)
+    steps = (places.T[:count] - 1).tolist()
+    return [(first, last, float(area)) for (first, last), area in zip(steps, areas, strict=False)]
+
+
+def _vectors(solution: NormalSolution, *names: str) -> Array:
     """Return vector fields as the core takes them; zeros without friction."""
     if not isinstance(solution, ContactState):
         return np.zeros((4, *solution.pressure.shape)).T

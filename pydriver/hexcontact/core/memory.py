@@ -1,4 +1,4 @@
-"""How much memory this process may still take."""
+"""Memory that is available to this process."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from pathlib import Path
 from ..errors import ResourceError
 
 GB = 1e9
-# Bytes of address space: of the netCDF library when it is loaded, and for what it holds of fifty variables
-# while it writes them; of the second thread of a run, for its stack and 64 MiB of malloc.
+# Bytes of address space: of the netCDF library, and of its buffers for fifty variables; of the second thread
+# of a run, for its stack and 64 MiB of malloc.
 _LOADING, WRITING, _THREAD = 30_000_000, 64_000_000, 80_000_000
+_NO_LIMIT = 1 << 60  # bytes; version 1 of control groups says 2^63 less a page
 
 
 def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/proc/self/cgroup")) -> int:
-    """Return the memory in bytes that can be taken before the machine, or a limit on this process, says no.
+    """Return the memory (bytes) that the machine and the limits of this process leave.
 
     Parameters
     ----------
     cgroups : Path
-        Where the control groups are mounted (batch systems and containers limit memory by them).
+        Mount point of the control groups, by which batch systems and containers limit memory.
     process : Path
-        File that says which groups this process belongs to.
+        File with the groups of this process.
     """
     import psutil
 
@@ -35,31 +36,36 @@ def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/pro
 
 
 def resident() -> int:
-    """Return the memory in bytes that this process takes now, with the interpreter and all libraries."""
+    """Return the resident memory (bytes) of this process, with the interpreter and all libraries."""
     import psutil
 
     return int(psutil.Process().memory_info().rss)
 
 
-def threads() -> int:
-    """Return how many threads the core uses on large windows."""
-    wanted = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
-    if wanted.isdecimal() and int(wanted):
-        return int(wanted)
+def cores() -> int:
+    """Return the number of cores of this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def require(needed: int, what: str, advice: str) -> None:
-    """Refuse what does not fit into memory.
+def threads() -> int:
+    """Return the number of threads of the core on large windows."""
+    wanted = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
+    return int(wanted) if wanted.isdecimal() and int(wanted) else cores()
+
+
+def require(needed: int, what: str, advice: str, there: int | None = None) -> None:
+    """Raise an error if memory is short.
 
     Parameters
     ----------
     needed : int
         Memory in bytes.
     what : str
-        What needs it, with its size: ``"a window of 2048 x 2048 nodes"``.
+        Its purpose, with the size: ``"a window of 2048 x 2048 nodes"``.
     advice : str
-        What the user can do about it.
+        Advice for the user.
+    there : int, optional
+        `available`, which reads a dozen files, if it is known.
 
     Raises
     ------
@@ -68,10 +74,8 @@ def require(needed: int, what: str, advice: str) -> None:
     """
     from . import kernel_cache
 
-    there = available()
-    kernel_cache.limit_growth(
-        there - needed
-    )  # what is kept for other cases must not be in the way of this one
+    there = available() if there is None else there
+    kernel_cache.limit_growth(there - needed)  # spectra of other cases give way to this one
     if needed > there:
         there = available()
     if needed > there:
@@ -81,18 +85,18 @@ def require(needed: int, what: str, advice: str) -> None:
 
 
 def give_back() -> None:
-    """Let the system have the memory that solving has freed; the C library may keep most of it otherwise."""
+    """Return the free memory of the C library to the system."""
     with contextlib.suppress(AttributeError, OSError):  # glibc alone has this
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def claim(needed: int) -> None:
-    """Raise OSError unless so many bytes can be had at once; libraries that find no memory would crash."""
+    """Raise OSError unless a number of bytes is available at once; some libraries crash without."""
     mmap.mmap(-1, needed, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS).close()
 
 
 def _left_in_limits() -> Iterator[int]:
-    """Yield what limits leave of the address space of this process (``ulimit -v``) and its data (``-d``)."""
+    """Yield the free bytes within the limits of address space (``ulimit -v``) and data (``-d``)."""
     import resource
 
     allowed = {name: resource.getrlimit(getattr(resource, name))[0] for name in ("RLIMIT_AS", "RLIMIT_DATA")}
@@ -105,7 +109,7 @@ def _left_in_limits() -> Iterator[int]:
     except OSError:
         yield 0
         return
-    import netCDF4  # noqa: F401  # which a run needs in the end
+    import netCDF4  # noqa: F401  # which every run needs
 
     spare = WRITING + _THREAD * (threading.active_count() == 1)
     taken = psutil.Process().memory_info()
@@ -116,7 +120,7 @@ def _left_in_limits() -> Iterator[int]:
 
 
 def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
-    """Yield what each control group (version 1 or 2) that limits this process leaves."""
+    """Yield the free bytes of each control group (version 1 or 2) that limits this process."""
     try:
         lines = process.read_text().splitlines()
     except OSError:
@@ -130,7 +134,7 @@ def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
             cache = "total_inactive_file"
         else:
             continue
-        # A container may see its own group as the root: groups that are not there are passed over.
+        # in a container, the own group may be the root and others missing
         own = root / group.lstrip("/")
         for folder in (own, *own.parents):
             if (left := _left_in_group(folder, limit, usage, cache)) is not None:
@@ -140,9 +144,11 @@ def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
 
 
 def _left_in_group(folder: Path, limit: str, usage: str, cache: str) -> int | None:
-    """Return limit less usage; the file cache that the kernel would give back does not count as used."""
+    """Return limit less usage, without the file cache, which the kernel frees on demand."""
     try:
-        allowed = int((folder / limit).read_text())  # "max" is no limit
+        allowed = int((folder / limit).read_text())  # "max" is no limit, nor is what no machine has
+        if allowed > _NO_LIMIT:
+            return None
         used = int((folder / usage).read_text())
         statistics = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
         return max(0, allowed - used + int(statistics.get(cache, 0)))

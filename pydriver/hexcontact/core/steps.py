@@ -1,4 +1,4 @@
-"""Size of adaptive load steps, as the core decides it (fortran/path: step_control, step_error)."""
+"""Size of adaptive load steps, by the core (fortran/path: step_control, step_error)."""
 
 from __future__ import annotations
 
@@ -6,37 +6,42 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array, Mask
 from . import _core
-from .contact import raise_for
-from .friction import ContactState
+from .calls import called
+from .contact import ElasticPair
+from .friction import ContactState, FrictionLaw
 from .lattice import Lattice
 
 _api = _core.hc_f2py_steps
+_wear = _core.hc_f2py_wear
 
 REJECTED, ACCEPTED, LIMITED, FAILED = range(4)
-"""What becomes of an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones
-are of no use; it did not converge, and is the smallest there is."""
+"""Verdicts on an attempt: a smaller one follows; it is within the tolerance; it is not, but smaller ones do
+not help; the smallest one did not converge."""
+
+LEAST = 1e-3
+"""Smallest adaptive load step, as a part of its segment."""
 
 _FIELDS = ("pressure", "gap", "traction_x", "traction_y")
 
 
 class Change(NamedTuple):
-    """What the halves of a load step change.
+    """Changes by halving a load step.
 
     Attributes
     ----------
     stick : float
         Change of the stick area, as a share of the largest contact area.
     traction : float
-        Change of the shear tractions, as a share of what friction can carry.
+        Change of the shear tractions, as a share of those at full slip.
     added : float
-        The part of `traction` that this load step added.
+        The part of `traction` due to this load step.
     lattice : float
-        How far entering rings of nodes may move the stick area, whatever the steps; a share, too.
+        Possible change of the stick area by rings of nodes that enter, for any steps; a share, too.
     gain : float
-        How much the stick area changes with the tractions, both as shares, during the second half.
+        Change of the stick area over that of the tractions, both as shares, during the second half.
     """
 
     stick: float = 0.0
@@ -48,8 +53,8 @@ class Change(NamedTuple):
 
 def change_by_halving(
     lattice: Lattice,
-    candidate: NDArray[np.bool_],
-    friction_coefficient: float,
+    candidate: Mask,
+    friction: FrictionLaw,
     states: Sequence[ContactState | None],
     area: float,
 ) -> Change:
@@ -61,8 +66,8 @@ def change_by_halving(
         The window of all states.
     candidate : ndarray of bool, (n_row, n_col)
         Nodes that can touch.
-    friction_coefficient : float
-        Coefficient of friction; ``inf``: no slip.
+    friction : FrictionLaw
+        Friction at the nodes.
     states : sequence of ContactState or None
         The end of the path in whole steps, the middle and the end of that in halves, and both paths at the
         beginning of the step (None before the first load).
@@ -76,81 +81,167 @@ def change_by_halving(
             for field, name in zip(fields[number], _FIELDS, strict=True):
                 field[:] = getattr(state, name)
             zones[number] = state.zone
-    change, code, message = _api.change_by_halving(
+    change = called(
+        _api.change_by_halving,
         lattice.basis.T,
         candidate.T,
-        min(friction_coefficient, np.finfo(float).max),
+        *friction.as_arguments(),
         fields.T,
         zones.T,
         area,
     )
-    raise_for(code, message)
     return Change(*change.tolist())
 
 
 def is_shear_free(state: ContactState | None) -> bool:
-    """Tell whether a state has no shear tractions: a path of such states has no history."""
+    """Test whether a state has no shear tractions: a path of such states has no history."""
     if state is None:
         return True
     return bool(_api.is_shear_free(state.pressure.T, state.traction_x.T, state.traction_y.T))
 
 
+def archard_depth(energy: Array, coefficient: float, friction: FrictionLaw) -> Array:
+    """Return the depth (m) that is worn off where friction dissipates an energy by area (J/m2)."""
+    mu = np.broadcast_to(friction.coefficient, energy.shape)
+    depth = _wear.depth_of_energy(energy.ravel(), coefficient, mu.ravel())
+    return np.asarray(depth).reshape(energy.shape)
+
+
+def worn(
+    lattice: Lattice, friction: FrictionLaw, coefficient: float, energy: Array, cycles: float, depth: Array
+) -> tuple[Array, float, float]:
+    """Wear the surfaces by cycles that are all alike: docs/theory/wear.md, (V3).
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    friction : FrictionLaw
+        Friction at the nodes.
+    coefficient : float
+        Coefficient of wear of both bodies together (m2/N).
+    energy : ndarray, (n_row, n_col)
+        Energy that friction dissipates in a cycle, by area (J/m2).
+    cycles : float
+        Number of cycles.
+    depth : ndarray, (n_row, n_col)
+        Worn depth before (m).
+
+    Returns
+    -------
+    depth : ndarray, (n_row, n_col)
+        Worn depth after (m).
+    volume, deepest : float
+        Worn volume (m3), largest worn depth (m).
+    """
+    mu = np.broadcast_to(friction.coefficient, lattice.shape)
+    found = _wear.wear_of_cycles(energy.T, coefficient, mu.T, cycles, lattice.cell_area, depth.T)
+    return np.ascontiguousarray(found[0].T), float(found[1]), float(found[2])
+
+
+def change_by_jump(
+    lattice: Lattice,
+    pair: ElasticPair,
+    friction: FrictionLaw,
+    coefficient: float,
+    energies: tuple[Array, Array],
+    cycles: float,
+    max_pressure: float,
+) -> Change:
+    """Compare two jumps with one of both: docs/theory/wear.md, (V4).
+
+    Parameters
+    ----------
+    lattice, friction, coefficient
+        As of `worn`.
+    pair : ElasticPair
+        Elastic constants.
+    energies : tuple of ndarray, (n_row, n_col)
+        Energy that friction dissipates in the cycles before the first and the second jump, by area (J/m2).
+    cycles : float
+        Cycles of each jump.
+    max_pressure : float
+        Largest pressure (Pa).
+
+    Returns
+    -------
+    Change
+        For `StepControl`; its tolerance is that of the worn depth over the indentation of a node.
+    """
+    mu = np.broadcast_to(friction.coefficient, lattice.shape)
+    change = called(
+        _wear.change_by_jump,
+        *(lattice.basis.T, pair.as_array(), energies[0].T, energies[1].T, coefficient, mu.T),
+        *(cycles, max_pressure),
+    )
+    return Change(*change.tolist())
+
+
 class Attempt:
     """One attempt at a load step, in parts of its segment."""
 
-    def __init__(self, numbers: NDArray[np.float64]) -> None:
+    def __init__(self, numbers: Array) -> None:
         self.numbers = numbers
 
     @property
-    def begin(self) -> float:
-        """Where it begins."""
-        return float(self.numbers[0])
-
-    @property
     def end(self) -> float:
-        """Where it ends."""
+        """Fraction of the segment at its end."""
         return float(self.numbers[1])
 
     @property
     def rejected(self) -> int:
-        """Attempts before it."""
+        """Number of attempts before it."""
         return int(self.numbers[2])
 
 
 class StepControl:
-    """What decides about load steps: the size of the next one, and how much the last ones changed."""
+    """Control of load steps: the size of the next one, and the changes by the last ones.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    least : float
+        Smallest load step, as a part of its segment.
+    """
+
+    def __init__(self, least: float = LEAST) -> None:
         self._numbers = np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+        self._least = least
 
     @classmethod
-    def from_record(cls, record: Mapping[str, Any]) -> StepControl:
-        """Read it from the record of a step."""
-        control, past = cls(), record["memory"]
+    def from_record(cls, record: Mapping[str, Any], least: float = LEAST) -> StepControl:
+        """Return the control from the record of a step."""
+        control, past = cls(least), record["memory"]
         names = ("size", "first", "stick", "traction")
         control._numbers[:] = [*(record[name] for name in names), past["stick"], past["traction"]]
         return control
 
     @property
     def record(self) -> dict[str, Any]:
-        """Return what the record of a step holds."""
+        """The control in the record of a step."""
         size, first, stick, traction, *past = self._numbers.tolist()
         memory = {"stick": past[0], "traction": past[1]}
         return {"size": size, "first": first, "stick": stick, "traction": traction, "memory": memory}
 
+    def begin_with(self, size: float) -> None:
+        """Set the first size of a segment, as a part of it."""
+        self._numbers[1] = 0.5 * size  # the core doubles that of the segment before
+
     def forget(self) -> None:
-        """Forget the changes so far, as after a load step whose size was given."""
+        """Reset the changes, as after a load step of given size."""
         self._numbers[2:] = 0.0
 
     def first_attempt(self, fraction: float, largest: float) -> Attempt:
         """Return the first attempt at a load step that begins at a fraction of its segment."""
-        return Attempt(_api.first_attempt(self._numbers, fraction, largest))
+        return Attempt(_api.first_attempt(self._numbers, self._least, fraction, largest))
 
     def judge(self, attempt: Attempt, change: Change | None, tolerance: float) -> int:
-        """Return what becomes of an attempt (None: it did not converge); a rejected one becomes the next."""
+        """Return the verdict on an attempt (None: it did not converge); a rejected one becomes the next."""
         known = change is not None
-        return int(_api.judge_attempt(self._numbers, attempt.numbers, known, change or Change(), tolerance))
+        given = attempt.numbers, known, change or Change(), tolerance
+        return int(_api.decide_attempt(self._numbers, self._least, *given))
 
-    def accept(self, attempt: Attempt, change: Change, tolerance: float, verdict: int) -> float:
-        """Take an attempt over; return the bound on the error of the stick area over the largest contact."""
-        return float(_api.accept_attempt(self._numbers, attempt.numbers, change, tolerance, verdict))
+    def accept(self, attempt: Attempt, change: Change, tolerance: float, verdict: int) -> tuple[float, float]:
+        """Accept an attempt; return bounds on the errors of stick area and tractions, both as shares."""
+        given = attempt.numbers, change, tolerance, verdict
+        bounds = _api.accept_attempt(self._numbers, self._least, *given)
+        return float(bounds[0]), float(bounds[1])

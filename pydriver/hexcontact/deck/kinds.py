@@ -1,4 +1,4 @@
-"""Kinds of values: what each expects, in words and as JSON schema, how to read it, how a deck says it."""
+"""Kinds of values: the expected value in words and as JSON schema, reading, and writing to a deck."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from ..text import did_you_mean, listed, shown
 from ..variables import LARGEST
+from .formula import Formula
 from .units import ANGLE, NUMBER, Dimension, UnitError, to_si
 
 Schema = dict[str, Any]
@@ -21,33 +22,34 @@ Schema = dict[str, Any]
 
 
 def refuse(sentence: str) -> NoReturn:
-    """Reject a value while it is being validated; `sentence` follows the key and the value."""
+    """Reject a value during validation; `sentence` follows the key and the value in the message."""
     raise PydanticCustomError("deck", "{sentence}", {"sentence": sentence})
 
 
 SMALLEST = 1.0 / LARGEST
 _DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_SHARE = re.compile(rf"\s*([+-]?{_DIGITS})\s*\*?\s*(?:mu|[\u00b5\u03bc])\s*\*?\s*P\s*")  # both letters mu
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of value, which stands in ``Annotated[float, kind]``."""
+    """A kind of value, for annotations ``Annotated[float, kind]``."""
 
     @property
     def expected(self) -> str:
-        """What a value of this kind looks like, to follow the word "expected"."""
+        """Description of a value of this kind, to follow the word "expected"."""
         return self._expected()
 
     def parse(self, value: object) -> Any:
-        """Read a value, or `refuse` it."""
+        """Return the value of an entry of a deck, or `refuse` it."""
         return self._parse(value)
 
     def written(self, value: Any) -> Any:
-        """Return a value that was read as a deck says it."""
+        """Return a parsed value as a deck holds it."""
         return value
 
     def schema(self) -> Schema:
-        """Return what a JSON schema says about it."""
+        """Return the JSON schema of the kind."""
         return self._schema()
 
     def _expected(self) -> str:
@@ -72,7 +74,7 @@ class Kind:
 class Quantity(Kind):
     """A finite number with a dimension and bounds, in SI once read.
 
-    `infinite` admits +inf as well; `any_size` admits what no length, force or modulus could be.
+    `infinite` admits +inf; `any_size` also admits values beyond those of lengths, forces and moduli.
     """
 
     dimension: Dimension
@@ -114,7 +116,7 @@ class Quantity(Kind):
         return number
 
     def written(self, value: float) -> float | str:
-        """Return a number in SI; with its unit where a bare one is refused."""
+        """Return a number in SI, with its unit if the dimension requires one."""
         return f"{value!r} rad" if self.dimension is ANGLE else value
 
     def _schema(self) -> Schema:
@@ -131,6 +133,62 @@ class Quantity(Kind):
             return text | known
         known["description"] += f"; a bare number is in {self.dimension.unit}"
         return {"anyOf": [text, number], **known}
+
+
+@dataclass(frozen=True)
+class PowerCoefficient(Kind):
+    """A coefficient above 0 of a power law, which its table parses in a unit that depends on the exponent."""
+
+    unit: str
+    example: str
+
+    def _expected(self) -> str:
+        return f"a coefficient above 0 in {self.unit} such as {self.example}"
+
+    def _parse(self, value: object) -> Any:
+        return value
+
+    def _schema(self) -> Schema:
+        return {"type": ["number", "string"], "description": self.expected}
+
+
+@dataclass(frozen=True)
+class Share:
+    """A tangential load as a share of the limit of friction, mu P at the end of its segment."""
+
+    share: float
+
+    def __str__(self) -> str:
+        return f"{self.share!r} mu P"
+
+
+@dataclass(frozen=True)
+class OrShare(Kind):
+    """A force, or a share of the limit of friction."""
+
+    kind: Quantity
+
+    def _expected(self) -> str:
+        measured = self.kind.dimension
+        return f'{measured.name}, or a share of mu P, such as {measured.example} or "0.6 mu P"'
+
+    def _parse(self, value: object) -> float | Share:
+        if isinstance(value, Share):
+            return value
+        match = _SHARE.fullmatch(value) if isinstance(value, str) else None
+        if match and abs(share := float(match[1])) <= LARGEST:
+            return Share(share)
+        try:
+            return self.kind.parse(value)
+        except PydanticCustomError as error:
+            refuse(error.message().replace(self.kind.expected, self.expected, 1))
+
+    def written(self, value: float | Share) -> float | str:
+        """Return newtons, or the share as text."""
+        return str(value) if isinstance(value, Share) else self.kind.written(value)
+
+    def _schema(self) -> Schema:
+        return self.kind.schema() | {"examples": ["10 N", "0.6 mu P"]}
 
 
 @dataclass(frozen=True)
@@ -160,7 +218,7 @@ class Whole(Kind):
 
 @dataclass(frozen=True)
 class Word(Kind):
-    """One word out of a few."""
+    """One of several words."""
 
     words: tuple[str, ...]
 
@@ -184,7 +242,7 @@ class Text(Kind):
         return "text in quotes"
 
     def _parse(self, value: object) -> str:
-        if not isinstance(value, str) or re.search("[\ud800-\udfff]", value):  # halves of pairs
+        if not isinstance(value, str) or re.search("[\ud800-\udfff]", value):  # unpaired surrogates
             refuse(f"expected {self.expected}")
         return value
 
@@ -206,6 +264,23 @@ class FileName(Text):
 
 
 @dataclass(frozen=True)
+class HeightFormula(Text):
+    """A formula of x and y, as text."""
+
+    def _expected(self) -> str:
+        return 'a formula of x and y in m such as "min((x - 1e-4)**2, (x + 1e-4)**2)/2e-2 + y**2/2e-2"'
+
+    def _parse(self, value: object) -> str:
+        text = super()._parse(value)
+        try:
+            if not set(Formula(text).names) <= {"x", "y"}:
+                raise ValueError("a formula of x and y alone")
+        except ValueError as error:
+            refuse(f"expected {self.expected}; it is not {error}")
+        return text
+
+
+@dataclass(frozen=True)
 class Flag(Kind):
     """True or false."""
 
@@ -223,9 +298,9 @@ class Flag(Kind):
 
 @dataclass(frozen=True)
 class Several(Kind):
-    """An array of values of one kind: `count` of them, or any number but none.
+    """An array of values of one kind: `count` of them, or at least one.
 
-    `plural` names them and `example` shows an array as it stands in a deck.
+    `plural` is the noun for them, `example` an array as in a deck.
     """
 
     kind: Kind
@@ -234,7 +309,7 @@ class Several(Kind):
     count: int | None = None
 
     def _expected(self) -> str:
-        number = {None: "an array of", 2: "two"}[self.count]
+        number = {None: "an array of", 2: "two", 3: "three"}[self.count]
         return f"{number} {self.plural} such as {self.example}"
 
     def _parse(self, value: object) -> tuple[Any, ...]:
@@ -261,7 +336,7 @@ class Several(Kind):
 
 
 def _is_array(value: object) -> TypeGuard[Iterable[Any]]:
-    """Tell whether something has entries in an order: a list, a tuple, an array of numpy."""
+    """Return whether a value is an array: a list, a tuple, or an array of numpy."""
     return hasattr(value, "__getitem__") and hasattr(value, "__len__") and getattr(value, "shape", (1,)) != ()
 
 

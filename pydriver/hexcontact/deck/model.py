@@ -1,63 +1,102 @@
-"""What every table of a deck shares: strict keys, and a sentence for each thing wrong.
+"""The base of the tables of a deck: strict keys, and a sentence for each mistake.
 
-A `Table` is a pydantic model that forbids unknown keys and turns whatever pydantic finds into `Mistake`
-sentences; all of them reach the user at once, as one `DeckError`.
+A `Table` is a pydantic model that forbids unknown keys and turns the errors of pydantic into `Mistake`
+sentences, which one `DeckError` reports together.
 """
 
 from __future__ import annotations
 
+import difflib
 import tomllib
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, NoReturn, Self
+from typing import Any, ClassVar, NoReturn, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from ..text import did_you_mean, listed
+from ..text import listed
 from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .kinds import Kind, Schema
 
 
 def meaning(default: Any, words: str, example: str = "") -> Any:
-    """Say what a key of a table means; it is required if its default is ``...``.
+    """Return the field of a key with its description; it is required if its default is ``...``.
 
-    The example is as in a deck, for keys that need another one than their kind has.
+    An example, as in a deck, is for keys that need another one than that of their kind.
     """
     return Field(default, description=words, examples=[example] if example else None)
 
 
+SYMBOLS = {
+    **dict.fromkeys(("E", "modulus"), "young_modulus"),
+    **dict.fromkeys(("nu", "ν", "v", "poisson"), "poisson_ratio"),
+    **dict.fromkeys(("mu", "μ", "µ", "cof", "f", "coefficient"), "friction.coefficient"),
+    **dict.fromkeys(("P", "F", "N", "Fn", "Fz", "load", "force"), "normal_load"),
+    **dict.fromkeys(("Q", "Qx", "Ft", "Fx"), "tangential_load_x"),
+    **dict.fromkeys(("Qy", "Fy"), "tangential_load_y"),
+    **dict.fromkeys(("M", "Mz"), "torque"),
+    **dict.fromkeys(("delta", "δ", "depth", "d"), "approach"),
+    **dict.fromkeys(("ux", "sx"), "shift_x"),
+    **dict.fromkeys(("uy", "sy"), "shift_y"),
+    **dict.fromkeys(("R", "r"), "radius"),
+    **dict.fromkeys(("h", "dx", "l_e", "mesh"), "spacing"),
+}
+"""Keys of decks by the symbols and words of engineers, with the table if several have such a key."""
+
+
 class Table(BaseModel):
-    """A table of a deck: known keys only, immutable, and every problem in it reported together."""
+    """A table of a deck: immutable, with known keys only, and with all mistakes reported together."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False)
 
     schema_of_all: ClassVar[Schema] = {}
-    """What the schema says about the keys together."""
+    """Conditions of the schema on several keys."""
 
     schema_if_whole: ClassVar[Schema] = {}
-    """What it says besides if nothing of the table stands in an included deck."""
+    """Further conditions if no key of the table is in an included deck."""
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Yield (key, sentence) for keys that do not go together; sees the table as it was written.
+        """Yield (key, sentence) for keys that exclude or need each other, from the table as written.
 
-        An empty key blames the whole table.
+        An empty key is the whole table.
         """
         yield from ()
 
     @classmethod
     def known_keys(cls) -> dict[str, Any]:
-        """Return the fields of the table by the keys that decks use."""
+        """Return the fields of the table by the keys of decks."""
         return {info.alias or name: info for name, info in cls.model_fields.items()}
 
     @classmethod
+    def meant(cls, key: str) -> str:
+        """Return the known key that an unknown one may mean, also in an inner table; empty if none."""
+        known, path = cls.known_keys(), SYMBOLS.get(key, key)
+        table, _, word = path.rpartition(".")
+        elsewhere = table and table != cls.__name__.lower() and word != key
+        if word in known and not elsewhere:
+            return word
+        below = [
+            f"{name}.{word}"
+            for name, info in known.items()
+            for part in _parts(info.annotation)
+            if issubclass(part, Table) and word in part.known_keys()
+        ]
+        if below:
+            return path if path in below else below[0]
+        if elsewhere:
+            return path
+        near = difflib.get_close_matches(key[:100], list(known), n=1)
+        return near[0] if near else ""
+
+    @classmethod
     def parse(cls, data: Mapping[str, Any], source: Source) -> Self:
-        """Check a file that was read into dictionaries.
+        """Return the checked table of a file.
 
         Raises
         ------
         DeckError
-            With a sentence for each thing that is wrong.
+            With a sentence for each mistake.
         """
         try:
             return cls.model_validate(data)
@@ -65,7 +104,7 @@ class Table(BaseModel):
             raise deck_error(problems_of(error), source) from None
 
     def written(self, defaults: bool = True) -> dict[str, Any]:
-        """Return the keys that have a value, as a deck says them; without `defaults` only others."""
+        """Return the keys with values as a deck holds them; without `defaults` only values that differ."""
         keys = {}
         for name, info in type(self).model_fields.items():
             value = getattr(self, name)
@@ -77,7 +116,7 @@ class Table(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> Schema:
-        """Describe the keys; which of them are required depends on what a deck includes."""
+        """Describe the keys; which are required depends on the included decks."""
         schema: Schema = handler.resolve_ref_schema(handler(core))
         schema.pop("required", None)
         schema.pop("title")
@@ -104,8 +143,16 @@ class Table(BaseModel):
         except ValidationError as error:
             found += [cls._problem(details) for details in error.errors(include_url=False)]
         if isinstance(data, Mapping):
+            # A key that an unknown one means is not reported as missing.
+            known = cls.known_keys()
+            meant = {key: cls.meant(str(key)) for key in data if key not in known}
+            given = {tuple(key.split(".")) for key in meant.values() if key}
+            found = [problem for problem in found if problem.value is not MISSING or problem.key not in given]
+            corrected = {meant.get(key) or key: value for key, value in data.items()}
+            remaining = list(cls.conflicts(corrected))
             for key, sentence in cls.conflicts(data):
-                found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
+                if (key, sentence) in remaining:
+                    found.append(Mistake((key,) if key else (), data.get(key, MISSING), sentence))
         if found:
             raise ValidationError.from_exception_data(cls.__name__, [_details(problem) for problem in found])
         return table
@@ -114,16 +161,15 @@ class Table(BaseModel):
     def _problem(cls, details: Any) -> Mistake:
         key, value, kind = details["loc"], details["input"], details["type"]
         if kind == "deck":
-            # The problem may come from a table below, which has marked a missing value already.
-            return Mistake(
-                key, MISSING if details["ctx"].get("missing") else value, details["ctx"]["sentence"]
-            )
+            context = details["ctx"]  # an inner table has marked missing values
+            return Mistake(key, MISSING if context.get("missing") else value, context["sentence"])
         known = cls.known_keys()
         if kind == "missing":
             return Mistake(key, MISSING, f"missing; expected {expectation(known[key[0]])}")
         if kind == "extra_forbidden":
-            hint = did_you_mean(key[0], known) or f"; known here: {listed(sorted(known), 'and')}"
-            return Mistake(key, MISSING, f"unknown key{hint}")
+            near = cls.meant(str(key[0]))
+            hint = f"did you mean {near}?" if near else f"known here: {listed(sorted(known), 'and')}"
+            return Mistake(key, MISSING, f"unknown key; {hint}")
         if kind == "list_type":
             return Mistake(key, MISSING, f"expected an array of tables: write [[{key[-1]}]]")
         if kind == "too_short":
@@ -134,12 +180,12 @@ class Table(BaseModel):
 
 
 def extended(table: type[Table], keys: dict[str, Any]) -> Any:
-    """Return a table with more keys, each with its annotation and `meaning`."""
+    """Return a table with further keys, each with annotation and `meaning`."""
     return create_model(table.__name__, __base__=table, **keys)
 
 
 class Argument(Table):
-    """A table that is made in Python, too, where mistakes are a DeckError at once."""
+    """A table that is also made in Python, where mistakes raise a DeckError."""
 
     def __init__(self, /, **keys: Any) -> None:
         try:
@@ -149,7 +195,7 @@ class Argument(Table):
 
 
 def _written(value: Any, defaults: bool) -> Any:
-    """Return tables as a deck says them."""
+    """Return tables as a deck holds them."""
     if isinstance(value, Table):
         return value.written(defaults)
     return [_written(entry, defaults) for entry in value] if isinstance(value, list) else value
@@ -165,25 +211,29 @@ def kind_of(info: Any) -> Kind | None:
 
 
 def expectation(info: Any) -> str:
-    """Say what a field expects, for messages and for the deck reference."""
+    """Return the expected value of a field in words, for messages and for the deck reference."""
     if kind := kind_of(info):
         return kind.expected
     return "an array of tables of keys" if "list[" in str(info.annotation) else "a table of keys"
 
 
 def refuse_key(key: str, value: object, sentence: str) -> NoReturn:
-    """Reject one key of a table that is being validated as a single value."""
+    """Reject one key of a table that is validated as a single value."""
     raise ValidationError.from_exception_data("", [_details(Mistake((key,), value, sentence))])
+
+
+def _parts(annotation: Any) -> list[type]:
+    """Return the classes in an annotation such as ``Table | None``."""
+    return [part for part in (annotation, *get_args(annotation)) if isinstance(part, type)]
 
 
 def _details(problem: Mistake) -> InitErrorDetails:
     context = {"sentence": problem.sentence, "missing": problem.value is MISSING}
     value = None if problem.value is MISSING else problem.value
-    return InitErrorDetails(
-        type=PydanticCustomError("deck", "{sentence}", context), loc=problem.key, input=value
-    )
+    error = PydanticCustomError("deck", "{sentence}", context)
+    return InitErrorDetails(type=error, loc=problem.key, input=value)
 
 
 def problems_of(error: ValidationError) -> list[Mistake]:
-    """Return the problems that a `Table` found while it was validated."""
+    """Return the mistakes of a `Table` from a failed validation."""
     return [Table._problem(details) for details in error.errors(include_url=False)]

@@ -1,6 +1,6 @@
-"""One deck out of several sources: files it includes, keys set on the command line, series of loads.
+"""A deck from several sources: included files, keys set on the command line, series of loads.
 
-What comes out is whole: a result that keeps its text can be run again without any of the other files.
+The assembled deck is complete: a result that contains its text can be run again without the other files.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ MOST_SERIES = 1000  # files of series
 
 @dataclass(frozen=True)
 class Assembled:
-    """A deck put together.
+    """A deck assembled from its sources.
 
     Attributes
     ----------
     data : dict
         The tables, without `include` and without files of series.
     text : str or None
-        The text that stands for all of it, or None if no single text does.
+        Text of the whole deck, or None if it has several sources.
     source : Source
-        Where the keys are written.
+        Places of the keys.
     problems : list of Mistake
-        Series that could not be read; they are left as they were.
+        Mistakes in series, which stay as they were.
     """
 
     data: dict[str, Any]
@@ -48,7 +48,7 @@ class Assembled:
 
     @property
     def remark(self) -> str:
-        """A comment that says what the deck was made of."""
+        """A comment with the sources of the deck."""
         files = [name for name, _ in ((self.source.name, ""), *self.source.included) if name]
         remark = f"# Put together from {listed(files, 'and')}" if files else ""
         if remark and self.source.overrides:
@@ -63,7 +63,7 @@ def assemble(
     folder: Path = Path(),
     overrides: Mapping[str, Any] | None = None,
 ) -> Assembled:
-    """Merge what a deck includes, replace single keys, and read its series of loads.
+    """Return a deck with its included decks merged, single keys replaced, and series of loads read.
 
     Parameters
     ----------
@@ -72,11 +72,11 @@ def assemble(
     text : str, optional
         The deck as text.
     source : Source
-        Where it came from.
+        Source of the deck.
     folder : Path
-        Where relative names of files begin: the folder of the deck.
+        Folder of the deck, to which names of files are relative.
     overrides : mapping, optional
-        New values by dotted key, see `hexcontact.deck.with_overrides`.
+        New values by dotted key, see `hexcontact.deck.toml.with_overrides`.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def assemble(
         If an included file is missing, is no TOML or includes itself, or a key cannot be replaced.
     """
     refuse_deep(data, source.name)
-    if not ("include" in data or overrides or any(True for _ in _series_with_files(data))):
+    if not ("include" in data or overrides or any(True for _ in _named_files(data))):
         return Assembled(dict(data), text, source, [])
     name = Path(source.name) if source.name else None
     merged, included = _merged(data, source, folder, (name.resolve(),) if name else (), [])
@@ -96,15 +96,18 @@ def assemble(
         refuse_deep(merged, source.name)
     source = replace(source, overrides=frozenset(overrides or ()), included=tuple(included))
     merged = copy.deepcopy(merged)
+    for table, key in _named_files(merged):
+        if key == "map":  # read when the case is built, from any folder
+            table[key] = str((folder / table[key]).absolute())
     return Assembled(merged, None, source, list(_read_series(merged, folder)))
 
 
 def _merged(
     data: Mapping[str, Any], source: Source, folder: Path, chain: tuple[Path, ...], sizes: list[int]
 ) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    """Return a deck with what it includes beneath it, and the files, the one that counts most first.
+    """Return a deck merged with the decks that it includes, and these files in the order of precedence.
 
-    `sizes` collects those of all files read.
+    `sizes` collects the lengths of all files read.
     """
     own = {key: value for key, value in data.items() if key != "include"}
     if "include" not in data:
@@ -130,15 +133,15 @@ def _merged(
         sizes.append(len(text))
         below = Source(str(path), text)
         inner, further = _merged(tables, below, path.parent, (*chain, path.resolve()), sizes)
-        for series in _series_with_files(inner):  # relative to the file that names them
-            series["file"] = os.path.relpath(path.parent / series["file"], folder)
+        for table, key in _named_files(inner):  # relative to the file that names them
+            table[key] = os.path.relpath(path.parent / table[key], folder)
         beneath = _over(inner, beneath)
         files = [(str(path), text), *further, *files]
     return _over(own, beneath), files
 
 
 def _over(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:
-    """Lay one deck over another: tables are merged, anything else is replaced."""
+    """Return one deck over another: tables are merged, other values replaced."""
     result = dict(lower)
     for key, value in upper.items():
         below = result.get(key)
@@ -149,29 +152,37 @@ def _over(upper: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def _series_with_files(data: Mapping[str, Any]) -> Iterator[Any]:
+def _series_with_files(data: Mapping[str, Any]) -> Iterator[tuple[int, Any]]:
+    """Yield the index of each entry of [[load]] whose series is a file, and the series."""
     loads = data.get("load")
-    for load in loads if isinstance(loads, list) else ():
+    for number, load in enumerate(loads if isinstance(loads, list) else ()):
         series = load.get("series") if isinstance(load, Mapping) else None
         if isinstance(series, dict) and isinstance(series.get("file"), str):
-            yield series
+            yield number, series
+
+
+def _named_files(data: Mapping[str, Any]) -> Iterator[tuple[Any, str]]:
+    """Yield the tables that name files, and their keys."""
+    yield from ((series, "file") for _, series in _series_with_files(data))
+    friction = data.get("friction")
+    coefficient = friction.get("coefficient") if isinstance(friction, Mapping) else None
+    if isinstance(coefficient, dict) and isinstance(coefficient.get("map"), str) and coefficient["map"]:
+        yield coefficient, "map"
 
 
 def _read_series(data: Mapping[str, Any], folder: Path) -> Iterator[Mistake]:
-    """Put the rows in the place of the names of files, and yield what is wrong with them."""
-    if sum(1 for _ in _series_with_files(data)) > MOST_SERIES:
+    """Replace the names of files by their rows, and yield the mistakes in them."""
+    found = list(_series_with_files(data))
+    if len(found) > MOST_SERIES:
         raise DeckError(f"load: expected at most {MOST_SERIES} files of series")
-    for number, load in enumerate(data["load"] if isinstance(data.get("load"), list) else ()):
-        series = next(_series_with_files({"load": [load]}), None)
-        if series is None:
-            continue
+    for number, series in found:
         try:
-            asked = Series.model_validate(series)
+            table = Series.model_validate(series)
         except ValidationError:
-            continue  # what is wrong there is found when the tables are checked
-        columns = asked.columns and asked.columns.written()
+            continue  # the check of the tables reports it
+        columns = table.columns and table.columns.written()
         try:
-            load["series"] = read_series(folder / asked.file, columns)
+            data["load"][number]["series"] = read_series(folder / table.file, columns)
         except DeckError as error:
             key = ("load", number, "series", "file")
             for sentence in str(error).splitlines():

@@ -1,7 +1,6 @@
-"""JSON schema of the deck, for editors that complete and check TOML, made from the models that check decks.
+"""JSON schema of the deck, for editors that complete and check TOML, from the models that check decks.
 
-A schema says less than ``hexcontact check``: which keys and words there are, what is a quantity, what is
-required.
+A schema contains less than the rules of ``hexcontact check``: keys, words, quantities, required keys.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from .tables import Deck
 
 
 class _Generator(GenerateJsonSchema):
-    """Decks have no nulls, and need no titles of keys."""
+    """A generator of schemas without nulls and titles of keys."""
 
     def nullable_schema(self, schema: Any) -> Schema:
         return self.generate_inner(schema["schema"])
@@ -27,21 +26,25 @@ class _Generator(GenerateJsonSchema):
 
 def deck_schema() -> Schema:
     """Return the schema of a whole deck (draft 2020-12)."""
-    schema = Deck.model_json_schema(schema_generator=_Generator)
+    schema = schema_of(Deck, "hexcontact deck", "A contact problem of two elastic half-spaces")
+    # Required keys may be in an included deck.
+    return {**schema, "if": {"required": ["include"]}, "else": _whole(Deck)}
+
+
+def schema_of(table: type[Table], title: str, description: str) -> Schema:
+    """Return the schema of a file with the keys of a table, none of them required."""
+    schema = table.model_json_schema(schema_generator=_Generator)
     return {
         "$schema": _Generator.schema_dialect,
-        "title": "hexcontact deck",
+        "title": title,
         **schema,
-        "description": "A contact problem of two elastic half-spaces",
+        "description": description,
         "properties": {"$schema": {"type": "string"}, **schema["properties"]},
-        # what a deck leaves out may stand in those that it includes
-        "if": {"required": ["include"]},
-        "else": _whole(Deck),
     }
 
 
 def _whole(table: type[Table]) -> Schema:
-    """Return what a deck without includes must say."""
+    """Return the schema of the required keys of a deck without includes."""
     keys = table.known_keys().items()
     inner = {
         key: _whole(part)

@@ -1,7 +1,7 @@
 """Load histories as time series: the table `series` of a [[load]], and reading it from CSV or netCDF files.
 
-Each row of a file is a load step reached. A case keeps the numbers and not the name of the file, so that its
-result can be run again when the file has gone or changed.
+Each row of a file is the end of a load step. A case contains the numbers and not the name of the file, so
+that its result can be run again when the file is deleted or changed.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from ..text import did_you_mean, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
 from .model import Table, extended, meaning
-from .units import ANGLE, FORCE, LENGTH, TORQUE
+from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE
 
 
 class Driven(NamedTuple):
-    """A load or motion of which decks and files of series speak, each by its own key.
+    """A load or motion with its own key in decks and files of series.
 
     Attributes
     ----------
     kind : Quantity
-        What its values are.
+        Kind of its values.
     of_segment, of_row : str
-        What the key means in [[load]] and in a series.
+        Meaning of the key in [[load]] and in a series.
     header, rows : str
-        The header of a column, and an array of values, as a deck may have them.
+        Examples of the header of a column and of an array of values in a deck.
     example : str
-        A value, where that of its dimension does not do.
+        Example of a value, if that of its dimension does not suit.
     """
 
     kind: Quantity
@@ -56,15 +56,14 @@ _TWIST = "rotation about z, instead of torque"
 
 def _tangential(axis: str) -> Driven:
     meant = f"tangential load on body 1 along {axis}", f"tangential load along {axis} of each row"
-    return Driven(Quantity(FORCE), *meant, f'"Q{axis} [N]"', _FORCES)
+    return Driven(Quantity(FORCE), *meant, f'"Q{axis} [N]"', _FORCES, FORCE.example)
 
 
 def _shift(axis: str) -> Driven:
-    meant = (
-        f"tangential motion of body 2, instead of tangential_load_{axis}",
-        f"shift along {axis} of each row",
+    meant = f"tangential motion of body 2, instead of tangential_load_{axis}"
+    return Driven(
+        Quantity(LENGTH), meant, f"shift along {axis} of each row", f'"u{axis} [um]"', _LENGTHS, '"1 um"'
     )
-    return Driven(Quantity(LENGTH), *meant, f'"u{axis} [um]"', _LENGTHS, '"1 um"')
 
 
 DRIVEN: dict[str, Driven] = {
@@ -77,12 +76,23 @@ DRIVEN: dict[str, Driven] = {
     ),
     "shift_x": _shift("x"),
     "shift_y": _shift("y"),
+    **{
+        f"bulk_stress_{axes}": Driven(
+            Quantity(PRESSURE),
+            f"bulk stress {axes} of the body that [bulk] names, tension positive",
+            f"bulk stress {axes} of each row",
+            f'"S{axes} [MPa]"',
+            '["0 MPa", "80 MPa"]',
+            '"80 MPa"',
+        )
+        for axes in ("xx", "yy", "xy")
+    },
     "twist": Driven(Quantity(ANGLE), _TWIST, "twist of each row", '"angle [deg]"', '["0 deg", "1 deg"]'),
 }
-"""All of them, by the key."""
+"""The loads and motions by key."""
 
-_PASSED_OVER = ("time", "step")  # columns of files that need not be deck keys
-_MOST_COMPLAINTS = 10
+_IGNORED = ("time", "step")  # columns of files that are no deck keys
+_MOST_SENTENCES = 10
 _LONGEST_LABEL = 1000  # characters
 _EXPECTED = "a CSV or netCDF file of loads"
 
@@ -95,7 +105,7 @@ MOST_STEPS = 100_000
 
 @dataclass(frozen=True)
 class OrEmpty(Kind):
-    """A value, or "" where a row does not name it."""
+    """A value, or "" in rows without it."""
 
     kind: Kind
 
@@ -124,7 +134,7 @@ _Headers: Any = extended(
 
 
 class Columns(_Headers):
-    """Which column of a file holds what."""
+    """Headers of the columns of a file by key."""
 
     label: _Header = meaning(None, "header of the column of labels", '"phase"')
 
@@ -157,7 +167,7 @@ class Series(_Rows):
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Arrays are of one length, no row drives a motion twice, and a file stands alone."""
+        """Require arrays of one length, one control of each motion in a row, and a file without arrays."""
         data = {key: value for key, value in data.items() if value is not None}  # None comes from Python
         arrays = {key: data[key] for key in (*DRIVEN, "label") if isinstance(data.get(key), list | tuple)}
         if "file" in data:
@@ -182,7 +192,7 @@ class Series(_Rows):
         return len(next(filled for key in DRIVEN if (filled := getattr(self, key)) is not None))
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield what each row names, in SI, and its label."""
+        """Yield the values of each row, in SI, and its label."""
         named = {key: array for key in (*DRIVEN, "label") if (array := getattr(self, key)) is not None}
         for row in zip(*named.values(), strict=True):
             yield {key: value for key, value in zip(named, row, strict=True) if value is not None}
@@ -203,7 +213,7 @@ def driven_twice(arrays: Mapping[str, Any]) -> Iterator[tuple[int, str, str]]:
 
 @dataclass(frozen=True)
 class _Column:
-    """A column of a file: its header, its unit if the header says one, and where the rows stand."""
+    """A column of a file: header without unit, unit (may be empty), and cells."""
 
     header: str
     unit: str
@@ -214,7 +224,7 @@ _UNIT_IN_HEADER = re.compile(r"\s*(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\(
 
 
 def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
-    """Read a series of loads from a file.
+    """Return a series of loads from a file.
 
     Parameters
     ----------
@@ -222,18 +232,18 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
         A netCDF file if its name ends in ``.nc`` (variables of one dimension, with the attribute ``units``),
         else text: a line of headers, then rows, separated by commas, semicolons or tabs.
     columns : mapping of str to str, optional
-        Header of the column for each key. All other columns are passed over then; without it every header
-        has to be a key of [[load]], except for ``time`` and ``step``.
+        Header of the column for each key; other columns are ignored. Without it every header has to be a key
+        of [[load]], except for ``time`` and ``step``.
 
     Returns
     -------
     dict of str to list
-        The rows by key: floats in SI (twists as text with their unit), "" where a row is silent; labels.
+        The rows by key: floats in SI (twists as text with their unit), "" in rows without a value; labels.
 
     Raises
     ------
     DeckError
-        With a sentence for each thing that is wrong; they name file, line and column.
+        With a sentence for each mistake, which names file, line and column.
     """
     netcdf = path.suffix in (".nc", ".nc4", ".cdf")
     found, lines = (_netcdf_columns if netcdf else _text_columns)(path)
@@ -257,13 +267,13 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
         place = f"{path}, {where} {lines[row]}"
         problems.append(f"{place}: expected {force} or {displacement}, not both; choose one with columns")
     if problems:
-        more = len(problems) - _MOST_COMPLAINTS
-        raise DeckError("\n".join(problems[:_MOST_COMPLAINTS] + [f"{path}: and {more} more"] * (more > 0)))
+        more = len(problems) - _MOST_SENTENCES
+        raise DeckError("\n".join(problems[:_MOST_SENTENCES] + [f"{path}: and {more} more"] * (more > 0)))
     return series
 
 
 def _unit_fault(key: str, unit: str) -> str:
-    """Return what is wrong with the unit of a column, once instead of in each row."""
+    """Return the fault of the unit of a column, once instead of in each row."""
     try:
         DRIVEN[key].kind.parse(f"1 {unit}")
     except PydanticCustomError as error:
@@ -280,7 +290,7 @@ def _value(key: str, cell: Any, unit: str) -> Any:
             refuse("expected a decimal point, not a comma")
         number = _number(cell)
         if number is None and unit and _number(cell.split()[0] if cell.split() else "") is not None:
-            refuse(f"expected a number without a unit, since the header says [{unit}]")
+            refuse(f"expected a number without a unit, since the header has the unit [{unit}]")
         quantity: Any = cell if number is None else (f"{cell} {unit}" if unit else number)
     else:
         quantity = f"{cell!r} {unit}" if unit else cell
@@ -306,26 +316,25 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
         for column in found:
             if column.header in keys:
                 chosen[column.header] = column
-            elif column.header not in _PASSED_OVER:
-                hint = did_you_mean(column.header, keys) or (
+            elif column.header not in _IGNORED:
+                others = (
                     f"; known are {listed(keys, 'and')}; to leave columns out, name the others with columns"
                 )
+                hint = did_you_mean(column.header, keys) or others
                 problems.append(f"{path}: unknown column {shown(column.header)}{hint}")
     else:
         for key, header in columns.items():
             name, unit = _split(str(header))
             if name not in headers:
-                there = [*map(shown, headers[:_MOST_COMPLAINTS])] + ["others"] * (
-                    len(headers) > _MOST_COMPLAINTS
-                )
+                there = [*map(shown, headers[:_MOST_SENTENCES])]
+                there += ["others"] * (len(headers) > _MOST_SENTENCES)
                 hint = did_you_mean(name, headers) or f"; there are {listed(there, 'and')}"
                 problems.append(f"{path}: has no column {shown(name)} for {key}{hint}")
                 continue
             column = found[headers.index(name)]
             if unit and column.unit and unit != column.unit:
-                problems.append(
-                    f"{path}: column {shown(name)} is in {column.unit}, not in {unit} as columns says"
-                )
+                units = f"in {column.unit}, not in {unit} as in columns"
+                problems.append(f"{path}: column {shown(name)} is {units}")
             chosen[key] = _Column(column.header, unit or column.unit, column.cells)
     if not problems and not any(key in DRIVEN for key in chosen):
         problems.append(f"{path}: expected a column of loads or motions, such as normal_load [N]")
@@ -343,7 +352,7 @@ def _split(header: str) -> tuple[str, str]:
 
 
 def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
-    """Read a text file; empty lines and those that begin with # are passed over."""
+    """Return columns and line numbers of a text file without empty lines and lines that begin with #."""
     lines = [
         (number, line)
         for number, line in enumerate(text_of(path, _EXPECTED).splitlines(), start=1)
@@ -357,17 +366,14 @@ def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
         rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
     except csv.Error as error:
         raise DeckError(f"{path}: cannot be read ({error}); expected {_EXPECTED}") from None
-    if len(
-        problems := [
-            f"{path}, line {number}: expected {len(rows[0])} cells, as many as headers, not {len(row)}"
-            for (number, _), row in zip(lines, rows, strict=True)
-            if len(row) != len(rows[0])
-        ]
-    ):
-        raise DeckError("\n".join(problems[:_MOST_COMPLAINTS]))
-    columns = []
-    for place, header in enumerate(rows[0]):
-        columns.append(_Column(*_split(header), [row[place] for row in rows[1:]]))
+    problems = [
+        f"{path}, line {number}: expected {len(rows[0])} cells, as many as headers, not {len(row)}"
+        for (number, _), row in zip(lines, rows, strict=True)
+        if len(row) != len(rows[0])
+    ]
+    if problems:
+        raise DeckError("\n".join(problems[:_MOST_SENTENCES]))
+    columns = [_Column(*_split(header), [*cells]) for header, *cells in zip(*rows, strict=True)]
     return columns, [number for number, _ in lines[1:]]
 
 
@@ -377,7 +383,7 @@ def _refuse_many(path: Path, rows: int) -> None:
 
 
 def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
-    """Read the variables of one dimension, that of the first load or motion."""
+    """Return the variables along the dimension of the first load or motion, and their row numbers."""
     import netCDF4
     import numpy as np
 
@@ -410,16 +416,16 @@ def _netcdf_columns(path: Path) -> tuple[list[_Column], list[int]]:
                 columns.append(_Column(name, "" if unit == "1" else unit, cells))
     except DeckError:
         raise
-    except Exception as error:  # damage takes any form
+    except Exception as error:  # of any type if the file is damaged
         raise DeckError(f"{path}: cannot be read as netCDF ({error})") from None
     return columns, list(range(1, count + 1))
 
 
 def _is_readable(dtype: Any) -> bool:
-    """Tell whether a variable of this type holds numbers or text."""
+    """Return whether a variable of a type holds numbers or text."""
     return dtype is str or getattr(dtype, "kind", "") in tuple("iuf")
 
 
 def _is_text(variable: Any) -> bool:
-    """Tell whether a variable holds texts as characters."""
+    """Return whether a variable holds texts as characters."""
     return bool(variable.dtype == "S1" and variable.ndim == 2 and variable.shape[1] <= _LONGEST_LABEL)

@@ -1,9 +1,8 @@
 """Surface shapes and the initial gap between two of them.
 
-A shape gives its height over the plane z = 0, measured away from the other body: zero where the shape alone
-would touch a flat first, and infinite where it has no surface that could touch at all (outside a punch,
-beyond the rim of a true sphere). Body 2 is described in mirrored coordinates, so the heights of the two
-bodies simply add up to the gap.
+A shape has a height over the plane z = 0, measured away from the other body: zero where the shape would first
+touch a flat, and infinite where it has no surface that could touch (outside a punch, beyond the rim of a true
+sphere). Body 2 has mirrored coordinates, so that the gap is the sum of both heights.
 """
 
 from __future__ import annotations
@@ -15,18 +14,19 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
+from ..arrays import Array, Mask
 from ..errors import DeckError
 from ..text import did_you_mean
 from .faults import MISSING
-from .kinds import Flag, Kind, Quantity, Schema, Several, Word, refuse
+from .formula import Formula
+from .kinds import Flag, HeightFormula, Kind, PowerCoefficient, Quantity, Schema, Several, Word, refuse
 from .model import Argument, meaning, refuse_key
 from .units import ANGLE, LENGTH, NUMBER, Dimension
 
-Array = NDArray[np.float64]
 _S = TypeVar("_S", bound="Surface")
 PositiveLength = Annotated[float, Quantity(LENGTH, above=0)]
 LengthFromZero = Annotated[float, Quantity(LENGTH, at_least=0)]
@@ -34,15 +34,15 @@ Angle = Annotated[float, Quantity(ANGLE)]
 PositiveNumber = Annotated[float, Quantity(NUMBER, above=0)]
 Point = Annotated[tuple[float, float], Several(Quantity(LENGTH), "lengths", '["0.1 mm", "0 mm"]', count=2)]
 
-# A node that lies on the rim of a punch belongs to it, whatever the last bit of its coordinates.
+# A node on the rim of a punch belongs to it, whatever the last bit of its coordinates.
 _RIM = 1.0 + 1e-12
 
 
 class Surface(Argument):
     """A surface shape; `offset` moves it in the plane.
 
-    Built from SI numbers or from text with units, ``Sphere(radius=1e-3)`` or ``Sphere(radius="1 mm")``; an
-    angle always needs its unit.
+    Arguments are SI numbers or text with units, ``Sphere(radius=1e-3)`` or ``Sphere(radius="1 mm")``; an
+    angle needs its unit.
 
     Raises
     ------
@@ -71,8 +71,8 @@ class Surface(Argument):
         """
         return self._height(np.asarray(x, float) - self.offset[0], np.asarray(y, float) - self.offset[1])
 
-    def candidate(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
-        """Tell where the shape has a surface that could touch (False outside a punch)."""
+    def candidate(self, x: ArrayLike, y: ArrayLike) -> Mask:
+        """Return where the shape has a surface that could touch (False outside a punch)."""
         return np.isfinite(self.height(x, y))
 
     @property
@@ -89,12 +89,12 @@ class Surface(Argument):
         raise NotImplementedError
 
     def written(self, defaults: bool = True) -> dict[str, Any]:
-        """Name the shape in any case."""
+        """Return the keys, always with the shape."""
         return {"shape": self.shape, **super().written(defaults)}
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> Schema:
-        """Require the keys, which stand together in any deck."""
+        """Describe and require the keys."""
         schema = super().__get_pydantic_json_schema__(core, handler)
         required = [name for name, info in cls.known_keys().items() if info.is_required()]
         title = cls.model_fields["shape"].default
@@ -102,20 +102,20 @@ class Surface(Argument):
 
 
 SHAPES: dict[str, type[Surface]] = {}
-"""The shapes, by the word of a deck."""
+"""The shapes by their words in decks."""
 
 
 def shape(word: str) -> Callable[[type[_S]], type[_S]]:
-    """Let decks call a surface by a word."""
+    """Register a surface under the word of a deck."""
     this: Any = Literal[word]
 
-    def known(surface: type[_S]) -> type[_S]:
+    def register(surface: type[_S]) -> type[_S]:
         surface.model_fields["shape"] = FieldInfo.from_annotated_attribute(this, word)
         surface.model_rebuild(force=True)
         SHAPES[word] = surface
         return surface
 
-    return known
+    return register
 
 
 @shape("flat")
@@ -135,7 +135,7 @@ class Flat(Surface):
 
 @shape("sphere")
 class Sphere(Surface):
-    """A sphere, as the paraboloid that all of Hertz's theory is about, or as the true arc."""
+    """A sphere, as the paraboloid of the theory of Hertz, or as the true arc."""
 
     radius: PositiveLength = meaning(..., "radius R")
     exact: Annotated[bool, Flag()] = meaning(False, "take the true arc, not the parabola")
@@ -182,7 +182,7 @@ class Paraboloid(Surface):
 
 @shape("cylinder")
 class Cylinder(Surface):
-    """A (parabolic) cylinder lying on its side."""
+    """A parabolic cylinder with its axis in the plane."""
 
     radius: PositiveLength = meaning(..., "radius R")
     angle: Angle = meaning(0.0, "angle of its axis, from x towards y")
@@ -218,32 +218,18 @@ def _coefficient_dimension(exponent: float) -> Dimension:
     return Dimension(f"a coefficient in m^{power}", f"m^{power}", f'"0.1 mm^{power}"')
 
 
-@dataclass(frozen=True)
-class CoefficientKind(Kind):
-    """The coefficient of a power law, whose unit is known only when the exponent is."""
-
-    def _expected(self) -> str:
-        return 'a coefficient above 0 in m^(1-n) such as "0.1 mm^-1"'
-
-    def _parse(self, value: object) -> Any:
-        return value
-
-    def _schema(self) -> Schema:
-        return {"type": ["number", "string"], "description": self.expected}
-
-
 @shape("power")
 class Power(Surface):
     """A body of revolution whose profile is a power of the radius."""
 
     exponent: Annotated[float, Quantity(NUMBER, above=0, at_most=100)] = meaning(..., "exponent n")
-    coefficient: Annotated[float, CoefficientKind()] = meaning(..., "coefficient C")
+    coefficient: Annotated[float, PowerCoefficient("m^(1-n)", '"0.1 mm^-1"')] = meaning(..., "coefficient C")
     formula: ClassVar[str] = "h = C rⁿ"
 
     @field_validator("coefficient")
     @classmethod
     def _to_si(cls, value: object, info: ValidationInfo) -> float:
-        if "exponent" not in info.data:  # itself wrong, and reported
+        if "exponent" not in info.data:  # wrong, and reported itself
             return 0.0
         dimension = _coefficient_dimension(info.data["exponent"])
         return Quantity(dimension, above=0, any_size=True).parse(value)
@@ -280,6 +266,20 @@ class RoundedPunch(Surface):
         return np.maximum(np.hypot(x, y) - self.flat_radius, 0.0) ** 2 / (2 * self.edge_radius)
 
 
+@shape("formula")
+class FormulaSurface(Surface):
+    """Any height, such as that of several pads."""
+
+    expression: Annotated[str, HeightFormula()] = meaning(
+        ..., "height h in m, of x and y in m", '"min(x**2, (x - 1e-3)**2)/2e-2 + y**2/2e-2"'
+    )
+    formula: ClassVar[str] = "h = h(x, y), as the formula gives it"
+
+    def _height(self, x: Array, y: Array) -> Array:
+        x, y = np.broadcast_arrays(x, y)
+        return Formula(self.expression).over(x=x, y=y) + np.zeros(x.shape)
+
+
 def _axes(angle: float) -> tuple[Array, Array]:
     """Return the unit vectors along and across an axis at `angle` from x."""
     along = np.array([math.cos(angle), math.sin(angle)])
@@ -295,7 +295,7 @@ _REFUSED = {
 
 @dataclass(frozen=True)
 class SurfaceKind(Kind):
-    """A surface: one of the shapes as an inline table, or a `Surface` made in Python."""
+    """A surface: one of the shapes as an inline table, or a `Surface` of Python."""
 
     def _expected(self) -> str:
         return 'a table such as { shape = "sphere", radius = "1 mm" }'
@@ -326,7 +326,7 @@ class SurfaceKind(Kind):
         try:
             return SHAPES[shape](**{str(key): entry for key, entry in value.items()})
         except DeckError as error:
-            # pydantic merges the inner error, with its keys, into that of the deck around it.
+            # pydantic merges the inner error, with its keys, into that of the enclosing deck.
             raise (error.__cause__ or error) from None
 
 
@@ -350,12 +350,17 @@ class Separation:
         """Return the gap (m) at points of the plane: >= 0 up to rounding, inf where nothing can touch."""
         return self._sum(x, y) - self.first_touch[2]
 
+    @property
+    def flat(self) -> bool:
+        """Whether both surfaces are planes."""
+        return isinstance(self.surface_1, Flat) and isinstance(self.surface_2, Flat)
+
     @cached_property
     def first_touch(self) -> tuple[float, float, float]:
         """Point x, y (m) at which the bodies touch first, and the sum of their heights there (m).
 
-        It is found on the continuous plane, so it does not depend on any window or mesh. Where touching along
-        a line or over an area is possible, it is one of the points.
+        It does not depend on window or lattice. Where the bodies touch along a line or over an area, it is
+        one of the points.
 
         Raises
         ------
@@ -363,13 +368,13 @@ class Separation:
             If the two surfaces nowhere face each other (two punches side by side).
         """
         one, two = self.surface_1, self.surface_2
-        if isinstance(one, Flat) or one.offset == two.offset:
+        if isinstance(one, Flat | FormulaSurface) or one.offset == two.offset:
             return (*two.offset, 0.0)
-        if isinstance(two, Flat):
+        if isinstance(two, Flat | FormulaSurface):
             return (*one.offset, 0.0)
         if one.curvature is not None and two.curvature is not None:
-            # Both quadratic: (C1 + C2) r = C1 o1 + C2 o2, singular if both are cylinders side by side. Solved
-            # about o1, so that far-away offsets cost no digits.
+            # Both quadratic: (C1 + C2) r = C1 o1 + C2 o2, singular for two parallel cylinders. Solved about
+            # o1, so that large offsets cost no digits.
             apart = np.subtract(two.offset, one.offset)
             total = one.curvature + two.curvature
             point = np.linalg.pinv(total, hermitian=True) @ two.curvature @ apart + one.offset
@@ -382,15 +387,15 @@ class Separation:
         return self.surface_1.height(x, y) + self.surface_2.height(x, y)
 
     def _search(self) -> tuple[float, float]:
-        """Minimize the sum of the heights where no formula does, from the best point between the centers."""
+        """Return the point of the smallest sum of heights, searched from the best one between the centers."""
         from scipy.optimize import minimize
 
         first, second = np.array(self.surface_1.offset), np.array(self.surface_2.offset)
         scale = float(np.hypot(*(second - first)))
 
         def inside(point: Array) -> Array:
-            # Pulled to the nearest point that can touch: the minimum may lie on the rim of a punch, where a
-            # search over the bare height (infinite beyond) would stick.
+            # The nearest point that can touch: the minimum may lie on the rim of a punch, where a search over
+            # the bare height (infinite beyond) would not move.
             for surface, center in ((self.surface_1, first), (self.surface_2, second)):
                 arm = point - center
                 point = center + arm * min(1.0, surface.reach / max(float(np.hypot(*arm)), 1e-300))
@@ -403,17 +408,11 @@ class Separation:
         starts = [along * t for t in np.linspace(0.0, 1.0, 101)]
         best = min(starts, key=height)
         if not math.isfinite(height(best)):
-            raise DeckError(
-                "the two surfaces nowhere face each other, since their offsets put them side by side"
-            )
-        # A convex sum (all shapes but powers below 1) has no other minima for the simplex to fall into.
+            raise DeckError("the two surfaces nowhere face each other: their offsets put them side by side")
+        # A convex sum (all shapes but powers below 1) has no other minima.
         size = max(height(best), 1e-30)
-        found = minimize(
-            height,
-            best,
-            method="Nelder-Mead",
-            options={"xatol": 1e-9, "fatol": 1e-15 * size, "maxiter": 2000},
-        )
+        options: Any = {"xatol": 1e-9, "fatol": 1e-15 * size, "maxiter": 2000}
+        found = minimize(height, best, method="Nelder-Mead", options=options)
         point = inside(first + scale * (found.x if found.fun < height(best) else best))
         return float(point[0]), float(point[1])
 

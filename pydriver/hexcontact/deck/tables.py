@@ -1,12 +1,13 @@
-"""The deck: the whole input format as pydantic models, which are the settings that a solver reads.
+"""The deck: the input format as pydantic models, which are the settings that a solver reads.
 
-A `Deck` is what the file says, in SI, with every table checked on its own. What needs the tables together
-(the load history, the size of the window, what this version solves) is worked out in `hexcontact.problem`.
+A `Deck` holds the values of the file in SI, with every table checked on its own. `hexcontact.problem` checks
+the tables together (load history, size of the window, limits of this version).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -14,13 +15,29 @@ from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
-from ..variables import FIELDS, LOADS
+from ..variables import BULK_STRESS, FIELDS, LOADS
+from .below import Fatigue, Stress
 from .faults import Mistake
-from .kinds import FileName, Flag, Quantity, Schema, Several, Text, Whole, Word, WordOr, refuse
+from .interface import Friction, Interface
+from .kinds import (
+    FileName,
+    Flag,
+    OrShare,
+    Quantity,
+    Schema,
+    Several,
+    Share,
+    Text,
+    Whole,
+    Word,
+    WordOr,
+    refuse,
+)
 from .model import Table, extended, meaning, problems_of
 from .series import DRIVEN, MOST_STEPS, Series
 from .surfaces import Flat, Point, PositiveLength, Separation, Surface, SurfaceKind
 from .units import LENGTH, NUMBER, PRESSURE
+from .wear import Wear
 
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
@@ -49,16 +66,14 @@ class Body(Table):
     @field_validator("surface")
     @classmethod
     def _curved(cls, surface: Surface | None) -> Surface | None:
-        """Return no surface for a flat one, whether the deck names it or not."""
+        """Return None for a flat surface."""
         return None if isinstance(surface, Flat) else surface
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Moduli go with an elastic body and only with that."""
-        for key, words in (
-            ("young_modulus", 'a pressure such as "210 GPa"'),
-            ("poisson_ratio", "a number such as 0.3"),
-        ):
+        """Require moduli of an elastic body, and refuse those of a rigid one."""
+        moduli = {"young_modulus": 'a pressure such as "210 GPa"', "poisson_ratio": "a number such as 0.3"}
+        for key, words in moduli.items():
             if data.get("rigid") is True:
                 if key in data:
                     yield key, "expected nothing, since the body is rigid"
@@ -79,19 +94,33 @@ class Bodies(Table):
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """At least one of the two deforms."""
-        if all(
-            isinstance(body := data.get(key), Mapping) and body.get("rigid") is True for key in ("1", "2")
-        ):
+        """Require at least one elastic body."""
+        bodies = [data.get(key) for key in ("1", "2")]
+        if all(isinstance(body, Mapping) and body.get("rigid") is True for body in bodies):
             yield "2", "expected one elastic body at least; both are rigid"
 
 
-class Friction(Table):
-    """Coulomb friction."""
+BULK_STATES = ("plane stress", "plane strain x", "plane strain y")
 
-    coefficient: Annotated[float, Quantity(NUMBER, at_least=0, infinite=True)] = meaning(
-        ..., "coefficient of friction μ; inf: no slip"
+
+class Bulk(Table):
+    """The body that carries a bulk stress, given by `bulk_stress_xx` and so on of [[load]]."""
+
+    body: Annotated[int, Whole(1, 2)] = meaning(..., "1 or 2", "1")
+    state: Annotated[str, Word(BULK_STATES)] = meaning(
+        "plane stress",
+        "plane stress: sides are free, and components that are not given are zero; plane strain x, y: no "
+        "strain along x, y, and the stress along it is ν times the other one",
     )
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Keys of [[load]] for its stress, without the direction of no strain."""
+        return tuple(
+            name
+            for name in BULK_STRESS
+            if not self.state.endswith(f"strain {name[-2]}") or name[-2] != name[-1]
+        )
 
 
 class Grid(Table):
@@ -118,15 +147,13 @@ class Grid(Table):
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """One way to give the spacing, at most one to give the size."""
+        """Require one key for the spacing, and at most one for the size."""
         fineness = [key for key in FINENESS if key in data]
         if not fineness:
             yield "spacing", "missing; expected one of spacing, nodes_across and nodes_in_radius"
         for key in fineness[1:]:
-            yield (
-                key,
-                f"expected only one of spacing, nodes_across and nodes_in_radius; {fineness[0]} is given too",
-            )
+            keys = "spacing, nodes_across and nodes_in_radius"
+            yield key, f"expected only one of {keys}; {fineness[0]} is given too"
         if "window" in data and data.get("extent", "auto") != "auto":
             yield "window", "expected window or extent, not both"
         if "window" in data and "nodes_across" in data:
@@ -157,8 +184,8 @@ class Solver(Table):
     )
     step_tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-4, at_most=0.5)] = meaning(
         0.01,
-        'incremental, steps = "auto": what halving a load step may change in the stick area, as a share '
-        "of the largest contact area, and in the shear tractions, as a share of what friction can carry",
+        'incremental, steps = "auto": largest change by halving a load step, in the stick area as a share '
+        "of the largest contact area and in the shear tractions as a share of what friction can carry",
         "0.02",
     )
 
@@ -180,21 +207,23 @@ class Fractions(Several):
         return super()._schema() | {"uniqueItems": True}
 
 
-def _annotation(kind: Quantity) -> Any:
+def _annotation(name: str, kind: Quantity) -> Any:
+    if name.startswith("tangential_load"):
+        return Annotated[float | Share, OrShare(kind)] | None
     return Annotated[float, kind] | None
 
 
 _Driven: Any = extended(
     Table,
     {
-        name: (_annotation(load.kind), meaning(None, load.of_segment, load.example))
+        name: (_annotation(name, load.kind), meaning(None, load.of_segment, load.example))
         for name, load in DRIVEN.items()
     },
 )
 
 
 class Segment(_Driven):
-    """A stretch of the load history: every load ramps from where it stands to the value given here."""
+    """A segment of the load history: every load ramps from its current value to the one given here."""
 
     schema_of_all: ClassVar[Schema] = {
         "allOf": [{"not": {"required": list(pair)}} for pair in LOADS.values()]
@@ -219,12 +248,11 @@ class Segment(_Driven):
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Each motion has one control, each segment one kind of ramp."""
-        pairs = LOADS.values()
+        """Require one control of each motion, and one kind of ramp."""
         whole = "path" in data or "series" in data
-        if not whole and not any(key in data for pair in pairs for key in pair):
+        if not whole and not any(key in data for key in DRIVEN):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
-        for force, displacement in pairs:
+        for force, displacement in LOADS.values():
             if force in data and displacement in data:
                 yield displacement, f"expected {force} or {displacement}, not both"
         if data.get("ramp") == "cubic" and "normal_load" not in data:
@@ -238,13 +266,16 @@ class Segment(_Driven):
             yield "steps", f"expected {len(values)}, as many as there are values (or no steps at all)"
 
     def written(self, defaults: bool = True) -> dict[str, Any]:
-        """Leave out the ramp where values stand for it."""
+        """Return the keys without a ramp beside values."""
         keys = super().written(defaults)
         return {key: value for key, value in keys.items() if key != "ramp" or "values" not in keys}
 
 
+_BESIDE = {"path": ("label",), "series": ("label", "steps", "largest_step")}  # keys of segments beside them
+
+
 class Load(Segment):
-    """An entry of [[load]]: a segment, or a path of segments that is repeated."""
+    """An entry of [[load]]: a segment, or a path or series of segments that may be repeated."""
 
     repeat: Annotated[int, Whole(1, MOST_STEPS)] | None = meaning(
         None, "how often `path` or `series` is run; 1 if absent"
@@ -263,31 +294,26 @@ class Load(Segment):
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Let a path or a series stand alone."""
+        """Refuse keys of a segment beside a path or a series."""
         yield from super().conflicts(data)
         if "path" in data and "series" in data:
             yield "series", "expected path or series, not both"
-        elif "path" in data:
+        elif whole := next((key for key in _BESIDE if key in data), ""):
             for key in Segment.known_keys():
-                if key in data and key != "label":
-                    yield key, "expected inside the path, not beside it"
-        elif "series" in data:
-            for key in Segment.known_keys():
-                if key in data and key not in ("label", "steps", "largest_step"):
-                    yield key, "expected in the series, not beside it"
+                if key in data and key not in _BESIDE[whole]:
+                    yield key, f"expected in the {whole}, not beside it"
         elif "repeat" in data:
             yield "repeat", "needs a path of segments or a series to repeat"
 
     def written(self, defaults: bool = True) -> dict[str, Any]:
-        """Leave out what cannot stand beside a path or a series."""
-        beside = {"label"} if self.path else {"label", "steps", "largest_step"}
-        inside = Segment.known_keys() if self.path or self.series else {}
-        keys = super().written(defaults)
-        return {key: value for key, value in keys.items() if key not in inside or key in beside}
+        """Return the keys without those that a path or a series excludes."""
+        whole = "path" if self.path else "series" if self.series else ""
+        excluded = Segment.known_keys().keys() - set(_BESIDE[whole]) if whole else ()
+        return {key: value for key, value in super().written(defaults).items() if key not in excluded}
 
 
 class Accuracy(Table):
-    """How accurate the result is to be; the grid is that of the first, coarsest lattice then."""
+    """The target of the accuracy; the grid is then that of the first, coarsest lattice."""
 
     target: Annotated[float, Quantity(NUMBER, at_least=1e-6, at_most=0.5)] = meaning(
         ...,
@@ -301,7 +327,7 @@ class Accuracy(Table):
 
 
 class Output(Table):
-    """What is written, and where."""
+    """The output file and its fields."""
 
     file: Annotated[Path, FileName()] | None = meaning(None, "netCDF file of the result", '"fretting.nc"')
     fields: Annotated[
@@ -317,26 +343,31 @@ class Deck(Table):
 
     title: Annotated[str, Text()] = meaning("", "a line about the case", '"Sphere on flat"')
     include: Annotated[tuple[str, ...], Several(Text(), "file names", '["materials.toml"]')] | None = meaning(
-        None, "decks, or parts of decks, whose keys hold where this one says nothing"
+        None, "decks, or parts of decks, for the keys that are absent here"
     )
     body: Bodies
+    interface: Interface | None = None
     friction: Friction | None = None
+    bulk: Bulk | None = None
     grid: Grid
     solver: Solver = Field(default_factory=Solver)
     accuracy: Accuracy | None = None
     load: list[Load] = Field(min_length=1)
+    wear: Wear | None = None
     output: Output = Field(default_factory=Output)
+    stress: list[Stress] = Field(default_factory=list)
+    fatigue: list[Fatigue] = Field(default_factory=list)
 
     @classmethod
     def checked(cls, data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Mistake]]:
-        """Check a deck and return what is right with it, table by table, and what is wrong.
+        """Return the valid tables of a deck and its mistakes.
 
         Returns
         -------
         tables : dict
-            The attributes of a deck that were read; those with mistakes, or required and absent, are missing.
+            Attributes of the deck, without tables that have mistakes or are required and absent.
         problems : list of Mistake
-            Everything that is wrong with the tables one by one.
+            Mistakes in single tables.
         """
         try:
             return dict(cls.model_validate(data)), []
@@ -346,7 +377,8 @@ class Deck(Table):
         tables = {}
         for name, info in cls.model_fields.items():
             if name in data and name not in faulty:
-                tables[name] = TypeAdapter(cast(Any, info.annotation)).validate_python(data[name])
+                with suppress(ValidationError):  # an absent key of another table, which is reported
+                    tables[name] = TypeAdapter(cast(Any, info.annotation)).validate_python(data[name])
             elif name not in faulty:
                 tables[name] = info.get_default(call_default_factory=True)
         return tables, problems

@@ -1,4 +1,4 @@
-"""TOML to tables of values, single keys replaced, before anything is checked."""
+"""TOML files as dictionaries, and single keys replaced in them, before any check."""
 
 from __future__ import annotations
 
@@ -14,38 +14,47 @@ from ..files import text_of
 
 DEEPEST = 50  # levels of tables and arrays; no key needs more than six
 
+# Text in quotes or a comment; a number with a comma; brackets; a number with a unit without quotes.
+_QUOTED = re.compile(r"""\"[^\"]*\"|'[^']*'|\#.*""")
+_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)\s*$")
+_BRACKET = re.compile(r"(\w+)\[\d*\]")
+_TWICE = re.compile(r"Cannot declare \('(\w+)',\) twice")
+_WITH_UNIT = re.compile(r"(?<![\w.])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*(?:[^\W\d_]+[\w/^*·]*|[%°])")
 
-def read_toml(path: str | Path) -> tuple[dict[str, Any], str]:
-    """Read a deck file into dictionaries, without checking what it says.
+
+def read_toml(path: str | Path, kind: str = "a deck") -> tuple[dict[str, Any], str]:
+    """Return the tables of a deck file without checking them.
 
     Parameters
     ----------
     path : str or Path
         A TOML file in UTF-8.
+    kind : str
+        Expected kind of file, for messages.
 
     Returns
     -------
     data : dict
         The tables.
     text : str
-        The file as it is.
+        Text of the file.
 
     Raises
     ------
     DeckError
         If there is no such file, it cannot be read, or it is not TOML.
     """
-    text = text_of(path, "a deck (a TOML file)")
+    text = text_of(path, f"{kind} (a TOML file)")
     return parse_toml(text, str(path)), text
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Parse TOML; `name` is what an error message calls it.
+    """Return the tables of a TOML text; `name` is its name in messages.
 
     Raises
     ------
     DeckError
-        With the line and what is wrong there.
+        With the line and the mistake.
     """
     try:
         tables = tomllib.loads(text)
@@ -54,21 +63,30 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         place = re.search(r" \(at line (\d+), column (\d+)\)$", message)
         if place is None:
             raise DeckError(f"{name}: is not TOML: {message}") from None
-        sentence = f"{name}:{place[1]}:{place[2]}: is not TOML: {message[: place.start()]}"
+        line = text.split("\n")[int(place[1]) - 1]
+        unquoted = _QUOTED.sub("", line)
+        hint = ""
+        if bare := _WITH_UNIT.search(unquoted):
+            hint = f'; a value with a unit stands in quotes: "{bare[0].strip()}"'
+        elif comma := _COMMA.search(unquoted):
+            hint = f"; a number has a decimal point: {comma[1]}.{comma[2]}"
+        elif twice := _TWICE.match(message):
+            hint = f"; of several tables each begins with two brackets: [[{twice[1]}]]"
+        sentence = f"{name}:{place[1]}:{place[2]}: is not TOML: {message[: place.start()]}{hint}"
         raise DeckError(sentence, [Fault(sentence, "", "", name, int(place[1]), int(place[2]))]) from None
     refuse_deep(tables, name)
     return tables
 
 
 def refuse_deep(data: Mapping[str, Any], name: str) -> None:
-    """Refuse tables in tables in tables, which to copy or to show may need more stack than there is.
+    """Refuse deeply nested tables, since copying or showing them may exhaust the stack.
 
     Parameters
     ----------
     data : mapping
         The deck as dictionaries; may hold itself.
     name : str
-        What an error message calls it; may be empty.
+        Name of the deck in messages; may be empty.
 
     Raises
     ------
@@ -78,9 +96,7 @@ def refuse_deep(data: Mapping[str, Any], name: str) -> None:
     level: list[Any] = [data]
     for _ in range(DEEPEST):
         entries = [e for table in level for e in (table.values() if isinstance(table, Mapping) else table)]
-        level = list(
-            {id(entry): entry for entry in entries if isinstance(entry, Mapping | list | tuple)}.values()
-        )
+        level = list({id(e): e for e in entries if isinstance(e, Mapping | list | tuple)}.values())
         if not level:
             return
     raise DeckError(f"{name and name + ': '}nested too deeply; expected at most {DEEPEST} levels")
@@ -99,10 +115,13 @@ def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dic
     Raises
     ------
     DeckError
-        If a key runs through something that is no table, or an entry that is not there.
+        If a key leads through a plain value, or through an absent entry of an array.
     """
     result = copy.deepcopy(dict(data))
     for dotted_key, value in overrides.items():
+        if bracket := _BRACKET.search(dotted_key):
+            given = f"{bracket[1]}.1{dotted_key[bracket.end() :]}"
+            raise DeckError(f"{dotted_key}: expected the number of an entry between points, from 1: {given}")
         *parents, last = dotted_key.split(".")
         here: Any = result
         for part in parents:
@@ -119,9 +138,11 @@ def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dic
 
 
 def _entry(array: Any, number: str, key: str) -> Any:
-    """Return the entry of an array that a dotted key speaks of."""
+    """Return the entry of an array in a dotted key."""
     if not isinstance(array, list):
         raise DeckError(f"{key}: expected a key of a table, but {number} would be inside a plain value")
     if not number.isdecimal() or not 1 <= int(number) <= len(array):
-        raise DeckError(f"{key}: expected an entry from 1 to {len(array)}, not {number}")
+        example = key.replace(f".{number}", f".1.{number}", 1)
+        hint = "" if number.lstrip("-").isdecimal() else f" (entries of arrays count from 1: {example})"
+        raise DeckError(f"{key}: expected an entry from 1 to {len(array)}, not {number}{hint}")
     return array[int(number) - 1]

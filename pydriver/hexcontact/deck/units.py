@@ -1,7 +1,7 @@
-"""Physical quantities in decks, to floats in SI: ``"3.5 um"``, ``"432 GPa"``, ``"30 deg"``, bare numbers.
+"""Quantities of decks as floats in SI: ``"3.5 um"``, ``"432 GPa"``, ``"30 deg"``, bare numbers.
 
-The plain metric units are scaled here, exactly, by moving the decimal point; everything else (and every
-complaint about a unit) is left to pint, which is imported only then because it takes a third of a second.
+Common metric units are scaled here, exactly, by moving the decimal point. Other units, and messages about
+units, are left to pint, whose import takes a third of a second.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Dimension:
-    """What a number measures.
+    """The dimension of a number.
 
     Attributes
     ----------
     name : str
-        With its article, as error messages say it: "a length".
+        Noun with its article, for messages: "a length".
     unit : str
         The SI unit, spelt for pint; "" for a pure number.
     example : str
-        A value a user could have written, quotes included.
+        Example of a value, with quotes.
     bare : bool
         Whether a number without a unit is taken as SI.
     """
@@ -46,7 +46,7 @@ TORQUE = Dimension("a torque", "N m", '"2 N mm"')
 ANGLE = Dimension("an angle with its unit", "rad", '"30 deg"', bare=False)
 NUMBER = Dimension("a number", "", "0.3")
 
-# Decimal exponents of the units that nearly every deck gets by with, by the SI unit of their dimension.
+# Decimal exponents of common units, by the SI unit of their dimension.
 _METRIC = {
     "m": {"nm": -9, "um": -6, "µm": -6, "mm": -3, "cm": -2, "m": 0},
     "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
@@ -59,8 +59,7 @@ _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>.*?)\s*", re.ASCII
 )
 
-# Products, quotients and small powers of named units. Anything richer is not a unit, and pint would evaluate
-# it.
+# Products, quotients and small powers of named units; pint would evaluate other expressions.
 _NAME = r"[^\W\d_]+|[%°]|[^\W\d_]*°"
 _FACTOR = rf"(?:{_NAME})(?:\s*(?:\*\*|\^)\s*-?\d{{1,2}}(?:\.\d{{1,4}})?)?"
 _UNIT = re.compile(rf"(?:1\s*/\s*)?{_FACTOR}(?:\s*[*/·]\s*{_FACTOR}|\s+{_FACTOR})*")
@@ -68,35 +67,35 @@ _LONGEST_UNIT = 60
 
 
 class UnitError(ValueError):
-    """A quantity that cannot be read; the message is the part after "expected ..."."""
+    """An unreadable quantity; the message follows "expected ..."."""
 
 
 def to_si(value: object, dimension: Dimension) -> float:
-    """Turn a deck value into a float in SI units.
+    """Return a deck value as a float in SI units.
 
     Parameters
     ----------
     value : object
         A number (taken as SI), or text made of a number and a unit.
     dimension : Dimension
-        What the value has to measure.
+        Dimension of the value.
 
     Returns
     -------
     float
-        The value in ``dimension.unit``; may be infinite or NaN if a number said so.
+        The value in ``dimension.unit``; infinite or NaN if `value` is.
 
     Raises
     ------
     UnitError
-        If the value is not a quantity of that dimension. The message says why in a few words, or is empty
-        where there is nothing to say beyond what was expected.
+        If the value is not a quantity of that dimension, with the reason in a few words, or without one if
+        the expected value suffices.
     """
     if isinstance(value, str):
         return _from_text(value, dimension)
-    if isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise UnitError("")
-    if not dimension.bare:
+    if hasattr(value, "magnitude") and hasattr(value, "units"):
+        raise UnitError("in Python a quantity with a unit is given as text")
+    if isinstance(value, bool) or not hasattr(value, "__float__") or not dimension.bare:
         raise UnitError("")
     try:
         return float(value)
@@ -129,7 +128,7 @@ def _by_pint(number: float, unit: str, dimension: Dimension) -> float:
     registry = _registry()
     try:
         quantity = registry.Quantity(number, unit).to_base_units()
-    except Exception:  # pint raises a dozen unrelated types for text that is no unit
+    except Exception:  # pint raises a dozen unrelated types
         raise unknown from None
     # Comparing base units, not dimensionalities, keeps radians apart from pure numbers.
     target = registry.Quantity(1.0, dimension.unit).to_base_units()
@@ -139,13 +138,13 @@ def _by_pint(number: float, unit: str, dimension: Dimension) -> float:
 
 
 def _same(units: Any, other: Any) -> bool:
-    """Whether two base units agree, allowing for rounding in powers such as m^-1.5."""
+    """Return whether two base units agree, up to rounding in powers such as m^-1.5."""
     left, right = dict(units._units), dict(other._units)
     return left.keys() == right.keys() and all(abs(left[k] - right[k]) < 1e-9 for k in left)
 
 
 def _describe(quantity: Any) -> str:
-    """Name what a quantity in base units measures: "a mass", "an area", or its units."""
+    """Return the dimension of a quantity in base units: "a mass", "an area", or its units."""
     for name, unit in _NAMED_UNITS.items():
         if _same(quantity.units, _registry().Quantity(1.0, unit).to_base_units().units):
             return name
@@ -175,7 +174,7 @@ _NAMED_UNITS = {
 
 
 def readable(length: float) -> str:
-    """Write a length (m) to three digits in the unit that suits it, for messages: "0.182 mm"."""
+    """Return a length (m) with three digits in a suitable unit, for messages: "0.182 mm"."""
     for exponent, unit in ((0, "m"), (-3, "mm"), (-6, "um")):
         if abs(length) >= 0.1 * 10.0**exponent:
             return f"{length * 10.0**-exponent:.3g} {unit}"

@@ -1,8 +1,9 @@
-"""Decks as text: as they were given, or checked, with every key."""
+"""Decks as text: starter decks, given tables, and checked decks with every key."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,20 @@ import numpy as np
 from .model import Table
 from .tables import Deck
 
+STARTERS = (
+    *("sphere", "fretting", "paraboloid", "crossed_cylinders"),
+    *("punch", "rounded_punch", "cone", "power"),
+)
+"""Names of the starter decks, ``templates/NAME.toml``."""
+
+
+def starter(name: str) -> str:
+    """Return the text of a starter deck, see ``hexcontact new NAME``."""
+    return (resources.files(__package__) / "templates" / f"{name}.toml").read_text(encoding="utf-8")
+
 
 def plain(value: Any) -> Any:
-    """Return what a deck can hold of values from Python: without numpy, None and tables that were made."""
+    """Return values of Python as a deck can hold them: without numpy, None and `Table`."""
     if isinstance(value, Table):
         return value.written(defaults=False)
     if isinstance(value, np.ndarray | np.generic):
@@ -25,16 +37,16 @@ def plain(value: Any) -> Any:
 
 
 def as_toml(data: Mapping[str, Any]) -> str:
-    """Write the tables of a deck as they were given."""
+    """Return the text of a deck with the given tables."""
     import tomli_w
 
     return tomli_w.dumps(plain(data))
 
 
 def written(deck: Deck) -> str:
-    """Write a deck with every key that has a value, defaults included; numbers are in SI.
+    """Return the text of a deck with every key that has a value, defaults included, in SI.
 
-    Reading the text again gives an equal deck. Keys that cannot stand beside others (`ramp` beside `values`,
-    all but the label beside a `path`) are left out where they have no say.
+    Parsing the text gives an equal deck. Keys that others exclude (`ramp` beside `values`, all but the label
+    beside a `path`) are left out.
     """
     return as_toml(deck.written())

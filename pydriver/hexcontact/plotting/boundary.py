@@ -1,4 +1,4 @@
-"""The nodes of a contact on their lattice, with what is fitted to them."""
+"""The nodes of a contact on their lattice, with fitted circles or ellipses."""
 
 from __future__ import annotations
 
@@ -6,41 +6,44 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
+from matplotlib.tri import Triangulation
 
+from ..arrays import Mask
 from ..core import estimators
-from ..core.edges import ContactEdges, Edge
-from ..result.view import StepView, worded
-from .maps import mesh_of
+from ..result.history import ROUND
+from ..result.mesh import triangles
+from ..result.raster import SLIP, STICK
+from ..result.result import Result
+from ..result.view import StepView
+from ..text import worded
 from .plane import Part
 from .registry import figure
-from .style import COMPUTED, IN_CONTACT, SLIP, STICK, THIRD, set_title
+from .style import COMPUTED, IN_CONTACT, THIRD, drawing, handles_of, legend_under, set_title
 
 if TYPE_CHECKING:
     import xarray
-
-    from ..result.result import Result
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-_APART = 80  # spacings over the width of the picture up to which nodes can be told apart
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
-@figure("boundary", "nodes in contact (and stick) with fitted circle or ellipse")
-def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
+_APART = 80  # spacings across the picture up to which nodes are distinguishable
+
+
+@figure("boundary", "nodes in contact (and stick), fitted circle or ellipse")
+def contact_boundary(result: Result | xarray.Dataset, step: int = -1, ax: Axes | None = None) -> Figure:
     """Draw the nodes in contact on the lattice, the circle (9.1)-(9.2) or ellipse fitted to them, and Hertz.
 
-    With friction sticking nodes have a color of their own, and an ellipse fitted to them (Figure 9.4).
+    With friction, sticking nodes have their own color and fitted ellipse (Figure 9.4).
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
     step : int
         Number of the load step, from 1; -1 is the last one.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------
@@ -57,19 +60,19 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
     if not view.contact.any():
         raise ValueError("no node is in contact")
     part = Part.around([view], 1.2)
-    canvas = Figure((4.6, float(np.clip(3.75 * part.aspect, 1.5, 5.0)) + 1.15), layout="compressed")
-    axes = canvas.add_subplot()
+    width, height = part.size()
+    canvas, axes = drawing(ax, max(width, 4.6), height + 0.6, equal=True)
     x_min, x_max, y_min, y_max = part.limits
     x, y, rim = view.x * part.factor, view.y * part.factor, estimators.boundary(view.contact)
     across = part.width / view.spacing
-    pitch = 240.0 / across  # points between nodes
+    pitch = 70.0 * (6.4 if part.is_wide else min(3.4, 6.0 / part.aspect)) / across  # points between nodes
     if across < _APART:
         shown = (view.x > x_min) & (view.x < x_max) & (view.y > y_min) & (view.y < y_max)
-        if (found := mesh_of(view, view.pressure, shown)) is not None:
-            mesh, _ = found
-            edges = np.stack([mesh.x, mesh.y], axis=1)[mesh.edges] * part.factor
-            axes.add_collection(LineCollection(cast(Any, edges), colors="0.85", linewidths=0.4, zorder=0))
-    inside_size = 0.45 * pitch if across < _APART else 2.0 * pitch  # too many to tell apart: an area
+        corners = triangles(*shown.shape)
+        mesh = Triangulation(x.ravel(), y.ravel(), corners[shown.ravel()[corners].any(axis=1)])
+        links = np.stack([mesh.x, mesh.y], axis=1)[mesh.edges]
+        axes.add_collection(LineCollection(cast(Any, links), colors="0.85", linewidths=0.4, zorder=0))
+    inside_size = 0.45 * pitch if across < _APART else 2.0 * pitch  # too many: an area
     dot: dict[str, Any] = {"marker": "o", "mew": 0, "ls": "", "rasterized": across > _APART}
     stick = view.contact & view.stick if view.friction else None
     if stick is None:
@@ -79,11 +82,16 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
     for nodes, color, label in groups:
         axes.plot(x[nodes], y[nodes], ms=inside_size, mfc=color, label=label, **dot)
     if stick is not None:
-        dot |= {"mfc": "none", "mew": 0.8}  # a ring around a boundary node
+        dot |= {"mfc": "none", "mew": 0.8}  # boundary nodes as rings
     axes.plot(x[rim], y[rim], ms=max(0.45 * pitch, 1.0), color="black", label="boundary node", **dot)
-    if (edge := _edge_of(view)) is not None:
+    if view.has("gap"):
+        edge = view.edges().contact()
         pieces = LineCollection(cast(Any, edge.segments * part.factor), colors="black", linewidths=0.9)
-        pieces.set_label(rf"edge, $\sqrt{{A/\pi}}$ = {worded(edge.radius, 'm')}")
+        axes_of = edge.ellipse.semi_major, edge.ellipse.semi_minor
+        size = rf"$\sqrt{{A/\pi}}$ = {worded(edge.radius, 'm')}"
+        if axes_of[1] < ROUND * axes_of[0]:
+            size = " by ".join(worded(axis, "m") for axis in axes_of)
+        pieces.set_label(f"edge, {size}")
         axes.add_collection(pieces)
     fitted, words = _fitted(view, view.contact, "a", view.center)
     color = COMPUTED if stick is None else "black"
@@ -96,28 +104,19 @@ def contact_boundary(result: Result | xarray.Dataset, step: int = -1) -> Figure:
         fitted, words = _fitted(view, stick, "c")
         part.outline(axes, fitted, fitted.center, label=f"stick: {words}", linestyle="-", color=THIRD)
     part.show(axes)
-    legend = canvas.legend(loc="outside lower center", ncols=2, handlelength=1.6)
+    legend = legend_under(canvas, handles_of(axes), ax, size=8)
     for handle in legend.legend_handles[: len(groups) + 1]:
         cast(Line2D, handle).set_markersize(4.0)
-    set_title(canvas, view.title)
+    set_title(canvas, view.title, ax)
     return canvas
-
-
-def _edge_of(view: StepView) -> Edge | None:
-    """Return the edge of the contact between the nodes, None if the gap was not kept."""
-    try:
-        gap = view.field("gap")
-    except ValueError:
-        return None
-    return ContactEdges(view.pressure, gap, view.contact, np.isfinite(gap), view.basis, view.start).contact()
 
 
 def _fitted(
     view: StepView, zone: Mask, letter: str, center: tuple[float, float] | None = None
 ) -> tuple[estimators.Ellipse, str]:
-    """Fit a circle to the boundary nodes of a zone, or an ellipse to its second moments; word it."""
+    """Return the circle of the boundary nodes of a zone, or the ellipse of its moments, and its label."""
     moments = estimators.moment_ellipse(view.x, view.y, zone)
-    if moments.semi_minor > 0.97 * moments.semi_major:
+    if moments.semi_minor > ROUND * moments.semi_major:
         center = center or moments.center
         radius = estimators.boundary_circle(view.x, view.y, zone, view.spacing, center).radius
         return estimators.Ellipse(radius, radius, 0.0, center), f"circle, {letter} = {worded(radius, 'm')}"

@@ -6,26 +6,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ..analytic.friction import MindlinContact
 from ..analytic.hertz_gap import QuadraticGap
 from ..analytic.shear import CIRCULAR
-from ..result.view import as_list, dataset_of
+from ..result.view import Results, as_list, dataset_of
 from .history import values_of, vectors_of
 from .registry import SEVERAL_RUNS, figure
-from .style import COMPUTED, EXACT, GUIDE, THIRD, new_figure, set_title
+from .style import COMPUTED, EXACT, GUIDE, THIRD, drawing, set_title
 
 if TYPE_CHECKING:
     import xarray
-
-    from ..result.view import Results
-
-Array = NDArray[np.float64]
+    from matplotlib.axes import Axes
 
 
 def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
-    """Return the shift in the first step with a tangential load, relative to Mindlin's, and Q/(mu P) then.
+    """Return the shift of the first step with a tangential load over that of Mindlin, and its Q/(mu P).
 
     Parameters
     ----------
@@ -35,28 +31,18 @@ def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
     Raises
     ------
     ValueError
-        If it is no such result.
+        If it is another result.
     """
     gap, attributes = QuadraticGap.of(dataset), dataset.attrs
     friction = float(attributes.get("friction_coefficient", np.nan))
-    if (
-        attributes.get("algorithm") not in ("static", "incremental")
-        or not 0.0 < friction < np.inf
-        or gap is None
-    ):
+    frictional = attributes.get("algorithm") in ("static", "incremental") and 0.0 < friction < np.inf
+    if not frictional or gap is None:
         raise ValueError("the tangential compliance is that of spheres with friction")
     normal = values_of(dataset, "normal_load")
     load, shift = vectors_of(dataset, "tangential_load"), vectors_of(dataset, "shift")
-    begun = np.flatnonzero(np.hypot(*load) > 1e-6 * friction * normal)
-    if (
-        not begun.size
-        or begun[0] == 0
-        or abs(normal[begun[0]] - normal[begun[0] - 1]) > 1e-6 * normal[begun[0]]
-    ):
-        raise ValueError(
-            "the tangential compliance needs a load step that only shears, after those that press"
-        )
-    step = int(begun[0])
+    step = int(np.argmax(np.hypot(*load) > 1e-6 * friction * normal))  # 0 also without a tangential load
+    if step == 0 or abs(normal[step] - normal[step - 1]) > 1e-6 * normal[step]:
+        raise ValueError("the tangential compliance needs a load step of shear alone after those of pressing")
     hertz = gap.contact(float(normal[step]))
     if hertz.semi_minor < CIRCULAR * hertz.semi_major:
         raise ValueError("the tangential compliance is that of spheres with friction")
@@ -71,13 +57,15 @@ def initial_compliance(dataset: xarray.Dataset) -> tuple[float, float]:
 
 
 @figure("compliance", "initial tangential compliance of some files against beta", needs=SEVERAL_RUNS)
-def compliance(results: Results) -> Figure:
+def compliance(results: Results, ax: Axes | None = None) -> Figure:
     """Draw the initial tangential compliance of spheres against Dundurs' beta, a point for each result.
 
     Parameters
     ----------
     results : Result or xarray.Dataset, or a sequence of them
-        What runs returned, or `open_result` read: spheres pressed, then sheared.
+        Outputs of `Case.run` or `open_result`: spheres pressed, then sheared.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------
@@ -86,7 +74,7 @@ def compliance(results: Results) -> Figure:
     Raises
     ------
     ValueError
-        If one of them is no such result.
+        If one of them is another result.
     """
     several = [dataset_of(one) for one in as_list(results)]
     series: dict[tuple[float, str], list[tuple[float, float]]] = {}
@@ -96,8 +84,7 @@ def compliance(results: Results) -> Figure:
         shares.append(share)
         key = float(dataset.attrs["friction_coefficient"]), str(dataset.attrs.get("coupling", "full"))
         series.setdefault(key, []).append((abs(float(dataset.attrs["dundurs_beta"])), ratio))
-    canvas = new_figure(4.6, 3.6)
-    axes = canvas.add_subplot()
+    canvas, axes = drawing(ax, 4.6, 3.6)
     axes.axhline(1.0, color=GUIDE, lw=0.8, ls=":", label="Mindlin")
     colors = dict(zip(sorted({mu for mu, _ in series}), (COMPUTED, EXACT, THIRD), strict=False))
     for (mu, coupling), points in sorted(series.items()):
@@ -110,5 +97,5 @@ def compliance(results: Results) -> Figure:
     axes.legend()
     low, high = min(shares), max(shares)
     at = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
-    set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}")
+    set_title(canvas, f"Spheres pressed, then sheared to $Q/\\mu P$ = {at}", ax)
     return canvas

@@ -1,4 +1,4 @@
-"""What has one value by load step: histories, and loops of load and motion."""
+"""Quantities with one value for each load step: histories, and loops of load and motion."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from ..analytic.shear import ClosedForms, line_of
+from ..arrays import Array
+from ..core.measures import cycles as cycles_of
 from ..result.history import LOADS_AND_MOTIONS, worth_showing
-from ..result.view import dataset_of, scaled, title_of
-from ..variables import PANELS, VARIABLES, spelled
+from ..result.result import Result
+from ..result.view import dataset_of, title_of
+from ..text import scaled, worded
+from ..variables import PANELS, VARIABLES, names_where, spelled
 from .registry import figure
-from .style import COMPUTED, EXACT, GUIDE, new_figure, set_title
+from .style import COMPUTED, EXACT, GUIDE, drawing, handles_of, new_figure, set_title, shades
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
 
-    from ..result.result import Result
-
-Array = NDArray[np.float64]
 
 FRICTIONLESS = (("normal_load",), ("approach",), ("contact_radius",), ("max_pressure",))
-_MANY = 60  # steps that are too many for a marker each
-_BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as a band around
+_MANY = 60  # steps beyond which curves have no markers
+_BOUNDS = dict.fromkeys(("stick_area", "stick_area_fit"), "stick_area_step_error")  # drawn as bands
 
 
 def _known(dataset: xarray.Dataset) -> list[str]:
@@ -53,10 +53,10 @@ def _largest(dataset: xarray.Dataset, names: Sequence[str]) -> float:
 
 
 def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
-    """Return the quantities that share a panel, and what curves are called there, by the title of the panel.
+    """Return the quantities of each panel with the labels of their curves, by the title of the panel.
 
-    Loads and motions that are no more than noise, and quantities that stay 0, have no curve. Areas are those
-    to the edge between the nodes, where the histories have them.
+    Loads and motions below the noise, and quantities that stay 0, are left out. Areas extend to the edge
+    between the nodes, where the histories have them.
 
     Parameters
     ----------
@@ -79,6 +79,12 @@ def panels_of(histories: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str
     return panels
 
 
+def begins_at_zero(names: Sequence[str]) -> bool:
+    """Return whether quantities are 0 before the first load step, so that curves begin at step 0."""
+    shown = names_where(lambda v: not v.is_field and (v.title or v.summary))
+    return all(name.removesuffix("_fit") in shown for name in names)
+
+
 def peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
     """Return the largest magnitude of a quantity."""
     values = np.abs([float(history[name]) for history in histories])
@@ -86,13 +92,13 @@ def peak(name: str, histories: Sequence[Mapping[str, Any]]) -> float:
 
 
 def fitted(known: Container[Any], names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of areas or radii to the edge between the nodes, where all of them are known."""
+    """Return the names of areas or radii up to the edge between the nodes, where all are known."""
     fits = tuple(f"{name}_fit" for name in names)
     return fits if all(name in known for name in fits) else names
 
 
 def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
-    """Return the quantities that a history shows by default, those of a panel together."""
+    """Return the quantities that a history shows by default, in panels."""
     known = _known(dataset)
     if "stick_area" not in known:
         return [fitted(known, names) for names in FRICTIONLESS if names[0] in known]
@@ -102,18 +108,23 @@ def _chosen(dataset: xarray.Dataset) -> list[tuple[str, ...]]:
 
 @figure("history", "loads, motions, areas, p_max by step or over a load")
 def history(
-    result: Result | xarray.Dataset, quantities: Sequence[str] | None = None, over: str = "step"
+    result: Result | xarray.Dataset,
+    quantities: Sequence[str] | None = None,
+    over: str = "step",
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw quantities that have one value by step over the load steps, or over a load.
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
     quantities : sequence of str, optional
-        Names of the history variables, a panel each; by default those that are more than noise.
+        Names of the history variables, one for each panel; by default those above the noise.
     over : str
-        What is along the axis: "step", or a history variable such as "tangential_load_x".
+        Quantity on the horizontal axis: "step", or a history variable such as "tangential_load_x".
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw the quantities into, which then share a panel; by default those of a new figure.
 
     Returns
     -------
@@ -131,6 +142,11 @@ def history(
     if unknown := [name for name in wanted if name not in known]:
         raise ValueError(f"no history of {', '.join(unknown)} in this result; there are {', '.join(known)}")
     panels = [names for names in panels if names != (over,)]
+    if ax is not None:
+        if len({dataset[name].attrs.get("units") for name in wanted if name != over}) > 1:
+            raise ValueError("ax holds quantities of one unit; expected some in quantities")
+        draw_history(ax, dataset, [name for names in panels for name in names], over)
+        return drawing(ax, 0.0, 0.0)[0]
     columns = 3 if len(panels) > 6 and len(panels) % 3 == 0 else min(len(panels), 2)
     rows = -(-len(panels) // columns)
     canvas = new_figure((3.4 if columns < 3 else 2.8) * columns, 2.1 * rows + 0.3)
@@ -154,13 +170,15 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
     if over != "step":
         along, length = scaled(_largest(dataset, [over]), str(dataset[over].attrs.get("units", "")))
         place, label = values_of(dataset, over) * along, _titled(over, length)
+    begun = begins_at_zero([*names, *([over] if over != "step" else [])])
+    place = np.insert(place, 0, 0.0) if begun else place
     marker = "o" if place.size <= _MANY else ""
     lines = (COMPUTED, "-", marker), (EXACT, "--", "s" if marker else "")
     for name, (color, dash, mark) in zip(names, lines, strict=False):
-        values = values_of(dataset, name) * factor
+        values = np.insert(values_of(dataset, name), 0, 0.0)[not begun :] * factor
         axes.plot(place, values, ls=dash, marker=mark, ms=3, color=color, label=name)
         if (bound := _BOUNDS.get(name, "")) in dataset:
-            around = values_of(dataset, bound) * factor
+            around = np.insert(values_of(dataset, bound), 0, 0.0)[not begun :] * factor
             low, high = np.maximum(values - around, 0.0), values + around
             axes.fill_between(place, low, high, color=color, alpha=0.2, lw=0, label="_nolegend_")
     axes.set(xlabel=label, ylabel=_titled(names[0] if len(names) == 1 else _common(names), unit))
@@ -171,7 +189,7 @@ def draw_history(axes: Axes, dataset: xarray.Dataset, names: Sequence[str], over
         cast(MaxNLocator, axes.xaxis.get_major_locator()).set_params(integer=True)
         if "segment" in dataset:
             for change in np.flatnonzero(np.diff(dataset["segment"].values)):
-                axes.axvline(float(place[change]), color=GUIDE, lw=0.7, ls=":", zorder=0)
+                axes.axvline(float(place[change + begun]), color=GUIDE, lw=0.7, ls=":", zorder=0)
 
 
 def _titled(name: str, unit: str) -> str:
@@ -179,13 +197,13 @@ def _titled(name: str, unit: str) -> str:
 
 
 def _common(names: Sequence[str]) -> str:
-    """Name several quantities by the words that all of them have."""
+    """Return the words that the names of several quantities share."""
     words = [name.split("_") for name in names]
     return "_".join(word for word in words[0] if all(word in other for other in words))
 
 
 def _apart(name: str, names: Sequence[str]) -> str:
-    """Name a quantity by the words that the others do not have."""
+    """Return the words of a name that others do not share."""
     common = _common(names).split("_")
     return " ".join(word for word in name.split("_") if word not in common)
 
@@ -194,15 +212,22 @@ def _apart(name: str, names: Sequence[str]) -> str:
 
 
 @figure("loop", "tangential load against shift", needs="tangential load")
-def loop(result: Result | xarray.Dataset) -> Figure:
-    """Draw the tangential load against the shift; for similar spheres the closed curve, too.
+def loop(
+    result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
+) -> Figure:
+    """Draw the tangential load against the shift; for similar spheres also the closed solution.
 
     Both are taken along the direction of the largest load.
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
+    cycles : int or sequence of int, optional
+        Numbers of the cycles, from 1; -1 is the last one. By default the whole history, with the area of the
+        last cycle.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------
@@ -211,7 +236,7 @@ def loop(result: Result | xarray.Dataset) -> Figure:
     Raises
     ------
     ValueError
-        If there is no tangential load in this result.
+        If there is no tangential load in this result, or no such cycle.
     """
     dataset = dataset_of(result)
     if "shift_x" not in dataset or "tangential_load_x" not in dataset:
@@ -222,14 +247,14 @@ def loop(result: Result | xarray.Dataset) -> Figure:
         raise ValueError("there is no tangential load in this result")
     index = {(1.0, 0.0): "_x", (0.0, 1.0): "_y"}.get((round(direction[0], 6), round(direction[1], 6)), "")
     beside = "" if index else f" along {np.degrees(np.arctan2(direction[1], direction[0])):.3g}°"
-    canvas = new_figure(4.6, 3.8)
-    axes = canvas.add_subplot()
+    canvas, axes = drawing(ax, 4.6, 3.8)
     to_force = _draw_loop(
         axes,
         (np.array(direction) @ shift, f"shift $\\Delta{index}$" + beside, "m"),
         (np.array(direction) @ load, f"tangential load $Q{index}$" + beside, "N"),
         ClosedForms(dataset).shear_loop(),
         "Cattaneo–Mindlin,\nMindlin–Deresiewicz",
+        cycles,
     )
     bound = float(dataset.attrs.get("friction_coefficient", np.inf)) * values_of(dataset, "normal_load")[-1]
     low, high = axes.get_ylim()
@@ -239,19 +264,26 @@ def loop(result: Result | xarray.Dataset) -> Figure:
             axes.axhline(level, color=GUIDE, lw=0.8, ls=":", label=r"$\mu P$")
             low, high = min(low, level - room), max(high, level + room)
     axes.set_ylim(low, high)
-    axes.legend(*_once(axes))
-    set_title(canvas, title_of(dataset))
+    axes.legend(handles=handles_of(axes))
+    set_title(canvas, title_of(dataset), ax)
     return canvas
 
 
 @figure("torsion", "torque against twist", needs="torque")
-def torsion(result: Result | xarray.Dataset) -> Figure:
-    """Draw the torque against the twist over the load steps; for similar spheres Lubkin's curve, too.
+def torsion(
+    result: Result | xarray.Dataset, cycles: int | Sequence[int] | None = None, ax: Axes | None = None
+) -> Figure:
+    """Draw the torque against the twist; for similar spheres also the solution of Lubkin.
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
+    cycles : int or sequence of int, optional
+        Numbers of the cycles, from 1; -1 is the last one. By default the whole history, with the area of the
+        last cycle.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------
@@ -260,52 +292,61 @@ def torsion(result: Result | xarray.Dataset) -> Figure:
     Raises
     ------
     ValueError
-        If there is no torque in this result.
+        If there is no torque in this result, or no such cycle.
     """
     dataset = dataset_of(result)
     if "twist" not in dataset or not any("torque" in names for names in _chosen(dataset)):
         raise ValueError("there is no torque in this result")
-    canvas = new_figure(4.6, 3.8)
-    axes = canvas.add_subplot()
+    canvas, axes = drawing(ax, 4.6, 3.8)
     _draw_loop(
         axes,
         (values_of(dataset, "twist"), r"twist $\vartheta$", "rad"),
         (values_of(dataset, "torque"), "torque $M_z$", "N m"),
         ClosedForms(dataset).torsion_loop(),
         "Lubkin",
+        cycles,
     )
     axes.legend()
-    set_title(canvas, title_of(dataset))
+    set_title(canvas, title_of(dataset), ax)
     return canvas
 
 
-Axis = tuple[Array, str, str]  # values, name and unit of what is along an axis
+Axis = tuple[Array, str, str]  # values, name and unit of the quantity on an axis
 
 
-def _draw_loop(axes: Axes, motion: Axis, load: Axis, closed: tuple[Array, Array] | None, name: str) -> float:
-    """Draw a load against its motion, step by step; return the factor that scales the load."""
+def _draw_loop(
+    axes: Axes,
+    motion: Axis,
+    load: Axis,
+    closed: tuple[Array, Array] | None,
+    name: str,
+    chosen: int | Sequence[int] | None,
+) -> float:
+    """Draw a load against its motion, or some cycles of it; return the factor that scales the load."""
     (x, x_name, x_unit), (y, y_name, y_unit) = motion, load
     to_x, x_unit = scaled(float(np.abs(x).max()), x_unit)
     to_y, y_unit = scaled(float(np.abs(y).max()), y_unit)
     axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=0)
     axes.axvline(0.0, color=GUIDE, lw=0.5, zorder=0)
-    look: dict[str, Any] = {
-        "marker": "o",
-        "ms": 3.5 if x.size <= 2 * _MANY else 2.0,
-        "mfc": "none",
-        "mew": 0.9,
-    }
-    line = {"ls": ""} if closed is not None else {"lw": 0.7}
-    axes.plot(x * to_x, y * to_y, color=COMPUTED, label="computed", zorder=3, **look, **line)
+    size = 3.5 if x.size <= 2 * _MANY else 2.0
+    look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9}
+    found = cycles_of(x, y)
+    numbers = [-1] * bool(found) if chosen is None else [chosen] if isinstance(chosen, int) else [*chosen]
+    colors = [COMPUTED] if len(numbers) < 2 else shades(len(numbers))
+    for number, color in zip(numbers, colors, strict=False):
+        place = number if number < 0 else number - 1
+        if number == 0 or not -len(found) <= place < len(found):
+            raise ValueError(f"there is no cycle {number}; the history has {len(found)}")
+        first, last, area = found[place]
+        steps = slice(first, last + 1)
+        label = f"cycle {place % len(found) + 1}: {worded(area, 'J')}"
+        axes.fill(x[steps] * to_x, y[steps] * to_y, color=color, alpha=0.12, lw=0, label=label, zorder=1)
+        if chosen is not None:
+            axes.plot(x[steps] * to_x, y[steps] * to_y, color=color, lw=0.7, zorder=3, **look)
+    if chosen is None:
+        line = {"ls": ""} if closed is not None else {"lw": 0.7}
+        axes.plot(x * to_x, y * to_y, color=COMPUTED, label="computed", zorder=3, **look, **line)
     if closed is not None:
         axes.plot(closed[0] * to_x, closed[1] * to_y, color=EXACT, lw=1.1, label=name, zorder=2)
     axes.set(xlabel=f"{x_name} ({x_unit})", ylabel=f"{y_name} ({y_unit})")
     return to_y
-
-
-def _once(axes: Axes) -> tuple[list[Any], list[Any]]:
-    """Return what a legend lists, each label once."""
-    handles, labels = axes.get_legend_handles_labels()
-    first = dict(zip(reversed(labels), reversed(handles), strict=True))
-    unique = list(dict.fromkeys(labels))
-    return [first[label] for label in unique], unique

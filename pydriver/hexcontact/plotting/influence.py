@@ -1,8 +1,7 @@
-"""Pictures of the influence functions: the pyramid (Figure 5.6) beside other load shapes (Figure 7.3)."""
+"""Figures of the influence functions: pyramid (Figure 5.6), elements (5.2, 5.5), load shapes (7.3, 7.4)."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -10,13 +9,18 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from ..analytic import hertz_sphere
+from ..arrays import Array
+from ..core.influence import (
+    displacement_errors,
+    linear_load_displacement,
+    load_potential,
+    pressure_errors,
+    pyramid_functions,
+)
 from .registry import figure
 from .style import COMPUTED, EXACT, GUIDE, THIRD, new_figure
 
-Array = NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]
 
 HEIGHT = np.sqrt(0.75)  # of the equilateral triangle with side 1; also the cell area and the pyramid's volume
@@ -43,8 +47,6 @@ def pyramid_displacements(poisson_ratio: float = 0.3) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    from ..core.influence import pyramid_functions
-
     fine = np.linspace(-2.2, 2.2, 221)
     x, y = np.meshgrid(fine, fine)
     functions = iter(pyramid_functions(x, y, poisson_ratio))
@@ -65,7 +67,7 @@ def pyramid_displacements(poisson_ratio: float = 0.3) -> Figure:
 
 
 def _map(canvas: Figure, axes: Axes, x: Array, y: Array, value: Array) -> None:
-    """Draw filled contours; a function of both signs gets a diverging map that is white at 0."""
+    """Draw filled contours, for a function of both signs with a diverging map that is white at 0."""
     top = float(np.abs(value).max())
     signed = float(value.min()) < -0.05 * top
     levels = np.linspace(-top, top, 22) if signed else np.linspace(0.0, top, 22)
@@ -80,74 +82,144 @@ def _map(canvas: Figure, axes: Axes, x: Array, y: Array, value: Array) -> None:
     bar.ax.tick_params(labelsize=7)
 
 
-# ----------------------------------------------------------------------------------- load shapes
+# --- elements -------------------------------------------------------------------------------------
 
 
-def point_force(x: Array, y: Array) -> Array:
-    """Integral of 1/rho over a point force of the pyramid's volume; infinite at the force."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(HEIGHT / np.hypot(x, y))
+_HALF = (1, 2, 6)  # elements of Figure 5.5; their mirror images complete the pyramid
 
 
-def constant_cell(x: Array, y: Array) -> Array:
-    """Integral of 1/rho over the hexagonal cell of a node, under the load 1."""
-    from ..core.influence import triangle_integral
-
-    corner = np.exp(1j * (_HEXAGON + np.pi / 6)) / np.sqrt(3.0)
-    total = np.zeros(np.broadcast(x, y).shape)
-    for first, second in itertools.pairwise(corner):
-        triangle = np.array([[0.0, 0.0], [first.real, first.imag], [second.real, second.imag]])
-        total += triangle_integral(triangle, x, y, 1, 0, 0)
-    return total
+def _element(number: int) -> Array:
+    """Return the corners of a tetrahedral element, the loaded one first; element 1 is about +y."""
+    start = np.pi / 3 * number
+    angles = np.array([start, start + np.pi / 3])
+    return np.vstack([np.zeros(2), np.stack([np.cos(angles), np.sin(angles)], axis=1)])
 
 
-def pyramid(x: Array, y: Array) -> Array:
-    """Integral of 1/rho over the unit pyramid."""
-    from ..core.influence import pyramid_kernels
-
-    return np.asarray(pyramid_kernels(x, y)[0])
-
-
-SHAPES: dict[str, tuple[Shape, dict[str, Any]]] = {
-    "point force": (point_force, {"color": EXACT, "ls": ":"}),
-    "constant on the cell": (constant_cell, {"color": THIRD, "ls": "--"}),
-    "pyramid": (pyramid, {"color": COMPUTED, "ls": "-"}),
-}
-"""Ways to spread a nodal pressure, each of volume sqrt(3)/2 (spacing 1), and how each is drawn."""
-
-
-def hertz_error(shape: Shape, nodes_in_radius: float, x: Array, y: Array) -> Array:
-    """Error of the displacement when Hertz's pressure, taken at the nodes, is spread with ``shape``.
-
-    The exact pressure stands at the nodes of a lattice of spacing 1 with a node at the center; inside the
-    contact the exact displacement is the paraboloid delta - r^2/(2R).
+@figure("elements", "tetrahedra and pyramids of load (Figures 4.5, 5.2, 5.5)")
+def load_elements(poisson_ratio: float = 0.3) -> Figure:
+    """Draw a tetrahedral element, pyramids of six (Figures 4.5, 5.2, 5.4, 5.5), displacements by elements.
 
     Parameters
     ----------
-    shape : callable
-        One of `SHAPES`.
-    nodes_in_radius : float
-        a/l_e.
-    x, y : ndarray
-        Points inside the contact, in spacings.
+    poisson_ratio : float
+        nu of the body.
 
     Returns
     -------
-    ndarray
-        (computed - exact)/delta at the points.
+    matplotlib.figure.Figure
     """
-    hertz = hertz_sphere(1.0, 1.0, contact_radius=nodes_in_radius)
-    reach = int(1.2 * nodes_in_radius) + 2
-    row, col = np.mgrid[-reach : reach + 1, -2 * reach : 2 * reach + 1]
-    node_x, node_y = col + 0.5 * row, HEIGHT * row
-    p = hertz.pressure(np.hypot(node_x, node_y))
-    node_x, node_y, p = node_x[p > 0], node_y[p > 0], p[p > 0]
-    kernel = shape(x[..., None] - node_x, y[..., None] - node_y)
-    computed = kernel @ p / (np.pi * hertz.effective_modulus)
-    return np.asarray((computed - (hertz.approach - 0.5 * (x**2 + y**2))) / hertz.approach)
+    canvas = new_figure(9.6, 5.4)
+    solid = (True, False, True, True, False, False, False, False)
+    panels = [canvas.add_subplot(2, 4, k + 1, projection="3d" if solid[k] else None) for k in range(8)]
+    everything = (1, 2, 3, 4, 5, 6)
+    _draw_solid(panels[0], (1,), "")
+    panels[1].plot([0.0, HEIGHT], [1.0, 0.0], color=COMPUTED)
+    panels[1].set(xlabel="$\\eta/l_e$", ylabel="load", xlim=(-0.1, 1.0), ylim=(0.0, 1.1), box_aspect=0.8)
+    _draw_solid(panels[2], everything, "")
+    _draw_solid(panels[3], everything, "x")
+    titles = (
+        "tetrahedron 1 (4.5a, 5.2a)",
+        "its profile (5.2b)",
+        "pyramid of $p$ (4.5b, 5.4)",
+        "pyramid of $q_x$ (5.5)",
+    )
+    for letter, axes, title in zip("abcd", panels, titles, strict=False):
+        axes.set_title(f"({letter}) {title}")
+    fine = np.linspace(-1.6, 1.6, 161)
+    x, y = np.meshgrid(fine, fine)
+    loads = ((1, 2, "$u_z$ of $p$ on 1"), *((number, 0, f"$u_x$ of $q_x$ on {number}") for number in _HALF))
+    for letter, axes, (number, component, title) in zip("efgh", panels[4:], loads, strict=True):
+        corners, traction = _element(number), np.zeros((3, 3))
+        traction[0, component] = 1.0
+        moved = linear_load_displacement(
+            corners, x, y, traction, shear_modulus=1.0, poisson_ratio=poisson_ratio
+        )
+        _map(canvas, axes, x, y, 2 * np.pi / (1 - poisson_ratio) * moved[component])
+        axes.plot(*np.vstack([corners, corners[:1]]).T, color="white", lw=1.0)
+        axes.set(title=f"({letter}) {title}", xlabel="$x/l_e$")
+    panels[4].set_ylabel("$y/l_e$")
+    canvas.suptitle(
+        f"Elements of side $l_e$ and height 1; $2\\pi G u/((1-\\nu)\\,l_e)$ for $\\nu$ = {poisson_ratio:g}"
+    )
+    return canvas
 
 
-@figure("load-shapes", "pyramid, point force and constant load compared (Figure 7.3)")
+def _draw_solid(axes: Any, numbers: tuple[int, ...], along: str) -> None:
+    """Draw tetrahedra over their bases, with their numbers, and arrows along x if they are shear."""
+    for number in numbers:
+        corners = _element(number)
+        foot = np.column_stack([corners, np.zeros(3)])
+        top = foot + np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        axes.plot_trisurf(*top.T, triangles=[[0, 1, 2]], color=COMPUTED, alpha=0.35, lw=0.8, edgecolor="0.2")
+        axes.plot(*np.vstack([foot, foot[:1]]).T, color="0.4", lw=0.6, ls="--")
+        middle = corners.mean(axis=0)
+        axes.text(*(1.45 * middle), 0.0, str(number), ha="center", va="center", fontsize=8)
+        if along:
+            axes.quiver(*middle, 1 / 3, 0.35, 0.0, 0.0, color=EXACT, lw=1.2, arrow_length_ratio=0.4)
+        else:
+            axes.quiver(*middle, 0.75, 0.0, 0.0, -0.4, color=EXACT, lw=1.2, arrow_length_ratio=0.35)
+    axes.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0), zlim=(0.0, 1.0), xticks=[], yticks=[], zticks=[])
+    axes.set_box_aspect((2.0, 2.0, 1.0), zoom=1.35)
+    axes.view_init(elev=32.0, azim=-70.0)
+    axes.set_xlabel("x", labelpad=-14)
+    axes.set_ylabel("y", labelpad=-14)
+
+
+# --- load shapes ----------------------------------------------------------------------------------
+
+
+@figure("load-models", "a load in two dimensions (Figures 7.3, 7.4)")
+def load_models(nodes: int = 9) -> Figure:
+    """Draw a surface load in two dimensions (Figure 7.3) and overlapping triangles (Figure 7.4).
+
+    Parameters
+    ----------
+    nodes : int
+        Nodes across the contact.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    canvas = new_figure(7.6, 4.6)
+    panels = canvas.subplots(2, 2, sharex=True, sharey=True).ravel()
+    fine = np.linspace(-1.0, 1.0, 801)
+    place = np.linspace(-1.0, 1.0, nodes + 2)
+    height, step = np.sqrt(np.maximum(1.0 - place**2, 0.0)), place[1] - place[0]
+    for axes in panels:
+        axes.plot(fine, np.sqrt(1 - fine**2), color=GUIDE, lw=1.0)
+    for x, p in zip(place[1:-1], height[1:-1], strict=True):
+        panels[0].annotate("", (x, 0.0), (x, p), arrowprops={"arrowstyle": "->", "color": EXACT})
+        panels[3].plot([x - step, x, x + step], [0.0, p, 0.0], color=THIRD, lw=0.8)
+    panels[1].stairs(height[1:-1], place[1:] - 0.5 * step, color=THIRD, fill=True, alpha=0.5)
+    panels[2].fill_between(place, height, color=COMPUTED, alpha=0.4, lw=0.0)
+    panels[2].plot(place, height, color=COMPUTED)
+    panels[3].plot(place, height, color=COMPUTED)
+    sums = step * height.sum() / (np.pi / 2) - 1.0
+    titles = (
+        "(a) forces $a\\,p_i$ (7.3a)",
+        "(b) constant between nodes (7.3b)",
+        "(c) continuous, and smooth in gray (7.3c, d)",
+        f"(d) overlapping triangles and their sum (7.4)\n(7.2): area {100 * sums:+.1f} % off",
+    )
+    for axes, title in zip(panels, titles, strict=True):
+        axes.set(title=title, xlim=(-1.15, 1.15), ylim=(0.0, 1.1))
+    for axes in panels[2:]:
+        axes.set_xlabel("x / half-width")
+    for axes in panels[::2]:
+        axes.set_ylabel("$p/p_0$")
+    return canvas
+
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "point force": {"color": EXACT, "ls": ":"},
+    "constant on the cell": {"color": THIRD, "ls": "--"},
+    "pyramid": {"color": COMPUTED, "ls": "-"},
+}
+"""Line styles of the shapes of a nodal load."""
+
+
+@figure("load-shapes", "pyramid, point force, constant load compared (Figure 7.3)")
 def load_shapes(nodes_in_radius: int = 10) -> Figure:
     """Compare a point force, a constant load on the hexagonal cell and the pyramid (Figure 7.3).
 
@@ -169,15 +241,15 @@ def load_shapes(nodes_in_radius: int = 10) -> Figure:
     _draw_convergence(convergence)
     for letter, axes in zip("abcd", (one, pressure, error, convergence), strict=True):
         axes.set_title(f"({letter}) {axes.get_title()}")
-    handles = [matplotlib.lines.Line2D([], [], label=name, **look) for name, (_, look) in SHAPES.items()]
+    handles = [matplotlib.lines.Line2D([], [], label=name, **look) for name, look in LOOKS.items()]
     canvas.legend(handles=handles, loc="outside lower center", ncols=3)
     return canvas
 
 
 def _draw_one_load(axes: Axes) -> None:
     x = np.linspace(-2.5, 2.5, 501)
-    for shape, look in SHAPES.values():
-        axes.plot(x, shape(x, np.zeros_like(x)), **look)
+    for name, look in LOOKS.items():
+        axes.plot(x, load_potential(name, x, 0.0), **look)
     axes.set(title="displacement of one load", xlabel="$x/l_e$", ylabel="$\\pi E^* u_z / (p\\, l_e)$")
     axes.set(xlim=(-2.5, 2.5), ylim=(0.0, 4.5))
 
@@ -198,49 +270,19 @@ def _draw_pressures(axes: Axes, a: int) -> None:
 
 def _draw_errors(axes: Axes, a: int) -> None:
     x = np.linspace(0.0, 0.9, 721)
-    for name, (shape, look) in SHAPES.items():
-        error = 100 * hertz_error(shape, a, x * a, np.zeros_like(x))
+    for name, look in LOOKS.items():
+        error = 100 * displacement_errors(name, a, x * a, 0.0)
         axes.plot(x, error, **look, zorder=1 if name == "point force" else 2)
     axes.axhline(0.0, color=GUIDE, lw=0.6, zorder=0)
     axes.set(title="error of $u_z$ inside the contact", xlabel="$x/a$", ylabel="error (% of the approach)")
     axes.set(xlim=(0.0, 0.9), ylim=(-0.25, 0.25))
 
 
-def interpolation_error(nodes_in_radius: float) -> tuple[float, float]:
-    """Largest error of Hertz's pressure for r < 0.8 a when constant cells or pyramids spread it.
-
-    Parameters
-    ----------
-    nodes_in_radius : float
-        a/l_e.
-
-    Returns
-    -------
-    tuple of float
-        Error of the constant cells and of the pyramids, in units of p_0.
-    """
-    hertz = hertz_sphere(1.0, 1.0, contact_radius=nodes_in_radius)
-    step = np.linspace(0.0, 1.0, 17)
-    share = np.array([(1 - u - v, u, v) for u in step for v in step if u + v <= 1])  # barycentric
-    reach = int(1.2 * nodes_in_radius) + 1
-    row, col = np.mgrid[-reach:reach, -2 * reach : 2 * reach]
-    corners = [(row, col), (row, col + 1), (row + 1, col)]  # the other triangles are their mirror images
-    x = np.stack([c + 0.5 * r for r, c in corners], axis=-1).reshape(-1, 3)
-    y = np.stack([HEIGHT * r for r, _ in corners], axis=-1).reshape(-1, 3)
-    radius = np.hypot(x @ share.T, y @ share.T)
-    inner = radius < 0.8 * nodes_in_radius
-    exact = hertz.pressure(radius)
-    at_nodes = hertz.pressure(np.hypot(x, y))
-    constant = at_nodes[:, share.argmax(axis=1)]  # the nearest corner
-    worst = [float(np.abs(p - exact)[inner].max()) for p in (constant, at_nodes @ share.T)]
-    return worst[0] / hertz.max_pressure, worst[1] / hertz.max_pressure
-
-
 def _draw_convergence(axes: Axes) -> None:
     meshes = np.array([5, 10, 20, 40])
-    errors = 100 * np.array([interpolation_error(float(mesh)) for mesh in meshes])
+    errors = 100 * np.array([pressure_errors(float(mesh)) for mesh in meshes])
     for column, name in enumerate(("constant on the cell", "pyramid")):
-        axes.loglog(meshes, errors[:, column], marker="o", ms=3, **SHAPES[name][1])
+        axes.loglog(meshes, errors[:, column], marker="o", ms=3, **LOOKS[name])
         order = -np.polyfit(np.log(meshes), np.log(errors[:, column]), 1)[0]
         axes.annotate(
             f"order {order:.1f}", (meshes[1], errors[1, column]), (4, 4), textcoords="offset points"

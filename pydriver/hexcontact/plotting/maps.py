@@ -8,12 +8,16 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.collections import TriMesh
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.tri import Triangulation
-from numpy.typing import NDArray
 
-from ..result.mesh import triangles
-from ..result.view import StepView, scaled
+from ..arrays import Array
+from ..core.edges import ZoneMesh
+from ..result.result import Result
+from ..result.view import StepView
+from ..text import scaled
 from ..variables import MAPS, VARIABLES
 from .plane import ARROWS, FEWER_ARROWS, Part, map_panels, views_of
 from .registry import figure, styled
@@ -21,49 +25,34 @@ from .style import legend_above, set_title
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.collections import TriMesh
-    from matplotlib.figure import FigureBase
-
-    from ..result.result import Result
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-DRAWN_NODES = 60_000  # nodes beyond which a field is drawn from every second, third, ... node
-LEAST_ASPECT = 0.6  # of a single map, so that there is room for a color bar beside it
-_WITH_ARROWS = 9  # maps in a picture up to which their arrows can be seen
 
 
-def mesh_of(view: StepView, values: Array, where: Mask) -> tuple[Triangulation, Array] | None:
-    """Return the triangles of the lattice with a corner at some of the nodes, and the values at all corners.
+DRAWN_NODES = 60_000  # above this number, fields are drawn from every second, third, ... node
+_WITH_ARROWS = 9  # maps in a picture up to which arrows are visible
+
+
+def mesh_of(view: StepView, values: Array, vanishes: bool) -> ZoneMesh:
+    """Return triangles that fill the contact area up to its edge, with a field at their corners.
 
     Parameters
     ----------
     view : StepView
         The step.
     values : ndarray, shape (n_row, n_col)
-        A field.
-    where : ndarray of bool, shape (n_row, n_col)
-        The nodes; of more than `DRAWN_NODES` in contact only some are taken.
+        A field; above `DRAWN_NODES` nodes in contact only every second, third, ... is used.
+    vanishes : bool
+        Whether it is zero at the edge, like tractions.
     """
     stride = int(np.ceil(np.sqrt((1 + int(view.contact.sum())) / DRAWN_NODES)))
-    x, y, shown = (f[::stride, ::stride] for f in (view.x, view.y, values))
-    corners = triangles(*x.shape)
-    corners = corners[where[::stride, ::stride].ravel()[corners].any(axis=1)]
-    if not corners.size:
-        return None
-    used, renumbered = np.unique(corners, return_inverse=True)
-    triangulation = Triangulation(x.ravel()[used], y.ravel()[used], renumbered.reshape(corners.shape))
-    return triangulation, shown.ravel()[used]
+    return view.edges(stride).contact_mesh(values[::stride, ::stride], vanishes)
 
 
-# --- which fields there are -----------------------------------------------------------------------
+# --- the fields -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class _Field:
-    """A field that has a map: its label, unit, help, and the components of the vector whose length it is."""
+    """A field with a map: label, unit, help, and the components if it is the length of a vector."""
 
     label: str
     unit: str
@@ -106,13 +95,14 @@ def draw_field(
     name: str,
     part: Part,
     arrows: bool = True,
+    below: bool = False,
 ) -> None:
     """Draw a field of several steps into panels with one color scale.
 
     Parameters
     ----------
     canvas : Figure
-        Where the panels are.
+        Figure of the panels.
     panels : sequence of Axes
         One for each step.
     views : sequence of StepView
@@ -120,9 +110,11 @@ def draw_field(
     name : str
         Name of the field; "traction" and "slip_increment" are the lengths of the vectors.
     part : Part
-        The part of the plane that is shown.
+        Part of the plane to show.
     arrows : bool
-        Whether a vector is drawn as arrows, too.
+        Whether vectors are also drawn as arrows.
+    below : bool
+        Whether the color bar of a single panel is below it instead of at its side.
     """
     field = _FIELDS[name]
     values = [field.values(view, name) for view in views]
@@ -131,15 +123,13 @@ def draw_field(
     factor, unit = scaled(largest, field.unit)
     shades: TriMesh | None = None
     for axes, view, field_values in zip(panels, views, values, strict=True):
-        drawn = mesh_of(view, field_values, view.contact)
-        if drawn is None:
+        mesh = mesh_of(view, field_values, field.unit == "Pa")
+        if not mesh.triangles.size:
             axes.text(0.5, 0.5, "no contact", transform=axes.transAxes, ha="center", va="center")
         else:
-            mesh, at_corners = drawn
-            mesh = Triangulation(mesh.x * part.factor, mesh.y * part.factor, mesh.triangles)
             shades = axes.tripcolor(
-                mesh,
-                at_corners * factor,
+                Triangulation(mesh.x * part.factor, mesh.y * part.factor, mesh.triangles),
+                (mesh.values if signed else np.maximum(mesh.values, 0.0)) * factor,
                 shading="gouraud",
                 rasterized=True,
                 cmap="PuOr_r" if signed else "viridis",
@@ -151,8 +141,11 @@ def draw_field(
         if view.hertz is not None:
             part.outline(axes, view.hertz, view.center, label="Hertz contact area", lw=1.0)
     if shades is not None:
-        if len(panels) == 1:  # as high as the axes
-            bar = canvas.colorbar(shades, cax=panels[0].inset_axes((1.03, 0.0, 0.045, 1.0)))
+        if len(panels) == 1 and not below:  # as high as the axes
+            thick = min(0.045 * part.aspect, 0.2)
+            bar = canvas.colorbar(shades, cax=panels[0].inset_axes((1.0 + 0.6 * thick, 0.0, thick, 1.0)))
+        elif len(panels) == 1:
+            bar = canvas.colorbar(shades, ax=panels[0], orientation="horizontal", aspect=50, shrink=0.8)
         else:
             bar = canvas.colorbar(shades, ax=list(panels), aspect=30, pad=0.02)
         bar.set_label(f"{field.label} ({unit})")
@@ -165,19 +158,22 @@ def field_map(
     result: Result | xarray.Dataset,
     steps: int | Sequence[int] = -1,
     with_arrows: bool | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
-    """Draw a field over the plane, linear on the triangles of the lattice as in the solution.
+    """Draw a field over the contact area, linear on the triangles of the lattice as in the solver.
 
     Parameters
     ----------
     name : str
         "pressure", "traction", "traction_x", "traction_y", "slip_increment" or "accumulated_slip".
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
     steps : int or sequence of int
         Numbers of the load steps, from 1; -1 is the last one.
     with_arrows : bool, optional
-        Whether a vector is drawn as arrows, too; by default unless there are too many maps to see them.
+        Whether vectors are also drawn as arrows; by default if there are few maps.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------
@@ -188,30 +184,34 @@ def field_map(
     IndexError
         If there is no such step.
     ValueError
-        If the field of that step was not kept, or there is none without friction.
+        If the field of that step was not kept, or does not exist without friction.
     """
     views, labels, title = views_of(result, steps)
     single = len(views) == 1
-    part = Part.around(views, least_aspect=LEAST_ASPECT if single else 0.0)
-    canvas, panels = map_panels(part, labels)
+    part = Part.around(views)
+    canvas, panels = map_panels(part, labels, ax)
     arrows = len(views) <= _WITH_ARROWS if with_arrows is None else with_arrows
-    draw_field(canvas, panels, views, name, part, arrows)
+    draw_field(canvas, panels, views, name, part, arrows, below=part.is_wide)
     if single and views[0].hertz is not None:
         legend_above(panels[0])
-    set_title(canvas, title)
+    set_title(canvas, title, ax)
     return canvas
 
 
 @figure("pressure", _FIELDS["pressure"].help)
-def pressure_field(result: Result | xarray.Dataset, steps: int | Sequence[int] = -1) -> Figure:
-    """Draw the contact pressure over the plane, linear on the triangles of the lattice as in the solution.
+def pressure_field(
+    result: Result | xarray.Dataset, steps: int | Sequence[int] = -1, ax: Axes | None = None
+) -> Figure:
+    """Draw the contact pressure, linear on the triangles of the lattice as in the solver.
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
     steps : int or sequence of int
         Numbers of the load steps, from 1; -1 is the last one.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into; by default those of a new figure.
 
     Returns
     -------
@@ -224,7 +224,7 @@ def pressure_field(result: Result | xarray.Dataset, steps: int | Sequence[int] =
     ValueError
         If the pressure of that step was not kept.
     """
-    return field_map("pressure", result, steps)
+    return field_map("pressure", result, steps, ax=ax)
 
 
 for _name, _field in _FIELDS.items():

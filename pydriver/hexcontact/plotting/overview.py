@@ -1,15 +1,17 @@
-"""A load step in several pictures: maps, a section, the history."""
+"""Overview of a load step: maps, a section, the history."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from ..analytic.shear import ClosedForms
+from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from .history import draw_history, fitted
-from .maps import LEAST_ASPECT, draw_field
+from .maps import draw_field
 from .plane import Part
 from .registry import figure
 from .sections import Cut, draw_section, draw_shear
@@ -19,20 +21,18 @@ from .zones import draw_zones, zone_legend
 if TYPE_CHECKING:
     import xarray
 
-    from ..result.result import Result
 
-
-@figure("overview", "pressure and a section; with friction shear and zones, too", first=True)
+@figure("overview", "pressure and a section; with friction shear, zones", first=True)
 def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
-    """Draw a load step in several pictures.
+    """Draw maps, a section and the history of a load step.
 
-    Without friction that is the pressure over the plane and along x; with friction the shear traction, the
-    zones and the history, too.
+    Without friction: the pressure over the plane and along x; with friction also the shear traction, the
+    zones and the history.
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
     step : int
         Number of the load step, from 1; -1 is the last one.
 
@@ -48,16 +48,21 @@ def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
         If the pressure of that step was not kept.
     """
     view = StepView.of(result, step)
-    with_friction = view.friction > 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)
+    with_friction = view.friction != 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)
     canvas = _frictional(dataset_of(result), view) if with_friction else _frictionless(view)
     set_title(canvas, view.title)
     return canvas
 
 
 def _frictionless(view: StepView) -> Figure:
-    canvas = new_figure(8.6, 3.7)
-    left, right = cast(Any, canvas.subfigures(1, 2, width_ratios=(1.15, 1)))
-    axes, part = left.add_subplot(), Part.around([view])
+    part = Part.around([view])
+    if part.is_wide:
+        canvas = new_figure(7.2, 6.0 * part.aspect + 5.0)
+        left, right = cast(Any, canvas.subfigures(2, 1, height_ratios=(6.0 * part.aspect + 1.2, 3.8)))
+    else:
+        canvas = new_figure(8.6, float(np.clip(3.7 * part.aspect, 3.7, 6.5)))
+        left, right = cast(Any, canvas.subfigures(1, 2, width_ratios=(1.15, 1)))
+    axes = left.add_subplot()
     part.show(axes)
     draw_field(left, [axes], [view], "pressure", part)
     if view.hertz is not None:
@@ -68,11 +73,12 @@ def _frictionless(view: StepView) -> Figure:
 
 def _frictional(dataset: xarray.Dataset, view: StepView) -> Figure:
     """Draw maps of pressure, shear traction and zones; below them a section and the history."""
-    part = Part.around([view], least_aspect=LEAST_ASPECT)
+    part = Part.around([view])
     exact = ClosedForms(dataset).partial_slip(view.number)
-    canvas = new_figure(9.6, 6.2)
-    upper, lower = cast(Any, canvas.subfigures(2, 1, height_ratios=(1.05, 1)))
-    panels = upper.subplots(1, 3)
+    maps = 3 * (8.0 * part.aspect + 0.6) if part.is_wide else float(np.clip(2.4 * part.aspect, 3.2, 6.0))
+    canvas = new_figure(9.6, maps + 3.0)
+    upper, lower = cast(Any, canvas.subfigures(2, 1, height_ratios=(maps, 3.0)))
+    panels = upper.subplots(*((3, 1) if part.is_wide else (1, 3)))
     for axes in panels:
         part.show(axes)
     draw_field(upper, panels[:1], [view], "pressure", part)

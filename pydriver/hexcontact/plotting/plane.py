@@ -1,4 +1,4 @@
-"""Maps of the plane: which part they show, panels side by side, outlines and arrows."""
+"""Maps of the plane: their limits, panels side by side, outlines and arrows."""
 
 from __future__ import annotations
 
@@ -6,38 +6,37 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from ..result.view import StepView, as_list, dataset_of, scaled, title_of
-from .style import EXACT, new_figure
+from ..analytic.shear import ClosedForms, PartialSlip
+from ..arrays import Array
+from ..result.result import Result
+from ..result.view import Results, StepView, as_list, dataset_of, title_of
+from ..text import scaled
+from .style import EXACT, drawing
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from ..result.result import Result
-    from ..result.view import Results
-
-Array = NDArray[np.float64]
 Limits = tuple[float, float, float, float]
 
-ARROWS, FEWER_ARROWS = 13, 9  # about, across the contact, in a large and a small picture
-_WIDTH = 7.2  # inches of a picture with several panels
+ARROWS, FEWER_ARROWS = 13, 9  # across the contact, about, in a large and in a small picture
+_WIDTH = 7.2  # inches of a picture with several panels, or of an elongated contact
+_HIGH = 4.5  # inches of a map of an upright contact among others
+_ROWS = 5  # maps of a wide contact in one column
 
 
 @dataclass(frozen=True)
 class Part:
-    """A rectangle of the plane that maps show, in a unit of length that suits it.
+    """A rectangle of the plane that maps show, with its unit of length.
 
     Attributes
     ----------
     limits : tuple of float
         x_min, x_max, y_min, y_max, m.
     factor : float
-        What turns meters into the unit.
+        Factor from m to the unit.
     unit : str
         The unit.
     """
@@ -48,9 +47,9 @@ class Part:
 
     @classmethod
     def around(cls, views: Iterable[StepView], margin: float = 1.25, least_aspect: float = 0.0) -> Part:
-        """Return the part with the contact of some steps, at least so wide for its height, and so high.
+        """Return the part around the contact of some steps, or around their windows if none has contact.
 
-        Steps without contact have no say, unless there are no others: then it is the whole window.
+        Height over width and width over height are at least `least_aspect`.
         """
         known = [(view.contact.any(), view.window(margin), view.spacing) for view in views]
         touching = [entry for entry in known if entry[0]]
@@ -74,16 +73,36 @@ class Part:
         """Height over width."""
         return (self.limits[3] - self.limits[2]) / self.width
 
+    @property
+    def is_wide(self) -> bool:
+        """Whether it is more than twice as wide as high."""
+        return self.aspect < 0.5
+
+    @property
+    def is_tall(self) -> bool:
+        """Whether it is more than twice as high as wide."""
+        return self.aspect > 2.0
+
+    def size(self) -> tuple[float, float]:
+        """Return width and height (inches) of a figure with one map; a wide one has its color bar below."""
+        if self.is_wide:
+            return _WIDTH, 6.4 * self.aspect + 1.9
+        if self.is_tall:
+            return 6.0 / self.aspect + 1.9, 7.2
+        return 4.6, 3.4 * self.aspect + 0.9
+
     def show(self, axes: Axes) -> None:
-        """Let axes show this part, and nothing else."""
+        """Set limits and labels of axes to this part."""
         x_min, x_max, y_min, y_max = (self.factor * limit for limit in self.limits)
         axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal")
         axes.set(xlabel=f"x ({self.unit})", ylabel=f"y ({self.unit})")
+        if self.is_tall:
+            axes.locator_params(axis="x", nbins=2)
 
     def outline(
         self, axes: Axes, ellipse: Any, center: tuple[float, float], ratio: float = 1.0, **style: Any
     ) -> None:
-        """Draw the ellipse with the attributes semi_major, semi_minor and angle, reduced by a ratio."""
+        """Draw an ellipse (semi_major, semi_minor, angle), scaled by a ratio."""
         turn = np.linspace(0.0, 2.0 * np.pi, 361)
         along, across = ratio * ellipse.semi_major * np.cos(turn), ratio * ellipse.semi_minor * np.sin(turn)
         cosine, sine = np.cos(ellipse.angle), np.sin(ellipse.angle)
@@ -94,7 +113,7 @@ class Part:
     def arrows(
         self, axes: Axes, view: StepView, vector: tuple[Array, Array], color: str, many: int = ARROWS
     ) -> None:
-        """Draw a vector field at some nodes in contact; the longest arrow just reaches the next one."""
+        """Draw a vector field at some nodes in contact; the longest arrow reaches the next one."""
         size = np.hypot(*vector)
         if not size.max() > 0.0:
             return
@@ -128,7 +147,7 @@ class Part:
 
 
 def step_label(view: StepView) -> str:
-    """Name a step among others of the same result: its number and how far the shear has come."""
+    """Return the label of a step: its number and tangential load over mu P."""
     bound = view.friction * float(view.data["normal_load"])
     load = view.tangential_load
     if not 0.0 < bound < np.inf or abs(load) < 1e-6 * bound:
@@ -137,7 +156,7 @@ def step_label(view: StepView) -> str:
 
 
 def views_of(results: Results, steps: int | Sequence[int]) -> tuple[list[StepView], list[str], str]:
-    """Look at steps of one or several results: the views, a label for each, and the title of the picture."""
+    """Return views of steps of one or several results, a label for each, and the title of the figure."""
     several = as_list(results)
     chosen = [steps] if isinstance(steps, int) else list(steps)
     views = [StepView.of(result, step) for result in several for step in chosen]
@@ -153,18 +172,33 @@ def views_of(results: Results, steps: int | Sequence[int]) -> tuple[list[StepVie
     return views, labels, ""
 
 
-def map_panels(part: Part, labels: Sequence[str]) -> tuple[Figure, list[Axes]]:
-    """Return a figure with a map for each label, which stands above it if there are several."""
+def closed_solutions(results: Results, views: Sequence[StepView]) -> list[PartialSlip | None]:
+    """Return the closed solution of each view; the views of a result are in sequence."""
+    closed = [ClosedForms(dataset_of(one)) for one in as_list(results)]
+    each = len(views) // len(closed)
+    return [closed[k // each].partial_slip(view.number) for k, view in enumerate(views)]
+
+
+def map_panels(part: Part, labels: Sequence[str], ax: Axes | None = None) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a map for each label, several with the label as title; `ax` takes one map."""
+    if part.is_tall:
+        labels = [label.replace(", ", "\n") for label in labels]
     count, lines = len(labels), 1 + max(label.count("\n") for label in labels)
+    if ax is not None and count > 1:
+        raise ValueError(f"ax holds the map of one load step, not of {count}")
     if count == 1:
-        figure = new_figure(4.6, float(np.clip(3.4 * part.aspect, 1.6, 5.5)) + 0.9)
-        axes = figure.add_subplot()
+        figure, axes = drawing(ax, *part.size())
         part.show(axes)
         return figure, [axes]
-    columns = min(count, 4 if count > 6 or count == 4 else 3 if part.aspect < 2.0 else 4)
+    columns = min(count, 4 if count > 6 or count == 4 else 3)
+    if part.is_wide:
+        columns = 1 if count <= _ROWS else 2
+    elif part.is_tall:
+        columns = min(count, int(_WIDTH / max(_HIGH / part.aspect + 0.4, 1.7)))
     rows = -(-count // columns)
-    cell = _WIDTH / max(columns, 2)
-    height = rows * (float(np.clip((cell - 0.2) * part.aspect, 0.6, 3.5)) + 0.17 * lines + 0.24) + 0.95
+    cell = _WIDTH / (columns if part.is_wide else max(columns, 2))
+    most = _HIGH if part.is_tall else 3.5
+    height = rows * (float(np.clip((cell - 0.2) * part.aspect, 0.6, most)) + 0.17 * lines + 0.24) + 0.95
     figure = Figure(figsize=(cell * columns + 0.6, height), layout="compressed")
     cast(Any, figure.get_layout_engine()).set(h_pad=0.1)  # between a title and the panel above
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
@@ -173,7 +207,7 @@ def map_panels(part: Part, labels: Sequence[str]) -> tuple[Figure, list[Axes]]:
     for number, (axes, label) in enumerate(zip(panels.flat, labels, strict=False)):
         part.show(axes)
         axes.set_title(label)
-        if number + columns < count:  # labels of the axes only where no panel follows below, or stands left
+        if number + columns < count:  # axis labels only at the lower and left panels
             axes.set_xlabel("")
         else:
             axes.tick_params(labelbottom=True)

@@ -1,4 +1,4 @@
-"""The figures by name: a figure is a decorated function; the command, its help and the tests follow."""
+"""The registry of figures: decorated functions, from which the command, its help and its tests follow."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class Entry:
     name : str
         Name of the figure on the command line.
     help : str
-        What it shows, in a line.
+        One line about it.
     needs : str
-        What a result must have to be worth drawing: "friction", "torque", or `SEVERAL_RUNS`; may be empty.
+        What it needs: "friction", "torque", ..., `SEVERAL_RUNS`; may be empty.
     draw : callable
-        The function; its parameters besides the result are the options that there are.
+        The function; its parameters besides the result are the options.
     first : bool
-        Whether lists begin with it.
+        Whether it is the first in lists.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Entry:
 
     @property
     def of_a_result(self) -> bool:
-        """Whether it shows a result, and not what belongs to none."""
+        """Whether it shows a result."""
         return self.of_several or "result" in self.options
 
     @property
@@ -68,7 +68,7 @@ def entries() -> dict[str, Entry]:
 
 
 def styled(draw: Draw[P]) -> Draw[P]:
-    """Draw in the style of all figures."""
+    """Return a function that draws in the common style."""
 
     @functools.wraps(draw)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:

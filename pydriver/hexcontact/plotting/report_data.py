@@ -1,51 +1,49 @@
-"""What a page draws of a result: curves of its history, and fields, from which the page makes its maps.
+"""Data of the charts and maps of a report.
 
-Each load step is small gray pictures, with 255 shades from 0 to the largest value of its step; shade 0 is
-outside of the contact.
+The fields of a load step are small gray pictures: shade 0 is outside of the contact, shades 1 to 255 are
+values from 0 to the largest of the step.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array, Mask
 from ..result.history import step_rows
 from ..result.raster import Plane, png_of
-from ..result.view import StepView, scaled, worded
+from ..result.result import Result
+from ..result.view import StepView, dataset_of
+from ..text import scaled, worded
 from ..variables import LOADS, MAPS, RESIDUALS, VARIABLES, spelled
 from .history import panels_of, peak
 from .plane import Limits, Part
 from .sections import line_of
 
-if TYPE_CHECKING:
-    from ..result.result import Result
-
-Array = NDArray[np.float64]
-
-MOST_STEPS = 120  # whose maps a page shows; of longer histories evenly chosen ones
-_BYTES = 2.5e6  # of all smooth maps together, about: pages that a browser opens at once
+MOST_STEPS = 120  # steps with maps; evenly chosen from longer histories
+_BYTES = 2.5e6  # of all smooth maps together, about, so that pages open fast
 _ZONES = 480  # pixels of the longer side of a zone map
 _ARROWS = 15  # along the longer side
 _CUT = 201  # points of a section
-_NOISE = 1e-7  # share of the approach up to which slip is no more than the tolerance leaves
+_NOISE = 1e-7  # share of the approach below which slip is within the tolerance
 
 
 def rounded(values: Any, digits: int = 4) -> list[float | None]:
-    """Return numbers as JSON may hold them; None for those that are not finite."""
+    """Return rounded numbers for JSON, None in place of NaN and infinity."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.ravel(values).tolist()]
 
 
 def kept_steps(result: Result) -> list[int]:
-    """Return the numbers of the steps that can be shown as maps, the last among them."""
-    if "pressure" not in result.dataset:
+    """Return the numbers of the steps with maps, the last among them."""
+    data = dataset_of(result)
+    if "pressure" not in data:
         return []
-    numbers = result.dataset["step"].values.tolist()
-    every = int(result.dataset.attrs.get("output_every", 1))
+    numbers = data["step"].values.tolist()
+    every = int(data.attrs.get("output_every", 1))
     kept = [n for n in numbers if n % every == 0 or n == numbers[-1]]
     stride = math.ceil(len(kept) / MOST_STEPS)
     return kept[::-1][::stride][::-1]
@@ -54,7 +52,7 @@ def kept_steps(result: Result) -> list[int]:
 def drawn_data(
     result: Result, histories: Sequence[Mapping[str, Any]], numbers: Sequence[int]
 ) -> dict[str, Any]:
-    """Return all that a page draws, as its JSON holds it.
+    """Return the data of charts and maps for JSON.
 
     Parameters
     ----------
@@ -63,7 +61,7 @@ def drawn_data(
     histories : sequence of mapping
         History of each step, with its number.
     numbers : sequence of int
-        The steps with maps, see `kept_steps`.
+        Numbers of the steps with maps, see `kept_steps`.
     """
     palette = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, 255))[:, :3]
     return {
@@ -87,25 +85,26 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     result : Result
         The result.
     numbers : sequence of int
-        The steps; their pressure was kept.
+        Numbers of the steps, whose pressure was kept.
 
     Returns
     -------
     dict
-        What the page reads as JSON: limits, maps (pictures in base64), arrows, zones, sections.
+        Limits, maps (pictures in base64), arrows, zones, sections.
     """
     last = StepView.of(result, numbers[-1])
     part = Part.around((StepView.of(result, number) for number in numbers), 1.2, 0.2)
     known = {title: names for title, names in MAPS.items() if set(names) <= set(last.data)}
     if last.friction == 0.0:
         known = {title: names for title, names in known.items() if not VARIABLES[names[0]].frictional}
-    pixels = int(np.clip(math.sqrt(_BYTES / (0.45 * len(known) * len(numbers))), 70, 260))
+    elongated = math.sqrt(max(part.aspect, 1.0 / part.aspect))  # for the same number of pixels
+    pixels = int(elongated * np.clip(math.sqrt(_BYTES / (0.45 * len(known) * len(numbers))), 70, 260))
     plane, fine = Plane(part.limits, pixels), Plane(part.limits, _ZONES)
     shown: dict[str, dict[str, Any]] = {
         title: {
             "name": names[0].removesuffix("_x"),
             "title": title,
-            "common": "increment" not in names[0],  # all steps have one color scale at first
+            "common": "increment" not in names[0],  # one color scale for all steps at first
             "unit": VARIABLES[names[0]].units,
             "images": [],
             "max": [],
@@ -120,13 +119,13 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     place = np.linspace(0.0, line.length, _CUT)
     for number in numbers:
         view = StepView.of(result, number)
-        contact = view.at(*plane.points) > 0.0
+        contact = view.touches(*plane.points)
         weight = np.where(contact, view.at(*plane.points, view.contact.astype(float)), 1.0)
         for title, names in known.items():
             entry, slip = shown[title], VARIABLES[names[0]].units == "m"
             values = [np.nan_to_num(view.data[name].values) for name in names]
             size = np.sqrt(sum(view.at(*plane.points, component) ** 2 for component in values))
-            if slip:  # does not go to zero at the edge: nodes beyond it have no say
+            if slip:  # not zero at the edge: nodes beyond it do not count
                 size = size / weight
             largest = float(np.sqrt(sum(component**2 for component in values))[view.contact].max(initial=0.0))
             if slip and largest < noise:
@@ -136,11 +135,11 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
             if len(names) == 2:
                 entry["arrows"].append(_arrows(view, part.limits, values, largest) if largest else [])
         if view.friction and "zone" in view.data:
-            row, col, inside = fine.nearest(view)
-            zones.append(png_of(np.where(inside, view.data["zone"].values[row, col], 0).astype("u1")))
+            zone = np.where(view.sticks(*fine.points), 1, 2) * view.touches(*fine.points)
+            zones.append(png_of(zone.astype("u1")))
         sections.append(_section(view, *line.points(place)))
     for title, entry in list(shown.items()):
-        if entry["unit"] == "m" and not any(entry["max"]):
+        if entry["name"] != "pressure" and not any(entry["max"]):
             del shown[title]
             continue
         factor, entry["unit"] = scaled(max(entry["max"]), entry["unit"])
@@ -156,15 +155,16 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def _gray(values: Array, largest: float, contact: NDArray[np.bool_]) -> str:
+def _gray(values: Array, largest: float, contact: Mask) -> str:
     shades = np.zeros(values.shape) if largest == 0.0 else np.clip(values / largest, 0.0, 1.0)
     return png_of(np.where(contact, 1 + np.round(254 * shades), 0).astype("u1"))
 
 
 def _arrows(view: StepView, limits: Limits, components: Sequence[Array], largest: float) -> list[int]:
-    """Return arrows on a triangular pattern: four whole numbers for each.
+    """Return arrows on a triangular pattern, four whole numbers for each.
 
-    x and y in thousandths of the map, from its upper left corner, and components in percent of the largest.
+    These are x and y in thousandths of the map from its upper left corner, and the components in percent of
+    the largest.
     """
     x0, x1, y0, y1 = limits
     pitch = max(x1 - x0, y1 - y0) / _ARROWS
@@ -185,29 +185,36 @@ def _arrows(view: StepView, limits: Limits, components: Sequence[Array], largest
 
 
 def _section(view: StepView, x: Array, y: Array) -> dict[str, Array]:
-    """Return pressure and tractions along a line, and what bounds them or is known of them."""
+    """Return pressure and tractions along a line, with the bounds mu p and the pressure of Hertz."""
     curves = {"p": view.at(x, y)}
     mu = view.friction
-    if mu > 0.0 and {"traction_x", "traction_y"} <= set(view.data):
+    if mu != 0.0 and {"traction_x", "traction_y"} <= set(view.data):
         for axis in "xy":
             curves[f"q_{axis}"] = view.at(x, y, np.nan_to_num(view.data[f"traction_{axis}"].values))
         if math.isfinite(mu):
             curves["μp"] = mu * curves["p"]
+            curves["−μp"] = -curves["μp"]
     if view.hertz is not None and view.hertz_holds:
         curves["p (Hertz)"] = view.hertz.pressure(x - view.center[0], y - view.center[1])
     return curves
 
 
 def _scaled_sections(sections: Sequence[dict[str, Array]], x: Array) -> dict[str, Any]:
-    """Bring the curves of all steps to one unit; leave out components that are nothing but noise."""
+    """Return the curves of all steps in one unit, without components below the noise."""
     names = list(dict.fromkeys(name for section in sections for name in section))
     peak = {name: max(float(np.abs(s[name]).max()) for s in sections if name in s) for name in names}
     shear = max((peak[name] for name in peak if name.startswith("q")), default=0.0)
     names = [name for name in names if not name.startswith("q") or peak[name] > 1e-3 * shear > 0.0]
+    if "μp" in names:  # on the sides where the traction lies
+        sides = {"μp": 1.0, "−μp": -1.0}
+        tractions = [s[name] for s in sections for name in names if name in s and name[0] == "q"]
+        reach = {k: max((np.max(sign * q) for q in tractions), default=0.0) for k, sign in sides.items()}
+        used = [side for side in sides if reach[side] > 0.05 * peak["μp"]] or ["μp"]
+        names = [name for name in names if name not in sides or name in used]
     panels = []
-    for title, chosen in (("Pressure", ["p", "p (Hertz)"]), ("Shear traction", ["q_x", "q_y", "μp"])):
+    for title, chosen in (("Pressure", ["p", "p (Hertz)"]), ("Shear traction", ["q_x", "q_y", "μp", "−μp"])):
         curves = [name for name in chosen if name in names]
-        if not curves or (title != "Pressure" and curves == ["μp"]):
+        if not curves or (title != "Pressure" and not any(name.startswith("q") for name in curves)):
             continue
         factor, unit = scaled(max(peak[name] for name in curves), "Pa")
         values = {n: [rounded(factor * s[n]) if n in s else [] for s in sections] for n in curves}
@@ -219,7 +226,7 @@ def _scaled_sections(sections: Sequence[dict[str, Array]], x: Array) -> dict[str
 
 
 def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the curves of a history as the page draws them; none of a single load step.
+    """Return the charts of a history; none for a single load step.
 
     Parameters
     ----------
@@ -230,35 +237,28 @@ def charts_of(histories: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         return []
 
     def curves_of(names: Mapping[str, str]) -> dict[str, Any]:
-        """Return the unit of some quantities, and their values by what the curves are called."""
+        """Return unit and values of quantities by the labels of their curves."""
         largest = max(peak(name, histories) for name in names)
         factor, unit = scaled(largest, VARIABLES[next(iter(names))].units)
         values = {
-            word: rounded([factor * float(history[name]) for history in histories], 5)
+            word: rounded([0.0, *(factor * float(history[name]) for history in histories)], 5)
             for name, word in names.items()
         }
         return {"unit": unit, "curves": values}
 
-    steps = [history["step"] for history in histories]
+    steps = [0, *(history["step"] for history in histories)]  # all quantities are 0 before the first
     panels = panels_of(histories)
-    charts = [
-        {"title": title, "x": steps, "xlabel": "step", **curves_of(names)} for title, names in panels.items()
-    ]
+    over: dict[str, Any] = {"x": steps, "xlabel": "load step"}
+    charts = [{"title": title, **over, **curves_of(names)} for title, names in panels.items()]
     shown = {name for names in panels.values() for name in names}
     for motion, (load, way) in LOADS.items():
         if motion != "z" and {load, way} <= shown:
             title = f"{VARIABLES[load].title} over {VARIABLES[way].title.lower()}"
-            over = curves_of({way: ""})
-            charts.append(
-                {
-                    "title": title + (f", {motion}" if motion in "xy" else ""),
-                    "x": over["curves"][""],
-                    "xlabel": f"{spelled(way)} [{over['unit']}]",
-                    **curves_of({load: ""}),
-                    "points": True,
-                }
-            )
-    residuals = {name: sign for sign, name in RESIDUALS.items() if name in histories[0]}
-    residuals = {name: sign for name, sign in residuals.items() if peak(name, histories)}
+            along = curves_of({way: ""})
+            title += f", {motion}" if motion in "xy" else ""
+            axis = {"x": along["curves"][""], "xlabel": f"{spelled(way)} ({along['unit']})"}
+            charts.append({"title": title, **axis, **curves_of({load: ""}), "points": True})
+    known = {name: sign for sign, name in RESIDUALS.items() if name in histories[0]}
+    residuals = {name: sign for name, sign in known.items() if peak(name, histories)}
     found = curves_of(residuals) if residuals else {"unit": "", "curves": {}}
-    return [*charts, {"title": "Residuals", "x": steps, "xlabel": "step", **found, "log": True}]
+    return [*charts, {"title": "Residuals", **over, **found, "log": True}]

@@ -1,36 +1,49 @@
-"""Sections: pressure and shear traction along a line, beside the closed solutions that apply."""
+"""Sections: pressure and shear traction along a line, with closed solutions where they apply."""
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
-from ..analytic.shear import ClosedForms, PartialSlip
+from ..analytic.shear import PartialSlip
+from ..arrays import Array
 from ..result.interpolate import Line, section_line
-from ..result.view import StepView, dataset_of, scaled, title_of, worded
-from .plane import step_label
+from ..result.result import Result
+from ..result.view import StepView
+from ..text import scaled, worded
+from .plane import closed_solutions, views_of
 from .registry import figure
-from .style import COMPUTED, EXACT, GUIDE, THIRD, legend_below, new_figure, set_title, shades
+from .style import (
+    COMPUTED,
+    EXACT,
+    GUIDE,
+    THIRD,
+    color_scale,
+    drawing,
+    legend_below,
+    legend_under,
+    new_figure,
+    set_title,
+    shades,
+)
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
 
-    from ..result.result import Result
-
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
-_APART = 130  # nodes along a line that can be told apart
-_FINER = 8  # points between nodes where the line misses them: closed solutions are curved there
+_APART = 130  # nodes along a line that are distinguishable
+_SIDES = {(False, True): r"$\mu p$", (True, False): r"$-\mu p$", (True, True): r"$\pm\mu p$"}
+_COMPARED = 10  # steps up to which closed solutions are drawn
+_JOINED: dict[str, Any] = {"ls": "-", "lw": 1.1}  # curves of several steps
+_THIN: dict[str, Any] = {"color": "black", "ls": (0, (4, 3)), "lw": 0.7}  # closed solutions with them
+_FINER = 8  # points between nodes where the line misses them, since closed solutions are curved
 
 
 def line_of(views: Iterable[StepView], angle: float, through: Point | None = None) -> Line:
@@ -47,7 +60,7 @@ def line_of(views: Iterable[StepView], angle: float, through: Point | None = Non
 
 @dataclass(frozen=True)
 class Cut:
-    """The line of a section, and how values along it are drawn.
+    """The line of a section, and the places along it at which values are drawn.
 
     Attributes
     ----------
@@ -56,12 +69,12 @@ class Cut:
     angle : float
         Its direction from x, rad.
     place : ndarray
-        Distances (m) from its start at which values are drawn: of the nodes if there are enough on the line,
-        else of its corners, between which fields are linear, and points between them.
+        Distances (m) from its start at which values are drawn: of the nodes if enough lie on the line, else
+        of its crossings with lattice lines, between which fields are linear, and of points between them.
     at_nodes : bool
-        Whether these are nodes.
+        Whether the places are nodes.
     through : tuple of float, optional
-        The point that the line passes through, if one was given.
+        Given point of the line, m.
     """
 
     line: Line
@@ -72,7 +85,7 @@ class Cut:
 
     @classmethod
     def of(cls, views: Sequence[StepView], angle: float, through: Point | None = None) -> Cut:
-        """Cut the contacts of some steps of one result, see `line_of`."""
+        """Return the cut through the contacts of some steps of one result, see `line_of`."""
         line, lattice = line_of(views, angle, through), views[0].lattice
         corners = line.corners(lattice)
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
@@ -82,11 +95,11 @@ class Cut:
         return cls(line, angle, nodes if at_nodes else np.union1d(corners, between), at_nodes, through)
 
     def values(self, view: StepView, field: Array | None = None) -> Array:
-        """Return the pressure, or a field, where it is drawn."""
+        """Return the pressure, or a field, at `place`."""
         return view.at(*self.line.points(self.place), field)
 
     def hertz(self, view: StepView, place: Array) -> Array:
-        """Return the pressure of Hertz (Pa) at some distances from the start."""
+        """Return the pressure of Hertz (Pa) at distances from the start (m)."""
         if view.hertz is None:
             raise ValueError("there is no Hertz solution for this gap")
         x, y = self.line.points(place)
@@ -108,16 +121,16 @@ class Cut:
         return scaled(float(max(abs(v) for v in self._shown(np.array([0.0, self.line.length])))), "m")
 
     def _shown(self, place: Array) -> Array:
-        """Return what is on the axis (m) at some distances from the start: x along x, y along y."""
+        """Return coordinates of the axis (m) at distances from the start: x along x, y along y."""
         start = {"x": self.line.start[0], "y": self.line.start[1]}.get(self.axis, -self.line.zero)
         return start + place
 
     def along(self, place: Array) -> Array:
-        """Return what is on the axis, in its unit."""
+        """Return coordinates of the axis in its unit at distances from the start (m)."""
         return self._shown(place) * self.lengths[0]
 
     def show(self, axes: Axes) -> None:
-        """Label the axis and end it with the line."""
+        """Set label and limits of the axis."""
         low, high = self.along(np.array([-0.02, 1.02]) * self.line.length)
         axes.set(xlim=(low, high), xlabel=self._label(self.lengths[1]))
 
@@ -142,7 +155,7 @@ class Cut:
         return self.components(*parts)
 
     def exact_tractions(self, exact: PartialSlip) -> tuple[Array, Array]:
-        """Return those of a closed solution, at the distances `fine`."""
+        """Return the tractions of a closed solution along and across the line, at the distances `fine`."""
         return self.components(*exact.traction(*self.line.points(self.fine)))
 
     def names(self) -> tuple[str, str]:
@@ -152,37 +165,37 @@ class Cut:
 
     @property
     def few(self) -> bool:
-        """Whether nodes can be told apart."""
+        """Whether nodes are distinguishable."""
         return self.at_nodes and self.place.size < _APART
 
     def look(self) -> dict[str, Any]:
-        """Return how values are drawn: nodes as circles if they can be told apart."""
+        """Return the style of values: circles at nodes if they are distinguishable."""
         if not self.few:
             return {"ls": "-"}
         size = 3.5 if self.place.size < 80 else 2.5
         return {"marker": "o", "ms": size, "mfc": "none", "mew": 0.9, "ls": ""}
 
-    def beside(self, color: str, family: bool = False) -> dict[str, Any]:
-        """Return how a closed solution is drawn: under circles in a color, over a line dashed."""
-        if self.few:
-            return {"color": color, "ls": "-", "lw": 0.9 if family else 1.3, "zorder": 2}
-        return {"color": "black" if family else color, "ls": "--", "lw": 0.7 if family else 1.3, "zorder": 5}
+    def beside(self, color: str) -> dict[str, Any]:
+        """Return the style of a closed solution: a line under circles, dashes over a line."""
+        dash, order = ("-", 2) if self.few else ("--", 5)
+        return {"color": color, "ls": dash, "zorder": order}
 
 
 # --- pressure -------------------------------------------------------------------------------------
 
 
 def draw_pressures(axes: Axes, views: Sequence[StepView], cut: Cut, always: bool = False) -> None:
-    """Draw the pressure of some steps along a line, and Hertz where the pressure is his, or always."""
+    """Draw the pressure of some steps along a line, with Hertz where it holds, or always."""
     pressures = [cut.values(view) for view in views]
     largest = max(float(p.max()) for p in pressures)
     to_stress, stress = scaled(largest, "Pa")
     place, fine = cut.along(cut.place), cut.along(cut.fine)
     single = len(views) == 1
+    look = cut.look() if single else _JOINED
     for view, p, color in zip(views, pressures, [COMPUTED] if single else shades(len(views)), strict=True):
-        axes.plot(place, p * to_stress, color=color, label="computed", zorder=3, **cut.look())
-        if view.hertz_holds or (always and view.hertz is not None):
-            line = cut.beside(EXACT) if single else cut.beside(color, family=True)
+        axes.plot(place, p * to_stress, color=color, label="computed", zorder=3, **look)
+        if len(views) <= _COMPARED and (view.hertz_holds or (always and view.hertz is not None)):
+            line = cut.beside(EXACT) if single else {**_THIN, "zorder": 5}
             name = "Hertz" if view.hertz_holds else "Hertz (no friction)"
             axes.plot(fine, cut.hertz(view, cut.fine) * to_stress, label=name, **line)
     axes.set(ylabel=f"pressure $p$ ({stress})", ylim=(0.0, 1.08 * largest * to_stress or 1.0))
@@ -190,7 +203,7 @@ def draw_pressures(axes: Axes, views: Sequence[StepView], cut: Cut, always: bool
 
 
 def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Point | None = None) -> None:
-    """Draw the pressure along a line, and below it the difference from Hertz where there is a solution."""
+    """Draw the pressure along a line, and below it the difference from Hertz for quadratic gaps."""
     cut, hertz = Cut.of([view], angle, through), view.hertz
     if hertz is None:
         draw_pressures(canvas.add_subplot(), [view], cut)
@@ -219,20 +232,26 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
 
 @figure("section", "pressure along a line, and its difference from Hertz")
 def section(
-    result: Result | xarray.Dataset, step: int = -1, angle: float = 0.0, through: Point | None = None
+    result: Result | xarray.Dataset,
+    step: int = -1,
+    angle: float = 0.0,
+    through: Point | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
-    """Draw the pressure along a line through the contact; beside Hertz if the initial gap is quadratic.
+    """Draw the pressure along a line through the contact, with Hertz if the initial gap is quadratic.
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
     step : int
         Number of the load step, from 1; -1 is the last one.
     angle : float
         Direction of the line from x, rad; at multiples of 30 degrees its points are nodes.
     through : tuple of float, optional
-        A point (m) that the line passes through; by default the node nearest to the center.
+        A point of the line, m; by default the node nearest to the center.
+    ax : matplotlib.axes.Axes, optional
+        Axes for the pressure, without its difference from Hertz; by default those of a new figure.
 
     Returns
     -------
@@ -246,6 +265,10 @@ def section(
         If the pressure of that step was not kept.
     """
     view = StepView.of(result, step)
+    if ax is not None:
+        draw_pressures(ax, [view], Cut.of([view], angle, through), always=True)
+        ax.legend(loc="lower center")
+        return drawing(ax, 0.0, 0.0)[0]
     canvas = new_figure(4.6, 4.2)
     draw_section(canvas, view, angle, through)
     set_title(canvas, view.title)
@@ -261,21 +284,25 @@ def tractions(
     steps: int | Sequence[int] = -1,
     angle: float = 0.0,
     through: Point | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
-    """Draw pressure and shear traction along a line, of one load step or a family of them.
+    """Draw pressure and shear traction along a line, of one load step or of several.
 
-    Closed solutions stand beside where they apply: Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz.
+    Closed solutions are drawn where they apply: Hertz, Cattaneo-Mindlin, Mindlin-Deresiewicz.
 
     Parameters
     ----------
     result : Result or xarray.Dataset
-        What a run returned, or `open_result` read.
+        Output of `Case.run` or `open_result`.
     steps : int or sequence of int
         Numbers of the load steps, from 1; -1 is the last one.
     angle : float
         Direction of the line from x, rad; at multiples of 30 degrees its points are nodes.
     through : tuple of float, optional
-        A point (m) that the line passes through; by default the node nearest to the center.
+        A point of the line, m; by default the node nearest to the center.
+    ax : matplotlib.axes.Axes, optional
+        Axes for the shear traction of one load step; by default those of a new figure, with the pressure
+        above.
 
     Returns
     -------
@@ -288,13 +315,16 @@ def tractions(
     ValueError
         If the contact is frictionless, or the tractions of that step were not kept.
     """
-    chosen = [steps] if isinstance(steps, int) else list(steps)
-    views = [StepView.of(result, step) for step in chosen]
-    closed = ClosedForms(dataset_of(result))
-    exact = [closed.partial_slip(view.number) for view in views]
+    views, labels, title = views_of(result, steps)
+    exact = closed_solutions(result, views)
     cut = Cut.of(views, angle, through)
+    if ax is not None:
+        if len(views) > 1:
+            raise ValueError(f"ax holds the tractions of one load step, not of {len(views)}")
+        draw_shear(ax, views[0], exact[0], cut)
+        return drawing(ax, 0.0, 0.0)[0]
     if len(views) > 1:
-        return _family(views, exact, cut, title_of(dataset_of(result)))
+        return _family(views, labels, exact, cut, title)
     canvas = new_figure(4.8, 5.0)
     upper, lower = canvas.subplots(2, 1, sharex=True, height_ratios=(2, 3))
     draw_pressures(upper, views, cut)
@@ -302,12 +332,12 @@ def tractions(
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)
     upper.legend(loc="lower center")
-    set_title(canvas, views[0].title)
+    set_title(canvas, title)
     return canvas
 
 
 def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) -> None:
-    """Draw the shear traction of a step along a line: components, size, and what friction carries."""
+    """Draw the shear traction of a step along a line: components, size, and the bound mu p."""
     along, across = cut.tractions(view)
     size = np.hypot(along, across)
     bound = view.friction * cut.values(view) if np.isfinite(view.friction) else np.zeros(size.shape)
@@ -319,10 +349,10 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
     if with_size:
         high = float(size.max())
         axes.plot(place, size * to_stress, color="black", lw=0.9, ls=":", label="$|q|$", zorder=2)
-    # what friction carries is drawn on the sides that the traction uses, there whole
+    # The bound is drawn on the sides on which the traction lies.
     used = [sign for sign, reach in ((1.0, high), (-1.0, low)) if reach > 0.05 * largest] or [1.0]
     if bound.any():
-        name = r"$\pm\mu p$" if len(used) == 2 else r"$\mu p$" if used == [1.0] else r"$-\mu p$"
+        name = _SIDES[-1.0 in used, 1.0 in used]
         for sign in used:
             edge = sign * bound * to_stress
             axes.fill_between(place, edge, color="0.92", lw=0, zorder=0)
@@ -341,45 +371,50 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
     legend_below(axes, ncols=3, columnspacing=1.2)
 
 
-def _family(views: Sequence[StepView], exact: Sequence[PartialSlip | None], cut: Cut, title: str) -> Figure:
-    """Draw pressure and both components of the shear traction of several steps, one panel each."""
+def _family(
+    views: Sequence[StepView],
+    labels: Sequence[str],
+    exact: Sequence[PartialSlip | None],
+    cut: Cut,
+    title: str,
+) -> Figure:
+    """Draw pressure and shear tractions of several steps, a panel each; closed solutions thin and dashed."""
     tractions = np.array([cut.tractions(view) for view in views])  # step, component, place
     peaks = np.abs(tractions).max(axis=(0, 2))
     shown = [k for k in (0, 1) if peaks[k] > 0.005 * peaks.max()] or [0]
-    canvas = new_figure(6.6, 2.2 + 2.3 * len(shown))
-    panels = canvas.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    canvas = new_figure(6.6, 2.4 + 2.3 * len(shown))
+    panels = list(canvas.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0])
+    colors, mu = shades(len(views)), views[-1].friction
     draw_pressures(panels[0], views, cut)
-    panels[0].set_title("\n".join(textwrap.wrap(title, 60)), fontsize=10)
     to_stress, stress = scaled(float(peaks.max()), "Pa")
-    place, colors, mu = cut.along(cut.place), shades(len(views)), views[-1].friction
-    limit = mu * cut.values(views[-1]) if np.isfinite(mu) else np.full(place.size, np.inf)
+    place = cut.along(cut.place)
+    sides: set[float] = set()
+    limit = mu * cut.values(views[-1]) if np.isfinite(mu) else np.zeros(place.size)
     for axes, k in zip(panels[1:], shown, strict=True):
         axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=1)
         for q, solution, color in zip(tractions[:, k], exact, colors, strict=True):
-            joined = {"ls": "-", "lw": 0.6} if solution is None else {}
-            axes.plot(place, q * to_stress, color=color, zorder=3, **{**cut.look(), **joined})
-            if solution is not None:
+            axes.plot(place, q * to_stress, color=color, zorder=3, **_JOINED)
+            if solution is not None and len(views) <= _COMPARED:
                 closed = cut.exact_tractions(solution)[k] * to_stress
-                axes.plot(cut.along(cut.fine), closed, **cut.beside(color, family=True))
-        if np.abs(tractions[-1, k]).max() > 0.1 * limit.max():
-            for sign in (1.0, -1.0):
-                if (sign * tractions[:, k]).max() > 0.05 * peaks.max():
-                    axes.plot(place, sign * limit * to_stress, color=GUIDE, lw=0.9, ls=":", zorder=1)
+                axes.plot(cut.along(cut.fine), closed, zorder=5, **_THIN)
+        for sign in (1.0, -1.0):  # on the sides where the traction lies
+            if (sign * tractions[:, k]).max() > 0.05 * limit.max() > 0.0:
+                axes.plot(place, sign * limit * to_stress, color=GUIDE, lw=0.9, ls=":", zorder=1)
+                sides.add(sign)
         axes.set_ylabel(f"{cut.names()[k]} ({stress})")
         cut.show(axes)
     for axes in panels[:-1]:
         axes.set_xlabel("")
         axes.tick_params(labelbottom=False)
-    handles = [
-        Line2D([], [], color=color, label=step_label(view)) for view, color in zip(views, colors, strict=True)
-    ]
-    if np.isfinite(mu):
-        name = f"$\\mu p$ in step {views[-1].number}"
-        handles.append(Line2D([], [], color=GUIDE, ls=":", lw=0.9, label=name))
+    color_scale(canvas, panels, labels, colors)
     named = ["Hertz"] if any(view.hertz_holds for view in views) else []
     named += sorted({solution.name for solution in exact if solution is not None})
-    if named:
-        handles.append(Line2D([], [], color="black", label="computed", **cut.look()))
-        handles.append(Line2D([], [], label=",\n".join(named), **cut.beside("black", family=True)))
-    canvas.legend(handles=handles, loc="outside right upper", handlelength=1.6)
+    handles = [Line2D([], [], color=colors[0], label="computed", **_JOINED)]
+    if sides:
+        name = rf"{_SIDES[-1.0 in sides, 1.0 in sides]} in step {views[-1].number}"
+        handles.append(Line2D([], [], color=GUIDE, ls=":", lw=0.9, label=name))
+    if named and len(views) <= _COMPARED:
+        handles.append(Line2D([], [], label=", ".join(named), **_THIN))
+    legend_under(canvas, handles)
+    set_title(canvas, title)
     return canvas

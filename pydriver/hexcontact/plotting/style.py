@@ -1,23 +1,25 @@
-"""Colors and sizes that all pictures share."""
+"""Colors, sizes and legends that all figures share."""
 
 from __future__ import annotations
 
 import re
 import textwrap
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.transforms import ScaledTranslation
 
-from ..result.raster import SLIP as SLIP
-from ..result.raster import STICK as STICK
-
-# the Okabe-Ito palette, which people with any color vision can tell apart
+# the Okabe-Ito palette, for any color vision
 COMPUTED, EXACT, THIRD, GUIDE = "#0072B2", "#D55E00", "#009E73", "0.55"
 IN_CONTACT = "#56B4E9"
+_NAMED = 10  # labels of a color scale
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
@@ -36,11 +38,22 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def set_title(figure: Figure, title: str) -> None:
-    """Put a title over a figure, on as many lines as it needs."""
-    if title:
+def drawing(ax: Axes | None, width: float, height: float, equal: bool = False) -> tuple[Figure, Axes]:
+    """Return the axes of the caller with their figure, or new ones of a size in inches.
+
+    New axes may be for equal scales of x and y.
+    """
+    if ax is not None:
+        return cast(Figure, ax.get_figure(root=True)), ax
+    figure = Figure(figsize=(width, height), layout="compressed" if equal else "constrained")
+    return figure, figure.add_subplot()
+
+
+def set_title(figure: Figure, title: str, ax: Axes | None = None) -> None:
+    """Set the title of a figure, on as many lines as needed; axes of the caller have none."""
+    if title and ax is None:
         width = int(13.0 * figure.get_size_inches()[0])  # characters, about
-        loads = re.search(r" \(\$.*$", title)  # stay on one line
+        loads = re.search(r" \(\$.*$", title)  # on one line
         start, end = (title[: loads.start()], title[loads.start() :]) if loads else (title, "")
         start = re.sub(r"step (\d+)$", "step\u00a0\\1", start)
         lines = textwrap.wrap(start + end.replace(" ", "\u00a0").replace("\u00a0", " ", 1), width)
@@ -48,18 +61,57 @@ def set_title(figure: Figure, title: str) -> None:
 
 
 def legend_below(axes: Axes, **options: Any) -> None:
-    """Put a legend below the label of the x axis, however high the axes are."""
+    """Draw a legend below the label of the x axis, for axes of any height."""
     down = ScaledTranslation(0.0, -0.42, axes.figure.dpi_scale_trans)
     below = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down}
     axes.legend(loc="upper center", **below, **options)
 
 
+def legend_under(figure: Figure, handles: Sequence[Any], ax: Axes | None = None, size: float = 9) -> Legend:
+    """Draw a legend below a figure, or below axes of the caller, in as many columns as fit."""
+    room = figure.bbox.width if ax is None else 1.1 * ax.get_window_extent().width
+    for columns in range(min(4, len(handles)), 0, -1):
+        options: dict[str, Any] = {"ncols": columns, "handlelength": 1.6, "fontsize": size}
+        if ax is None:
+            legend = figure.legend(handles=handles, loc="outside lower center", **options)
+        else:
+            legend_below(ax, handles=handles, **options)
+            legend = cast(Legend, ax.get_legend())
+        if legend.get_window_extent().width < 0.98 * room:
+            break
+        if columns > 1:
+            legend.remove()
+    return legend
+
+
+def color_scale(figure: Figure, panels: Sequence[Axes], labels: Sequence[str], colors: Sequence[Any]) -> None:
+    """Draw a color scale beside panels with labels of the curves, of many curves only some."""
+    count = len(labels)
+    norm = BoundaryNorm(np.arange(count + 1) - 0.5, count)
+    shown = np.unique(np.round(np.linspace(0, count - 1, min(count, _NAMED))).astype(int))
+    scale = ScalarMappable(norm, ListedColormap(list(colors)))
+    bar = figure.colorbar(scale, ax=list(panels), aspect=40, pad=0.02, ticks=shown)
+    bar.set_ticklabels([labels[k] for k in shown])
+    bar.minorticks_off()
+    bar.ax.tick_params(length=0)
+    cast(Any, bar.outline).set_linewidth(0.5)
+
+
+def handles_of(*panels: Axes) -> list[Any]:
+    """Return the handles of the legends of panels, one for each label."""
+    found: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    return list(found.values())
+
+
 def legend_above(axes: Axes) -> None:
-    """Put a legend right above axes."""
+    """Draw a legend directly above axes."""
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)
 
 
 def shades(count: int) -> Sequence[Any]:
-    """Colors of a family of curves, from dark to light."""
+    """Return colors of a family of curves, from dark to light."""
     map_ = matplotlib.colormaps["viridis"]
     return [map_(0.88 * k / max(count - 1, 1)) for k in range(count)]

@@ -1,19 +1,60 @@
-"""Arguments of a case built in Python, as the tables of a deck, which is what everything else understands."""
+"""Arguments of a case built in Python, as tables of a deck."""
 
 from __future__ import annotations
 
-from typing import Any
+import difflib
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
 
 from ..core.lattice import Lattice
 from ..deck import tables
-from ..deck.model import Argument
+from ..deck.interface import Interface
+from ..deck.model import SYMBOLS, Argument, Table
 from ..deck.series import DRIVEN
 from ..deck.surfaces import Surface
+from ..deck.wear import Wear
 from ..deck.write import plain
+from ..text import listed
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+_TABLES: dict[str, type[Table]] = {  # of arguments that take one
+    "body_1": tables.Body,
+    "bulk": tables.Bulk,
+    "interface": Interface,
+    "accuracy": tables.Accuracy,
+    "wear": Wear,
+    "loads": tables.Load,
+}
+
+
+def known_keywords(call: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Let a method name the keyword nearest to an unknown one in its TypeError.
+
+    An unknown keyword may be a symbol (``mu``), a key of a table that an argument takes (``max_nodes``), or
+    misspelled.
+    """
+    _, *known = inspect.signature(call).parameters
+    title = call.__qualname__.removesuffix(".__init__")
+
+    @functools.wraps(call)
+    def checked(*arguments: _P.args, **keywords: _P.kwargs) -> _T:
+        if (name := next((name for name in keywords if name not in known), None)) is None:
+            return call(*arguments, **keywords)
+        path = SYMBOLS.get(name, name)
+        same = [word for word in (path, path.replace(".", "_")) if word in known]
+        below = [f"{of}.{path}" for of in known if of in _TABLES and path in _TABLES[of].known_keys()]
+        near = [*same, *below, *difflib.get_close_matches(name, known, n=1, cutoff=0.7)]
+        hint = f"did you mean {near[0]}?" if near else f"known here: {listed(known, 'and')}"
+        raise TypeError(f"{name}: unknown argument of {title}; {hint}")
+
+    return checked
 
 
 class Body(Argument, tables.Body):
-    """One of the two bodies.
+    """One of the two bodies, an argument of `hexcontact.Case`.
 
     Attributes
     ----------
@@ -24,9 +65,10 @@ class Body(Argument, tables.Body):
     rigid : bool
         Whether the body is rigid.
     surface : Surface or None
-        Shape of its surface; None for a flat one, or if the gap of the case is given as a whole.
+        Shape of its surface; None for a flat one, or if the case has a gap.
     """
 
+    @known_keywords
     def __init__(
         self,
         young_modulus: float | str | None = None,
@@ -34,19 +76,14 @@ class Body(Argument, tables.Body):
         rigid: bool = False,
         surface: Surface | None = None,
     ) -> None:
-        keys = {
-            "young_modulus": young_modulus,
-            "poisson_ratio": poisson_ratio,
-            "rigid": rigid,
-            "surface": surface,
-        }
+        keys = {name: value for name, value in locals().items() if name in tables.Body.model_fields}
         super().__init__(**plain(keys))
 
 
 def with_radians(value: Any, key: str = "") -> Any:
-    """Give bare angles of loads their unit: in Python, unlike in a deck, all numbers are SI.
+    """Add the unit to bare angles of loads: in Python, unlike in a deck, all numbers are SI.
 
-    NaN is a row of a series that names nothing.
+    NaN is an empty entry of a series.
     """
     if isinstance(value, dict):
         return {name: with_radians(entry, name) for name, entry in value.items()}
@@ -57,7 +94,7 @@ def with_radians(value: Any, key: str = "") -> Any:
 
 
 def middle_of(lattice: Lattice) -> list[float]:
-    """Return the point (m) about which a deck finds the same window again."""
+    """Return the point (m) that leads a deck to the same window."""
     middle = [lattice.cols[lattice.n_col // 2], lattice.rows[lattice.n_row // 2]]
     center: list[float] = (lattice.origin + middle @ lattice.basis).tolist()
     return center

@@ -1,50 +1,48 @@
-"""How much work a case will be, roughly, before anything runs."""
+"""Rough estimates of the work of a case before a run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from itertools import pairwise
 
+from .problem import Problem
 from .refinement import least_and_most
 
-if TYPE_CHECKING:
-    from .problem import Problem
-
-# Operator applications of a load step to 1e-8, as measured on meshes of 20 to 60 spacings in the radius.
+# Operator applications of a load step to 1e-8, measured on meshes of 20 to 60 spacings in the radius.
 # Without friction they are of the pressure alone, a third of an application each.
 _FRICTIONLESS, _SIMILAR, _DISSIMILAR = 8 / 3, 20.0, 45.0
-_INTERPOLATED = 4.0  # times as many, where nodes enter the contact
-_ADAPTIVE, _ADAPTIVE_SIMILAR = (
-    30,
-    6,
-)  # solutions in a segment of adaptive steps: as measured, within a factor of 3
+_INTERPOLATED = 4.0  # times as many in steps in which nodes enter the contact
+_ADAPTIVE, _ADAPTIVE_SIMILAR = 30, 6  # solutions in a segment of adaptive steps, within a factor of 3
 
-# Seconds per application and node of the window on one core of 2020 or so, with all that goes with it.
+# Seconds per application and node of the window on one core of about 2020, all other work included.
 _SECONDS_FRICTIONLESS, _SECONDS = 2e-7, 1.3e-7
-_SECONDS_LEAST = 5e-3  # of a step, whatever its size
+_SECONDS_LEAST = 5e-3  # of a step
 
 
 def operator_applications(case: Problem) -> float | None:
-    """Return about how many operator applications all load steps take; None for the direct method."""
+    """Estimate the operator applications of all load steps; None for the direct method."""
     if case.method_for(case.lattice) == "direct":
         return None
     if not case.frictional:
         return _FRICTIONLESS * len(case.load_steps)
     each = _DISSIMILAR if case.coupled else _SIMILAR
+    entering = 0
     if case.solver.algorithm == "incremental" and case.solver.entry == "interpolated":
-        each *= _INTERPOLATED
-    return each * _solutions(case)
+        loads = [0.0, *(step.z.value for step in case.load_steps)]
+        entering = sum(after > before for before, after in pairwise(loads))
+    share = entering / len(case.load_steps)
+    return each * (1.0 + (_INTERPOLATED - 1.0) * share) * _solutions(case)
 
 
 def _solutions(case: Problem) -> int:
-    """Return how many solutions a case takes; a guess for segments whose steps are chosen on the way."""
+    """Return the number of solutions of a case; a guess for segments with chosen steps."""
     adaptive = sum(step.ramp is not None for step in case.load_steps) if case.adaptive else 0
     each = _ADAPTIVE if case.coupled else _ADAPTIVE_SIMILAR
     return len(case.load_steps) - adaptive + each * adaptive
 
 
 def seconds(case: Problem) -> float | None:
-    """Return about how long a run takes on one core (s); None for the direct method."""
+    """Estimate the time of a run on one core (s); None for the direct method."""
     applications = operator_applications(case)
     if applications is None:
         return None
@@ -53,7 +51,7 @@ def seconds(case: Problem) -> float | None:
 
 
 def work(case: Problem) -> str:
-    """Say it in words: "about 1,800 operator applications, about 4 s on one core"."""
+    """Return the estimate in words: "about 1,800 operator applications, about 4 s on one core"."""
     runs = least_and_most(case) if case.accuracy else ([case],)
     applications = [_total(operator_applications(one) for one in cases) for cases in runs]
     times = [_total(seconds(one) for one in cases) for cases in runs]
@@ -66,13 +64,13 @@ def work(case: Problem) -> str:
 
 
 def _total(parts: Iterable[float | None]) -> float | None:
-    """Return the sum, or None if a part is not known."""
+    """Return the sum, or None if a part is unknown."""
     known = list(parts)
     return None if None in known else sum(part for part in known if part is not None)
 
 
 def _rounded(number: float) -> int:
-    """Round to two digits; more would pretend to be exact."""
+    """Round to two digits."""
     return round(float(f"{number:.2g}"))
 
 

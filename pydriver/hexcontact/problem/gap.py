@@ -1,4 +1,4 @@
-"""The gap before loading: of two surfaces, or as Python gives it."""
+"""The gap before loading: of two surfaces, or given in Python."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arrays import reals
+from ..arrays import Array, reals
 from ..core.contact import shaped
 from ..core.lattice import Lattice
 from ..deck.surfaces import Separation
-from ..deck.units import LENGTH, UnitError, to_si
+from ..deck.units import LENGTH, Dimension, UnitError, to_si
 from ..errors import DeckError
 from ..text import listed
 from ..variables import LARGEST
@@ -22,7 +22,6 @@ from ..variables import LARGEST
 if TYPE_CHECKING:
     import xarray
 
-Array = NDArray[np.float64]
 GivenGap = Callable[[Array, Array], ArrayLike] | Array
 """A function of x and y, or values over the nodes of a window."""
 
@@ -33,7 +32,7 @@ def given_gap(gap: Any, lattice: Lattice | None) -> GivenGap | None:
     Raises
     ------
     DeckError
-        If it does not say where its values are.
+        If the places of its values are unknown.
     """
     if gap is None or callable(gap):
         return gap
@@ -46,8 +45,8 @@ def given_gap(gap: Any, lattice: Lattice | None) -> GivenGap | None:
             raise DeckError(f"gap: expected coordinates x and y (m), not {named}")
         if coordinates["x"].ndim == coordinates["y"].ndim == 1:
             return HeightMap.of(gap)
-        gap = gap.copy(data=_in_meters(gap))
-    reals(gap, "gap")  # what is no array needs another sentence
+        gap = gap.copy(data=_in_si(gap))
+    reals(gap, "gap")  # other values need another sentence
     if lattice is None:
         raise DeckError(
             "gap: an array needs lattice=..., at whose nodes it is given; heights on a rectangular grid "
@@ -58,7 +57,7 @@ def given_gap(gap: Any, lattice: Lattice | None) -> GivenGap | None:
 
 @dataclass(frozen=True)
 class Gap:
-    """The gap before loading, wherever it comes from.
+    """The gap before loading.
 
     Attributes
     ----------
@@ -70,24 +69,32 @@ class Gap:
 
     @property
     def at_nodes(self) -> bool:
-        """Whether it is known at the nodes of one window only."""
+        """Whether it is an array over the nodes of one window."""
         return isinstance(self.source, np.ndarray)
 
     @property
     def given(self) -> bool:
-        """Whether Python gives it, and no deck says it."""
+        """Whether it was given in Python."""
         return not isinstance(self.source, Separation)
 
     @property
     def first_touch(self) -> tuple[float, float] | None:
-        """Point (m) where the bodies touch first; None if it is not known."""
+        """Point (m) where the bodies touch first; None if it is unknown."""
         known = isinstance(self.source, Separation | HeightMap)
         return self.source.first_touch[:2] if known else None  # type: ignore[union-attr]
 
     def at(self, x: Array, y: Array) -> Array:
         """Return the gap (m) at points of the plane."""
         assert not isinstance(self.source, np.ndarray)
-        gap = reals(self.source(x, y), "gap")
+        try:
+            gap = reals(self.source(x, y), "gap")
+        except (TypeError, ValueError) as error:
+            if isinstance(error, DeckError) or not _takes_numbers(self.source, x, y):
+                raise
+            raise DeckError(
+                "gap: expected a function of two arrays, x and y (m); this one takes numbers only: use "
+                "functions of numpy, or numpy.vectorize(gap)"
+            ) from error
         if gap.shape != np.shape(x):
             raise DeckError(f"gap: expected an array of the shape of x, {np.shape(x)}, not {gap.shape}")
         if (bad := np.isnan(gap)).any():
@@ -109,16 +116,25 @@ class Gap:
         return gap
 
     def ends_within(self, distance: float, x: Array, y: Array) -> bool:
-        """Tell whether one of some points is that near to the end of a height map."""
+        """Test whether one of some points is within a distance (m) of the end of a height map."""
         return isinstance(self.source, HeightMap) and self.source.ends_within(distance, x, y)
 
     def __eq__(self, other: object) -> bool:
-        """Whether two gaps are the same; two functions are if they are one object."""
+        """Test whether two gaps are the same; functions are if they are one object."""
         if not isinstance(other, Gap):
             return NotImplemented
         if self.at_nodes and other.at_nodes:
             return np.array_equal(self.source, other.source)  # type: ignore[arg-type]
         return self.source is other.source or not (self.given or other.given)
+
+
+def _takes_numbers(source: Callable[[Any, Any], ArrayLike], x: Array, y: Array) -> bool:
+    """Test whether a function that fails on arrays takes two numbers."""
+    try:
+        float(source(float(np.ravel(x)[0]), float(np.ravel(y)[0])))  # type: ignore[arg-type]
+    except Exception:  # of a function of a user
+        return False
+    return True
 
 
 class HeightMap:
@@ -129,23 +145,31 @@ class HeightMap:
     x, y : ndarray
         Coordinates (m) of the columns and rows of the grid, in any order.
     gap : ndarray, (x, y)
-        Values (m) at its points.
+        Values (m) at its points, or those of another quantity.
+    name : str
+        Its name in messages.
+    degree : int
+        Degree of the spline.
     """
 
-    def __init__(self, x: Array, y: Array, gap: Array) -> None:
+    def __init__(self, x: Array, y: Array, gap: Array, name: str = "gap", degree: int = 3) -> None:
         if not (np.isfinite(gap).all() and all(_are_distinct(along) for along in (x, y))):
-            raise DeckError("gap: expected numbers at all points of a rectangular grid, without holes")
+            raise DeckError(f"{name}: expected numbers at all points of a rectangular grid, without holes")
+        self._degree = degree
         order = np.argsort(x), np.argsort(y)
         self.x, self.y, self.gap = x[order[0]], y[order[1]], gap[np.ix_(*order)]
 
     @classmethod
-    def of(cls, gap: xarray.DataArray) -> Self:
-        """Return the height map of an array with the coordinates x and y, each along a dimension."""
+    def of(
+        cls, gap: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH, degree: int = 3
+    ) -> Self:
+        """Return the map of an array with the coordinates x and y, each along a dimension."""
         x, y = gap.coords["x"], gap.coords["y"]
         if sorted(map(str, gap.dims)) != sorted(map(str, x.dims + y.dims)):
             named = listed([str(name) for name in gap.dims], "and")
-            raise DeckError(f"gap: expected the dimensions of x and y, not {named}")
-        return cls(_in_meters(x), _in_meters(y), _in_meters(gap.transpose(*x.dims, *y.dims)))
+            raise DeckError(f"{name}: expected the dimensions of x and y, not {named}")
+        values = _in_si(gap.transpose(*x.dims, *y.dims), name, dimension)
+        return cls(_in_si(x, name), _in_si(y, name), values, name, degree)
 
     @property
     def first_touch(self) -> tuple[float, float]:
@@ -157,11 +181,11 @@ class HeightMap:
     def _spline(self) -> Any:
         from scipy.interpolate import RectBivariateSpline
 
-        kx, ky = (min(3, len(along) - 1) for along in (self.x, self.y))
+        kx, ky = (min(self._degree, len(along) - 1) for along in (self.x, self.y))
         return RectBivariateSpline(self.x, self.y, self.gap, kx=kx, ky=ky)
 
     def ends_within(self, distance: float, x: Array, y: Array) -> bool:
-        """Tell whether one of some points is that near to the end of what was measured."""
+        """Test whether one of some points is within a distance (m) of the end of the map."""
         inside = [along[0] + distance <= at for along, at in ((self.x, x), (self.y, y))]
         inside += [at <= along[-1] - distance for along, at in ((self.x, x), (self.y, y))]
         return not np.all(inside)
@@ -176,10 +200,11 @@ def _are_distinct(along: Array) -> bool:
     return bool(len(along) > 1 and np.isfinite(along).all() and (np.diff(np.sort(along)) > 0.0).all())
 
 
-def _in_meters(values: xarray.DataArray) -> Array:
-    """Return lengths in m, whatever the attribute `units` says; without it they are in m."""
-    units = str(values.attrs.get("units", "m"))
+def _in_si(values: xarray.DataArray, name: str = "gap", dimension: Dimension = LENGTH) -> Array:
+    """Return values in SI, converted from the attribute `units`; without it they are in SI."""
+    units = str(values.attrs.get("units", dimension.unit))
     try:
-        return reals(values, "gap") * to_si(f"1 {units}", LENGTH)
+        return reals(values, name) * (1.0 if units in ("", "1") else to_si(f"1 {units}", dimension))
     except UnitError:
-        raise DeckError(f"gap: {values.name or 'values'} in {units}: expected lengths") from None
+        expected = "lengths" if dimension is LENGTH else dimension.name
+        raise DeckError(f"{name}: {values.name or 'values'} in {units}: expected {expected}") from None

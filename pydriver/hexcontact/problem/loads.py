@@ -1,8 +1,7 @@
 """The load history: the segments of a deck unrolled into load steps with a target for each rigid motion.
 
-Where nothing is said, the tangential loads are held at zero by force and the twist at zero by displacement; a
-load or motion that a segment does not name keeps its control and its value. See "control" in the deck
-reference.
+By default the tangential loads are zero by force and the twist by displacement; a load or motion that a
+segment does not name keeps its control and its value. See "control" in the deck reference.
 """
 
 from __future__ import annotations
@@ -10,33 +9,35 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from itertools import takewhile
+from typing import Any, Literal, NamedTuple
 
 from ..deck.faults import MISSING, Mistake
-from ..deck.kinds import SMALLEST
+from ..deck.kinds import SMALLEST, Share
 from ..deck.series import MOST_STEPS
-from ..deck.tables import Load, Segment
-from ..variables import LOADS
+from ..deck.tables import Bulk, Load, Segment
+from ..variables import BULK_STRESS, LOADS
 
 Control = Literal["force", "displacement"]
 Motion = Literal["z", "x", "y", "twist"]
 MOTIONS: tuple[Motion, ...] = ("z", "x", "y", "twist")
+Stress = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Target:
-    """What one rigid motion is driven to in one load step.
+    """The prescribed load or displacement of one rigid motion in one load step.
 
     Attributes
     ----------
     control : "force" or "displacement"
-        Which of the conjugate pair is prescribed: normal load or approach, tangential load or shift, torque
-        or twist.
+        The prescribed one of a conjugate pair: normal load or approach, tangential load or shift, torque or
+        twist.
     value : float
         The prescribed value (N, N m, m or rad), or the known part of it.
     from_start : float
-        Share of the value that this quantity had when the segment began. It is not zero only while a segment
-        of several steps takes over from the other control, since that value is then a result, not an input.
+        Share of the value that this quantity had at the beginning of the segment. It is not zero only within
+        a segment of several steps after the other control, since that value is a result, not an input.
     """
 
     control: Control
@@ -44,44 +45,48 @@ class Target:
     from_start: float = 0.0
 
     def at(self, start: float) -> float:
-        """Return the value to prescribe, given what the quantity was when the segment began."""
+        """Return the prescribed value, given that at the beginning of the segment."""
         return self.value + self.from_start * start
 
 
 @dataclass(frozen=True)
 class Ramp:
-    """A segment in increments that are chosen while it is solved (``steps = "auto"``).
+    """A segment in increments that are chosen during its solution (``steps = "auto"``).
 
     Attributes
     ----------
     segment : Segment
-        What the deck says.
+        The segment of the deck.
     start : mapping of str to Target
-        What drives each motion when the segment begins.
+        Target of each motion at its beginning.
     virgin : bool
-        All is zero when it begins.
+        Whether all is zero at its beginning.
+    bulk : tuple of float
+        Bulk stress at its beginning (Pa).
     """
 
     segment: Segment
     start: Mapping[Motion, Target]
     virgin: bool
+    bulk: Stress = (0.0, 0.0, 0.0)
 
     @property
     def largest(self) -> float:
-        """Largest part of the segment that one increment may take."""
+        """Largest increment, as a part of the segment."""
         return 1.0 if self.segment.largest_step is None else self.segment.largest_step
 
-    def targets(self, fraction: float) -> dict[str, Target]:
-        """Return what drives each motion when a fraction of the segment is done."""
-        return {
+    def targets(self, fraction: float) -> dict[str, Any]:
+        """Return the target of each motion, and the bulk stress, at a fraction of the segment."""
+        targets: dict[str, Any] = {
             motion: _ramp(self.segment, motion, self.start[motion], fraction, self.virgin)
             for motion in MOTIONS
         }
+        return targets | {"bulk": _bulk(self.segment, self.bulk, fraction)}
 
 
 @dataclass(frozen=True)
 class LoadStep:
-    """One load step, or a segment whose load steps are chosen while it is solved.
+    """One load step, or a segment whose load steps are chosen during its solution.
 
     Attributes
     ----------
@@ -92,11 +97,13 @@ class LoadStep:
     label : str
         Name of the segment, may be empty.
     z, x, y, twist : Target
-        What drives the normal motion, the two tangential ones and the rotation about z.
+        Targets of the normal motion, the two tangential ones and the rotation about z.
     fraction : float
-        How much of the segment is done at the end of the step.
+        Fraction of the segment at the end of the step.
     ramp : Ramp or None
-        The way there, if it is taken in increments that are chosen on it.
+        The ramp of a segment in chosen increments.
+    bulk : tuple of float
+        Bulk stress xx, yy, xy (Pa).
     """
 
     index: int
@@ -108,25 +115,26 @@ class LoadStep:
     twist: Target
     fraction: float = 1.0
     ramp: Ramp | None = None
+    bulk: Stress = (0.0, 0.0, 0.0)
 
     def until(self, fraction: float) -> LoadStep:
         """Return the part of an adaptive segment that ends at a fraction of it."""
         if self.ramp is None:
             return self
-        return replace(self, fraction=fraction, **self.ramp.targets(fraction))  # type: ignore[arg-type]
+        return replace(self, fraction=fraction, **self.ramp.targets(fraction))
 
     @property
     def targets(self) -> tuple[Target, Target, Target, Target]:
-        """What drives z, x, y and the twist, in this order."""
+        """Targets of z, x, y and the twist."""
         return self.z, self.x, self.y, self.twist
 
     def values(self, begun: Mapping[str, float]) -> tuple[float, ...]:
-        """Return the values to prescribe for z, x, y and the twist.
+        """Return the prescribed values for z, x, y and the twist.
 
         Parameters
         ----------
         begun : mapping of str to float
-            Loads and motions when the segment began, by the names of `hexcontact.deck.LOADS`.
+            Loads and motions at the beginning of the segment, by the names of `hexcontact.variables.LOADS`.
         """
         return tuple(
             target.at(begun[LOADS[motion][target.control == "displacement"]])
@@ -135,7 +143,7 @@ class LoadStep:
 
 
 class _Stretch(NamedTuple):
-    """A segment as it is run: its key in the deck, its label, whether it carries on the one before."""
+    """A segment with its key in the deck, its label, and whether it continues the one before."""
 
     key: tuple[str | int, ...]
     segment: Segment
@@ -143,9 +151,10 @@ class _Stretch(NamedTuple):
     carries_on: bool = False
 
 
-AUTO = "auto"  # number of load steps of a segment in which they are chosen
-LEAST = 1e-3  # of a segment, the smallest adaptive load step
-_WATCHED = [part / 16 for part in range(1, 17)]  # fractions of such a segment at which loads are looked at
+_FRICTION = "or a [friction] table with a coefficient above 0"  # the missing one
+AUTO = "auto"  # number of load steps of a segment that are chosen
+
+_WATCHED = [part / 16 for part in range(1, 17)]  # fractions of such a segment at which loads are checked
 
 START: dict[Motion, Target] = {
     "z": Target("force", 0.0),
@@ -161,7 +170,10 @@ class History:
     Parameters
     ----------
     friction_coefficient : float or None
-        Coefficient of friction; inf allowed. None: tangential loads and motions are not solved for at all.
+        Coefficient of friction, may be inf; NaN for another law; None: tangential loads and motions are no
+        unknowns.
+    bulk : Bulk, optional
+        The body that carries a bulk stress.
 
     Attributes
     ----------
@@ -169,9 +181,11 @@ class History:
         The history; incomplete if it is longer than `MOST_STEPS`.
     """
 
-    def __init__(self, friction_coefficient: float | None) -> None:
+    def __init__(self, friction_coefficient: float | None, bulk: Bulk | None = None) -> None:
         self.steps: list[LoadStep] = []
         self._mu = friction_coefficient
+        self._overloaded: tuple[str | int, ...] = ()  # segment whose load friction cannot carry
+        self._bulk, self._stress = bulk, (0.0, 0.0, 0.0)
         self._entries: list[Load] = []
         self._count = 0
         self._segments = 0
@@ -179,7 +193,7 @@ class History:
         self._problems: dict[tuple[str | int, ...], Mistake] = {}
 
     def append(self, load: Load) -> None:
-        """Append the load steps of an entry, valid on its own; see `problems` for what is wrong then."""
+        """Append the load steps of an entry that is valid on its own; see `problems` for faults."""
         turns, path = load.repeat or 1, list(_turn(("load", len(self._entries)), load))
         self._entries.append(load)
         self._count += turns * sum(_count(stretch.segment) for stretch in path)
@@ -196,27 +210,70 @@ class History:
         if segment.ramp == "cubic" and start["z"].control != "force":
             sentence = "expected linear, since the segment before was driven by approach"
             self._complain(Mistake((*key, "ramp"), "cubic", sentence))
-        ramp = Ramp(segment, start, virgin) if segment.steps == AUTO else None
+        segment = self._in_newtons(key, segment, _ramp(segment, "z", start["z"], 1.0, virgin))
+        self._complain_of_bulk(key, segment)
+        stress = self._stress
+        ramp = Ramp(segment, start, virgin, stress) if segment.steps == AUTO else None
         for fraction in _fractions(segment):
             now = {motion: _ramp(segment, motion, start[motion], fraction, virgin) for motion in MOTIONS}
             number = self._segments - 1
-            step = LoadStep(len(self.steps), number, label, **now, fraction=fraction, ramp=ramp)
+            bulk = _bulk(segment, stress, fraction)
+            step = LoadStep(len(self.steps), number, label, **now, fraction=fraction, ramp=ramp, bulk=bulk)
             self.steps.append(step)
-            self._now = now
+            self._now, self._stress = now, bulk
             for part in _WATCHED if ramp else (1.0,):
-                for problem in _overload(key, segment, step.until(part), self._mu):
-                    self._complain(problem)
+                problems = list(_overload(key, stretch.segment, step.until(part), self._mu))
+                # a load that is too large at the beginning of a segment is a fault of the one before
+                if not self._overloaded or self._overloaded == key:
+                    for problem in problems:
+                        self._complain(problem)
+                    self._overloaded = key if problems else ()
+                elif not problems:
+                    self._overloaded = ()
+
+    def _complain_of_bulk(self, key: tuple[str | int, ...], segment: Segment) -> None:
+        """Note bulk stress without friction or body, or along a direction without strain."""
+        for name in BULK_STRESS:
+            sentence = ""
+            if self._mu is None:
+                sentence = f"expected nothing, {_FRICTION}"
+            elif self._bulk is None:
+                sentence = "expected a [bulk] table, which names the body"
+            elif name not in self._bulk.components:
+                sentence = f"expected nothing: in {self._bulk.state} it follows from the other component"
+            if sentence and (value := getattr(segment, name)) is not None:
+                self._complain(Mistake((*key, name), value, sentence))
+
+    def _in_newtons(self, key: tuple[str | int, ...], segment: Segment, normal: Target) -> Segment:
+        """Return a segment with its shares of mu P at its end as forces."""
+        forces = {}
+        for name, value in segment:
+            if isinstance(value, Share):
+                unknown = (
+                    f"expected nothing, {_FRICTION}"
+                    if self._mu is None
+                    else "expected newtons, since friction.coefficient is inf"
+                    if math.isinf(self._mu)
+                    else "expected newtons, since friction varies or has a bound, so that mu P is no number"
+                    if math.isnan(self._mu)
+                    else "expected newtons, since the approach is given and not the normal load"
+                    if normal.control != "force"
+                    else "expected 0, since the normal load at the end of this segment is 0"
+                    if value.share and not normal.value
+                    else ""
+                )
+                if unknown:
+                    self._complain(Mistake((*key, name), str(value), unknown))
+                forces[name] = 0.0 if unknown else value.share * (self._mu or 0.0) * normal.value
+        return segment.model_copy(update=forces) if forces else segment
 
     def _complain(self, problem: Mistake) -> None:
-        # The first complaint about a key is enough: its segment has many steps, and may be repeated.
+        # the first fault of a key is enough: its segment has many steps, and may be repeated
         self._problems[problem.key] = self._problems.pop(problem.key, problem)
 
     @property
     def problems(self) -> list[Mistake]:
-        """What is wrong with the history as a whole.
-
-        Loads that never press, that no friction carries, or a ramp whose start is not known.
-        """
+        """Faults: loads that never press, or that friction cannot carry; ramps of unknown start."""
         if self._count > MOST_STEPS:
             sentence = f"expected at most {MOST_STEPS} load steps in all, not {self._count}"
             return [Mistake(("load",), MISSING, sentence)]
@@ -230,13 +287,26 @@ class History:
 
 
 def load_steps(
-    loads: Sequence[Load], friction_coefficient: float | None
+    loads: Sequence[Load], friction_coefficient: float | None, bulk: Bulk | None = None
 ) -> tuple[tuple[LoadStep, ...], list[Mistake]]:
-    """Return the load steps of a whole `History`, and what is wrong with it."""
-    history = History(friction_coefficient)
+    """Return the load steps of a whole `History`, and its faults."""
+    history = History(friction_coefficient, bulk)
     for load in loads:
         history.append(load)
     return tuple(history.steps), history.problems
+
+
+def cycle_entries(loads: Sequence[Load], label: str) -> list[Load]:
+    """Return the last entries of [[load]], which have the label."""
+    return [*reversed([*takewhile(lambda load: load.label == label, reversed(loads))])]
+
+
+def wearing_cycle(
+    loads: Sequence[Load], friction_coefficient: float, bulk: Bulk | None, label: str
+) -> tuple[LoadStep, ...]:
+    """Return the load steps of the last entries, which have the label, once more after the history."""
+    steps, _ = load_steps([*loads, *cycle_entries(loads, label)], friction_coefficient, bulk)
+    return steps[len(load_steps(loads, friction_coefficient, bulk)[0]) :]
 
 
 def _turn(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:
@@ -257,20 +327,20 @@ def _turn(key: tuple[str | int, ...], load: Load) -> Iterator[_Stretch]:
 
 
 def _count(segment: Segment) -> int:
-    """Return the number of load steps of a segment, 1 for one in which they are chosen."""
+    """Return the number of load steps of a segment, 1 if they are chosen."""
     if segment.values:
         return len(segment.values)
     return segment.steps if isinstance(segment.steps, int) else 1
 
 
 def _fractions(segment: Segment) -> Sequence[float]:
-    """Return how much of a segment is done after each of its steps; the last is exactly 1."""
+    """Return the fraction of a segment at the end of each step; the last is exactly 1."""
     count = _count(segment)
     return segment.values or [step / count for step in range(1, count + 1)]
 
 
 def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virgin: bool) -> Target:
-    """Return the target of a motion at a fraction of a segment; `virgin`: all is zero when it begins."""
+    """Return the target of a motion at a fraction of a segment; `virgin`: all is zero at its beginning."""
     force, displacement = (getattr(segment, key) for key in LOADS[motion])
     if force is None and displacement is None:
         return start
@@ -286,6 +356,16 @@ def _ramp(segment: Segment, motion: Motion, start: Target, fraction: float, virg
     return Target(goal.control, begin + fraction * (goal.value - begin))
 
 
+def _bulk(segment: Segment, start: Stress, fraction: float) -> Stress:
+    """Return the bulk stress at a fraction of a segment; components that it does not name are constant."""
+    goals = [getattr(segment, name) for name in BULK_STRESS]
+    xx, yy, xy = (
+        begin if goal is None else goal if fraction == 1.0 else begin + fraction * (goal - begin)
+        for begin, goal in zip(start, goals, strict=True)
+    )
+    return xx, yy, xy
+
+
 def _overload(
     key: tuple[str | int, ...], segment: Segment, step: LoadStep, mu: float | None
 ) -> Iterator[Mistake]:
@@ -296,9 +376,9 @@ def _overload(
             by_force = target.control == "force"
             name = LOADS[motion][0 if by_force else 1]
             given = getattr(segment, name)
-            # without friction, but solved for all the same, the surfaces may be moved over each other
+            # without friction, but with shear as an unknown, motions are free
             if target.value != 0 and given is not None and (by_force or mu is None):
-                known = "or a [friction] table" if mu is None else "since friction.coefficient = 0"
+                known = _FRICTION if mu is None else "since friction.coefficient = 0"
                 yield Mistake((*key, name), given, f"expected 0, {known}")
         return
     if step.z.control != "force" or any(target.from_start for _, target in (("z", step.z), *tangential)):
@@ -310,6 +390,7 @@ def _overload(
         blamed = ("tangential_load_x", "tangential_load_y", "torque", "normal_load")
         name = next((name for name in blamed if getattr(segment, name) is not None), "steps")
         given = getattr(segment, name)
+        given = str(given) if isinstance(given, Share) else given
         sentence = (
             f"gross sliding: the tangential load of {force:g} N in load step {step.index + 1} is more than "
             f"friction.coefficient x normal_load = {bound:g} N"

@@ -1,46 +1,55 @@
-"""What is going to be run: rows of a table, and parameters that a result and the log keep."""
+"""Overview of a case before a run: rows of a table, and parameters for the result and the log."""
 
 from __future__ import annotations
 
 import math
 import os
 import platform
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
+from ..core.lattice import Lattice
+from ..deck.interface import FROM_PYTHON, NodalCoefficient, TwoCoefficients
 from ..deck.kinds import Quantity
-from ..text import percent, quantity
+from ..deck.surfaces import Surface
+from ..deck.tables import Body, Bulk
+from ..text import Row, percent, quantity
+from ..variables import BULK_STRESS, INTERFACE, LOADS
+from . import plausibility
 from .estimates import work
+from .loads import LoadStep
+from .problem import Problem
 from .refinement import least_and_most
-
-if TYPE_CHECKING:
-    from ..core.lattice import Lattice
-    from ..deck.surfaces import Surface
-    from ..deck.tables import Body
-    from .problem import Problem
-
-Row = tuple[str, ...]
 
 
 def parameters_of(case: Problem) -> dict[str, Any]:
-    """Return what describes a case and how it is solved, and the machine that does it."""
+    """Return the parameters of a case, its solver and the machine."""
     return {
         "effective_modulus": case.pair.effective_modulus,
         "dundurs_beta": case.pair.beta,
         "tangential_compliance_ratio": case.pair.gamma,
         "friction_coefficient": case.friction_coefficient,
+        **({"friction_law": law_in_words(case)} if math.isnan(case.friction_coefficient) else {}),
+        **(dict(zip(INTERFACE, case.interface, strict=True)) if case.deck.interface else {}),
         "algorithm": case.solver.algorithm,
         "coupling": case.solver.coupling,
         "entry": case.solver.entry,
         "tolerance": case.solver.tolerance,
+        **({"bulk_state": case.deck.bulk.state} if case.deck.bulk else {}),
         **({"step_tolerance": case.solver.step_tolerance} if case.adaptive else {}),
+        **(
+            {"cycle_tolerance": wear.cycle_tolerance(case.solver.tolerance)}
+            if (wear := case.deck.wear)
+            else {}
+        ),
         **({"accuracy_target": case.accuracy.target} if case.accuracy else {}),
+        **({"warnings": "\n".join(doubts)} if (doubts := plausibility.warnings(case)) else {}),
         "machine": _machine(),
     }
 
 
 def _machine() -> str:
-    """Say what the program runs on: "node7, Linux x86_64, 16 processors"."""
+    """Describe the machine: "node7, Linux x86_64, 16 processors"."""
     count = os.cpu_count() or 1
     return (
         f"{platform.node()}, {platform.system()} {platform.machine()}, {count} processor{'s' * (count > 1)}"
@@ -48,17 +57,19 @@ def _machine() -> str:
 
 
 def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = None) -> list[Row]:
-    """Return what would be run.
+    """Return the rows of an overview of a case.
 
     Parameters
     ----------
     case : Problem
         The problem.
     memory : callable, optional
-        Estimates the memory (bytes) that a run on a window takes; without it the table does not name it.
+        Estimates the memory (bytes) of a run on a window; without it the table has no memory.
     """
     lattice = case.lattice
-    span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(lattice.basis)  # the window may be too large to fill
+    span = [lattice.n_col - 1, lattice.n_row - 1] @ abs(
+        lattice.basis
+    )  # without the coordinates, for which the window may be too large
     return [
         *((f"body {number}", _body(body)) for number, body in ((1, case.body_1), (2, case.body_2))),
         (
@@ -66,7 +77,10 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
             f"E* = {quantity(case.pair.effective_modulus, 'Pa')}, beta = {case.pair.beta:.4g}, "
             f"gamma = {case.pair.gamma:.4g}",
         ),
+        *([("interface", _interface(case))] if case.deck.interface else []),
         ("friction", _friction(case)),
+        *([("contact", contact)] if (contact := plausibility.row(case)) else []),
+        *([("contact", "full, one unknown: p = P/A over all nodes")] if case.full_contact else []),
         ("spacing", quantity(lattice.spacing, "m")),
         (
             "window",
@@ -74,6 +88,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
             f"{quantity(span[1], 'm')}, {'fixed' if case.window_fixed else 'grows with the contact'}",
         ),
         *([("accuracy", _accuracy(case))] if case.accuracy else []),
+        *([("bulk stress", _bulk(case.deck.bulk, case.load_steps))] if case.deck.bulk else []),
         ("load steps", _history(case)),
         ("largest load", _largest(case)),
         ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
@@ -88,7 +103,7 @@ def _memory(case: Problem, memory: Callable[[Problem, Lattice], int]) -> str:
 
 
 def _accuracy(case: Problem) -> str:
-    """Say what is to be reached, and between which lattices the refinement will end."""
+    """Describe the target, and the range of the last lattice of the refinement."""
     assert case.accuracy is not None
     last = [cases[-1].lattice for cases in least_and_most(case)]
     spacings = [quantity(lattice.spacing, "m") for lattice in last]
@@ -98,15 +113,52 @@ def _accuracy(case: Problem) -> str:
     )
 
 
+def law_in_words(case: Problem) -> str:
+    """Describe the law of friction of a case."""
+    friction, layer = case.deck.friction, case.deck.interface
+    if friction is None and layer and layer.friction_limit:
+        exponent = layer.friction_exponent or layer.exponent
+        return f"limit {layer.friction_coefficient:.6g} Pa/m^{exponent:g} ψ^{exponent:g} of the interface"
+    mu: Any = friction.coefficient if friction else 0.0
+    if isinstance(mu, NodalCoefficient):
+        law = f"coefficient {mu}" if mu.in_deck != FROM_PYTHON else "coefficient by node"
+    elif isinstance(mu, TwoCoefficients):
+        law = f"coefficients {mu}"
+    else:
+        unbounded = mu == math.inf and math.isinf(case.friction_coefficient)
+        law = "no slip (coefficient inf)" if unbounded else f"coefficient {mu:g}"
+    if friction is None or friction.shear_limit is None:
+        return law
+    return f"{law}, shear traction of at most {quantity(friction.shear_limit, 'Pa')}"
+
+
 def _friction(case: Problem) -> str:
     if not case.frictional:
         return "none"
-    mu = case.friction_coefficient
-    law = "no slip (coefficient inf)" if math.isinf(mu) else f"coefficient {mu:g}"
+    law = law_in_words(case)
     goodman = ", shear does not move the pressure" * (case.solver.coupling == "goodman")
     interpolated = case.solver.algorithm == "incremental" and case.solver.entry == "interpolated"
     entry = ", entry interpolated" * interpolated
     return f"{law}, {case.solver.algorithm}{entry}{goodman}"
+
+
+def _bulk(bulk: Bulk, steps: Sequence[LoadStep]) -> str:
+    """Return the largest components of the bulk stress, and the body that carries it."""
+    largest = [max(values, key=abs) for values in zip(*(step.bulk for step in steps), strict=True)]
+    parts = [
+        f"{quantity(value, 'Pa')} along {name[-2:]}"
+        for name, value in zip(BULK_STRESS, largest, strict=True)
+        if value
+    ]
+    return f"body {bulk.body}, {bulk.state}: {', '.join(parts) or 'none'}"
+
+
+def _interface(case: Problem) -> str:
+    coefficient, exponent, stiffness = case.interface
+    springs = f", tangential springs of {stiffness:.6g} Pa/m" if stiffness else ""
+    return (
+        f"p = c ψ^m under penetration ψ, m = {exponent:g}, c = {coefficient:.6g} Pa/m^{exponent:g}{springs}"
+    )
 
 
 def _history(case: Problem) -> str:
@@ -117,18 +169,35 @@ def _history(case: Problem) -> str:
         where = f"{chosen} segment{'s' * (chosen > 1)}"
         fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
         return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}"
-    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "")
+    wears = ""
+    if wear := case.deck.wear:
+        solved = 'a number that shows on the way (jump "auto")'
+        if not isinstance(wear.jump, str):
+            solved = f"{math.ceil(wear.cycles / wear.jump) + 1:,}"
+        wears = f", then {solved} of {wear.cycles:,} cycles, with {1 + len(case.cycle)} each"
+    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "") + wears
 
 
 def _largest(case: Problem) -> str:
-    """Return the largest load along each direction, as far as the deck tells."""
+    """Describe the largest prescribed load along each direction."""
+    largest = largest_loads(case)
+    normal = quantity(largest["normal_load"], "N") if largest["normal_load"] else "follows from the approach"
+    along = [
+        f"{quantity(value, 'N')} along {axis}"
+        for axis in "xy"
+        if (value := largest[f"tangential_load_{axis}"])
+    ]
+    return ", ".join([normal, *along])
+
+
+def largest_loads(case: Problem) -> dict[str, float]:
+    """Return the largest prescribed normal and tangential loads (N), 0 without one."""
     largest = {}
     for direction in ("z", "x", "y"):
         targets = [getattr(step, direction) for step in case.load_steps]
-        largest[direction] = max((abs(t.value) for t in targets if t.control == "force"), default=0.0)
-    normal = quantity(largest["z"], "N") if largest["z"] else "follows from the approach"
-    along = [f"{quantity(largest[axis], 'N')} along {axis}" for axis in ("x", "y") if largest[axis]]
-    return ", ".join([normal, *along])
+        name = LOADS[direction][0]
+        largest[name] = max((abs(t.value) for t in targets if t.control == "force"), default=0.0)
+    return largest
 
 
 def _body(body: Body) -> str:

@@ -1,4 +1,4 @@
-"""A contact problem in SI units, checked: what is solved, whatever asked for it."""
+"""A checked contact problem in SI units, which the solvers read."""
 
 from __future__ import annotations
 
@@ -10,30 +10,36 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array, Mask
 from ..core import contact, friction, memory
 from ..core.contact import ElasticPair, Method
+from ..core.friction import FrictionLaw
 from ..core.lattice import Lattice
+from ..core.measures import bulk_strain
 from ..deck import toml
 from ..deck.faults import MISSING, Mistake, Source, deck_error
+from ..deck.interface import coulomb
 from ..deck.kinds import SMALLEST
 from ..deck.read import Assembled, assemble
-from ..deck.tables import Accuracy, Grid
+from ..deck.tables import BULK_STATES, Accuracy, Grid
 from ..deck.write import as_toml, plain
 from ..errors import DeckError
 from ..text import listed
+from ..variables import LOADS
 from . import window
 from .arguments import Body
 from .checks import checked
+from .friction_law import FrictionField
 from .gap import Gap, GivenGap
+from .loads import LoadStep, wearing_cycle
 from .window import Estimate, NoContactFound
 
-Array = NDArray[np.float64]
-
-# Windows of up to this number of nodes go to LAPACK when the method is "auto"; beyond, transforms are faster.
+# Largest window that LAPACK solves with "auto"; beyond, and with friction, transforms are faster.
 MOST_DIRECT_NODES = 200
+_MOST_CHECKED_NODES = 10_000_000  # nodes of a window for which friction is computed before a run
 _SMALLEST_BETA = 1e-6  # below, pressure and shear do not couple
+_NO_ELASTICITY = 1e-9  # share of the compliance of the interface that bodies have in a full contact
 
 
 class Problem:
@@ -48,27 +54,28 @@ class Problem:
     pair : ElasticPair
         Their compliances.
     friction_coefficient : float
-        Coefficient of friction.
+        Coefficient of friction; NaN if it varies, or the shear traction has a bound.
     solver : Solver
-        How it is solved: the table of the deck, with the algorithm that follows from it.
+        Table [solver], with the algorithm.
     accuracy : Accuracy or None
-        How accurate the result is to be; None: the lattice is not refined.
+        Target accuracy; None: the lattice is not refined.
     load_steps : tuple of LoadStep
         The history; a segment in adaptive steps is one of them.
     output : Output
-        What is written, and where.
+        Table [output].
     deck : Deck
         The deck, checked and in SI.
     deck_file : Path or None
-        The file it was read from.
+        Its file.
     lattice : Lattice
-        The window to start with.
+        The first window.
     window_fixed : bool
-        Whether the size of the window was given: contact at its rim is an error then, otherwise the window
-        grows.
+        Whether the size of the window is given: contact at its rim is an error; otherwise the window grows.
     """
 
     deck_file: Path | None = None
+    _stiffest = 0.0  # decimal logarithm of the stiffness of the interface over that of the bodies
+    trial = False  # whether it is one of several lattices of a refinement
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Self:
@@ -85,9 +92,11 @@ class Problem:
         Raises
         ------
         DeckError
-            If it cannot be read, or with a sentence for each thing that is wrong with it.
+            If it cannot be read, or with a sentence for each fault.
         """
         data, text = toml.read_toml(path)
+        if "parameter" in data and "body" not in data:
+            raise DeckError(f"{path} is a study and no deck; hexcontact study {path} runs its cases")
         source = Source(str(path), text)
         case = cls._made(assemble(data, text, source, Path(path).parent, overrides))
         case.deck_file = Path(path).absolute()
@@ -95,13 +104,13 @@ class Problem:
 
     @classmethod
     def from_text(cls, text: str, name: str = "deck", overrides: Mapping[str, Any] | None = None) -> Self:
-        """Read a deck from its text (as a result file keeps it); `name` is what messages call it."""
+        """Read a deck from its text, as in a result; `name` stands for it in messages."""
         data = toml.parse_toml(text, name)
         return cls._made(assemble(data, text, Source(name, text), Path(), overrides))
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Make a case from the tables of a deck: ``{"body": {"1": {...}, ...}, "grid": {...}, ...}``."""
+        """Create a case from the tables of a deck: ``{"body": {"1": {...}, ...}, "grid": {...}, ...}``."""
         if not isinstance(data, Mapping):
             raise DeckError("a deck: expected tables of keys")
         toml.refuse_deep(data, "")
@@ -120,54 +129,92 @@ class Problem:
         self.title, self.accuracy, self.output = deck.title, deck.accuracy, deck.output
         one, two = (Body.model_construct(**dict(body)) for body in (deck.body.body_1, deck.body.body_2))
         self.body_1, self.body_2 = one, two
-        self.friction_coefficient = deck.friction.coefficient if deck.friction else 0.0
+        self.friction_coefficient = coulomb(deck.friction, deck.interface) or 0.0
+        self._friction = FrictionField(deck.friction, deck.interface)
+        self.interface = deck.interface.normal_law if deck.interface else contact.UNILATERAL
         self._gap = Gap(deck.body.separation if gap is None else gap)
         self.pair = ElasticPair.from_materials(
             one.young_modulus, one.poisson_ratio, two.young_modulus, two.poisson_ratio
         )
+        self.full_contact = gap is None and bool(deck.interface) and deck.body.separation.flat
         self.window_fixed = window.is_fixed(deck.grid)
-        self._contact: Estimate | None = None  # where the window follows from it alone
-        self._contact_radius = math.inf  # estimated; of an array of gaps nothing is known
+        self._contact: Estimate | None = None  # if the window follows from it alone
+        self.estimate: Estimate | None = None  # None for an array of gaps
         self.lattice = self._size(deck.grid, given.source, lattice)
+        if self._friction.varies and self.lattice.size <= _MOST_CHECKED_NODES:
+            self.friction_law(self.lattice)
         if self.accuracy and (problems := self._refinement_problems(self.accuracy)):
             raise deck_error(problems, given.source)
 
     @cached_property
     def deck_text(self) -> str:
-        """The case as a deck, whole: with what it includes, what was set, and series of loads from files."""
+        """The whole deck of the case, with included files, overrides, and series of loads from files."""
         given = self._given
         if given.text:
             return given.text
         data = plain(given.data)
         if self._gap.given:
-            # Refused when read again, instead of solving something else.
+            # this shape is refused in a deck
             data["body"]["1"]["surface"] = {"shape": "python"}
+        if self._friction.varies:
+            data["friction"]["coefficient"] = self._friction.in_deck
         return given.remark + as_toml(data)
+
+    def bulk(self, stress: tuple[float, float, float]) -> tuple[Array, Array]:
+        """Return the whole bulk stress xx, yy, xy (Pa), and its strain, of body 1 less that of body 2."""
+        if (bulk := self.deck.bulk) is None:
+            return np.zeros(3), np.zeros(3)
+        body = self.body_1 if bulk.body == 1 else self.body_2
+        assert body.young_modulus is not None
+        assert body.poisson_ratio is not None  # checked: the body is elastic
+        state = BULK_STATES.index(bulk.state)
+        whole, strain = bulk_strain(body.young_modulus, body.poisson_ratio, stress, state)
+        return whole, strain if bulk.body == 1 else -strain
 
     @property
     def adaptive(self) -> bool:
-        """Whether load steps are chosen on the way: some are "auto", and the answer depends on them."""
+        """Whether load steps are chosen during the solution: some are "auto", and have a history."""
         incremental = self.solver.algorithm == "incremental"
         return incremental and any(step.ramp is not None for step in self.load_steps)
 
     @property
     def planned_steps(self) -> int:
-        """Number of load steps; 0 if it shows on the way."""
-        return 0 if self.adaptive else len(self.load_steps)
+        """Number of load steps; 0 if it is open."""
+        return 0 if self.adaptive or self.deck.wear else len(self.load_steps)
+
+    @cached_property
+    def cycle(self) -> tuple[LoadStep, ...]:
+        """The load steps of the cycle that wears the surfaces, after the load history."""
+        if (wear := self.deck.wear) is None:
+            return ()
+        return wearing_cycle(self.deck.load, self.friction_coefficient, self.deck.bulk, wear.cycle)
+
+    @property
+    def solved_pair(self) -> ElasticPair:
+        """Compliances of the bodies; in a full contact a billionth of that of the interface at the most.
+
+        Half-spaces that carry the same tractions everywhere move as a whole; what is left keeps the operators
+        regular.
+        """
+        pair = self.pair
+        if not self.full_contact:
+            return pair
+        share = _NO_ELASTICITY / max(1.0, 10.0**self._stiffest)
+        return ElasticPair(share * pair.lambda_1, 0.0, share * pair.lambda_5)
 
     @property
     def frictional(self) -> bool:
-        """Whether shear tractions are solved for."""
+        """Whether shear tractions are unknowns."""
         return self.solver.algorithm != "frictionless"
 
     @property
     def coupled(self) -> bool:
-        """Whether pressure and shear move each other."""
+        """Whether pressure and shear are coupled."""
         return self.solver.coupling == "full" and abs(self.pair.beta) > _SMALLEST_BETA
 
-    # --- what solving needs ---------------------------------------------------------------------------------
+    # --- data of the solvers --------------------------------------------------------------------------------
 
-    def initial_gap(self, lattice: Lattice) -> tuple[Array, NDArray[np.bool_]]:
+    def initial_gap(self, lattice: Lattice) -> tuple[Array, Mask]:
         """Return the gap before loading, over the nodes of a window.
 
         Parameters
@@ -180,18 +227,28 @@ class Problem:
         gap : ndarray, (n_row, n_col)
             Initial gap (m) from first touch; inf where nothing can touch.
         candidate : ndarray of bool, (n_row, n_col)
-            False where the two bodies can never touch, as outside a punch.
+            False where the two bodies cannot touch, as outside a punch.
 
         Raises
         ------
         DeckError
-            If a gap given in Python does not fit the window or is not a number somewhere.
+            If a gap given in Python does not fit the window or is NaN somewhere.
         """
         gap = self._gap.over(lattice)
         return gap, np.isfinite(gap)
 
-    def check_contact(self, number: int, lattice: Lattice, contact: NDArray[np.bool_]) -> None:
-        """Refuse a load step whose contact reaches the end of a height map, where it stops with the data.
+    def friction_law(self, lattice: Lattice) -> FrictionLaw:
+        """Return the law of friction at the nodes of a window.
+
+        Raises
+        ------
+        DeckError
+            If a coefficient is negative or NaN somewhere, or a map ends within the window.
+        """
+        return self._friction.over(lattice)
+
+    def check_contact(self, number: int, lattice: Lattice, contact: Mask) -> None:
+        """Refuse a load step whose contact reaches the end of a height map.
 
         Parameters
         ----------
@@ -205,7 +262,7 @@ class Problem:
         Raises
         ------
         DeckError
-            If it does.
+            If the contact reaches it.
         """
         if self._gap.ends_within(lattice.spacing, lattice.x[contact], lattice.y[contact]):
             raise DeckError(
@@ -213,31 +270,10 @@ class Problem:
                 "of a larger part, or a function that says what lies beyond"
             )
 
-    def grown(self, lattice: Lattice, contact: NDArray[np.bool_] | None = None) -> Lattice:
-        """Return a larger window with the same nodes, for a contact that reached the rim.
-
-        Parameters
-        ----------
-        lattice : Lattice
-            The window that became too small.
-        contact : ndarray of bool, (n_row, n_col), optional
-            The nodes in contact: only the sides that they reach grow, by a quarter each. All sides without
-            it.
-        """
-        return window.grown(lattice) if contact is None else window.grown(lattice, window.rim_sides(contact))
-
     def on_lattice(self, spacing: float, origin: tuple[float, float]) -> Self:
-        """Return the same problem on another lattice, solved on that one alone.
-
-        Parameters
-        ----------
-        spacing : float
-            Spacing, m.
-        origin : (float, float)
-            Position of a node, m.
-        """
+        """Return the same problem on a lattice of another spacing (m) and origin (m), without refinement."""
         other = copy.copy(self)
-        other.accuracy = None
+        other.accuracy, other.trial = None, True
         moved = np.array(window.lattice_coordinates(*self.lattice.origin, origin))
         if self._contact is not None:
             bounds = self._contact.bounds + moved[:, None]
@@ -247,18 +283,19 @@ class Problem:
         return other
 
     def method_for(self, lattice: Lattice) -> Method:
-        """Return the method to use on a window, "direct" or "fft"; decides what "auto" means."""
-        if self.solver.method == "auto":
-            # with friction transforms are faster on any window, without it they need a few nodes for that
-            return "direct" if lattice.size <= MOST_DIRECT_NODES and not self.frictional else "fft"
-        return "direct" if self.solver.method == "direct" else "fft"
+        """Return the method for a window, "direct" or "fft", also for "auto"."""
+        small = lattice.size <= MOST_DIRECT_NODES and not self.frictional
+        return "direct" if self.solver.method in ("direct", "auto" if small else "direct") else "fft"
 
     def contact_nodes(self, lattice: Lattice) -> int:
-        """Return the nodes in contact at the largest load, as estimated; all where there is no estimate."""
-        return math.ceil(min(math.pi * self._contact_radius**2 / lattice.cell_area, lattice.size))
+        """Return the estimated number of nodes in contact at the largest load; all without an estimate."""
+        if self._gap.at_nodes and self.method_for(lattice) == "direct":
+            return window.nodes_in_contact(self.pair, self._gap.over(lattice), lattice, self.largest_drives)
+        radius = math.inf if self.estimate is None else self.estimate.radius
+        return math.ceil(min(math.pi * radius**2 / lattice.cell_area, lattice.size))
 
     def memory_needed(self, lattice: Lattice) -> int:
-        """Return the memory (bytes) that solving on a window takes, with a contact as large as estimated."""
+        """Return the memory (bytes) of the solver on a window, for the estimated contact."""
         method, shape = self.method_for(lattice), lattice.shape
         nodes = self.contact_nodes(lattice)
         if not self.frictional:
@@ -269,6 +306,7 @@ class Problem:
             contact=nodes,
             loads=max(sum(t.control == "force" for t in step.targets) for step in self.load_steps),
             coupled=self.coupled,
+            unlike=self.pair.beta != 0.0,
             threads=memory.threads(),
         )
 
@@ -279,13 +317,13 @@ class Problem:
         ----------
         changes : mapping
             New values by dotted key, with units or in SI: ``{"friction.coefficient": 0.2,
-            "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is found
-            anew, also where a `Lattice` was given; that of a gap over its nodes cannot change.
+            "load.2.steps": 20}``. Entries of arrays count from 1; None removes a key. The window is computed
+            again, also if a `Lattice` was given; that of a gap over its nodes cannot change.
 
         Raises
         ------
         DeckError
-            With a sentence for each thing that is wrong then.
+            With a sentence for each fault.
         """
         folder = self.deck_file.parent if self.deck_file else Path()
         lattice = self.lattice if self._gap.at_nodes else None
@@ -301,7 +339,7 @@ class Problem:
         return case
 
     def __eq__(self, other: object) -> bool:
-        """Whether two cases are the same problem, with the same solver and output."""
+        """Test whether two cases are the same problem, with the same solver and output."""
         if not isinstance(other, Problem):
             return NotImplemented
         mine, others = ((one._gap, one.deck, one.load_steps, one.lattice) for one in (self, other))
@@ -322,7 +360,7 @@ class Problem:
     # --- the window -----------------------------------------------------------------------------------------
 
     def _refinement_problems(self, wanted: Accuracy) -> list[Mistake]:
-        """Return what prevents a refinement that is fine enough to estimate errors."""
+        """Return what prevents a refinement of three lattices, which estimates of errors need."""
         if self._gap.at_nodes:
             sentence = "needs a gap that is known everywhere: surfaces or a function, not an array over nodes"
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]
@@ -338,19 +376,28 @@ class Problem:
         return [Mistake(("accuracy", "max_nodes"), wanted.max_nodes, sentence)]
 
     def _size(self, grid: Grid, source: Source, lattice: Lattice | None) -> Lattice:
-        """Return the window, checked against an estimate of the contact wherever there is one."""
+        """Return the window, checked against an estimate of the contact if there is one."""
         if self._gap.at_nodes and lattice is not None:
             self.initial_gap(lattice)
+            self._check_interface(source, lattice)
             return lattice
         touch = self._gap.first_touch or (0.0, 0.0)
         center = grid.center or touch
+        self._center = center if self._gap.given else touch
+        if self.full_contact:
+            assert grid.spacing is not None  # checked, as the window is
+            assert grid.window is not None
+            lattice = window.centered(grid.spacing, center, grid.window, grid.origin)
+            self._check_interface(source, lattice)
+            return lattice
         try:
-            estimate = self._estimate(center if self._gap.given else touch, grid.origin)
+            self._check_interface(source)
+            estimate = self._largest_contact()
         except NoContactFound as error:
-            raise deck_error(
-                [Mistake(("grid",), MISSING, f"no window can be found: {error}")], source
-            ) from None
-        self._contact_radius = estimate.radius
+            soft = ", or the interface is too soft" if self.deck.interface else ""
+            sentence = f"no window can be found: {error}{soft}"
+            raise deck_error([Mistake(("grid",), MISSING, sentence)], source) from None
+        self.estimate = estimate
         if lattice is None and not (self.window_fixed or grid.nodes_across):
             self._contact = estimate
         lattice = lattice or window.window(grid, center, estimate)
@@ -358,15 +405,45 @@ class Problem:
             raise deck_error(problems, source)
         return lattice
 
-    def _estimate(self, center: tuple[float, float], origin: tuple[float, float]) -> Estimate:
+    def _check_interface(self, source: Source, lattice: Lattice | None = None) -> None:
+        """Refuse an interface far softer than the bodies; the contact is as large as the window, if given."""
+        for drive in self.largest_drives if self.deck.interface else ():
+            if lattice is None:
+                size = window.starting_half_size(self.pair, self._gap.at, self._center, **drive)
+            else:
+                size = math.sqrt(lattice.size * lattice.cell_area)
+            ratios, problems = window.check_interface(
+                self.interface, self.pair, size, self.full_contact, **drive
+            )
+            if problems:
+                raise deck_error(problems, source)
+            self._stiffest = max(self._stiffest, *ratios)
+
+    def estimated(self, **drive: Any) -> Estimate:
+        """Estimate the contact under a normal load (N) or at an approach (m)."""
+        place = self._center, self.deck.grid.origin
+        return window.estimate_contact(self.pair, self._gap.at, *place, self.interface, **drive)
+
+    @cached_property
+    def growth(self) -> float:
+        """Exponent of the contact radius over load or approach, near the largest one; 0 if it is unknown."""
+        ((name, value), *_) = self.largest_drives[0].items()
+        try:
+            small, large = (self.estimated(**{name: load}).radius for load in (value / 8, value))
+        except NoContactFound:
+            return 0.0
+        return math.log(large / small) / math.log(8.0)
+
+    def _largest_contact(self) -> Estimate:
         """Estimate the contact at the largest load of the history, by force and by approach."""
+        found = [self.estimated(**drive) for drive in self.largest_drives]
+        return found[0] if len(found) == 1 else found[0].joined(found[1])
+
+    @property
+    def largest_drives(self) -> list[dict[str, float]]:
+        """The largest prescribed normal load (N) and approach (m) of the history."""
         largest = {
             name: max((s.z.value for s in self.load_steps if s.z.control == control), default=0.0)
-            for name, control in (("normal_load", "force"), ("approach", "displacement"))
+            for name, control in zip(LOADS["z"], ("force", "displacement"), strict=True)
         }
-        found = [
-            window.estimate_contact(self.pair, self._gap.at, center, origin, **{name: value})
-            for name, value in largest.items()
-            if value >= SMALLEST
-        ]
-        return found[0] if len(found) == 1 else found[0].joined(found[1])
+        return [{name: value} for name, value in largest.items() if value >= SMALLEST]

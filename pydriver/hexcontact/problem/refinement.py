@@ -1,30 +1,28 @@
-"""Lattices on which a problem is solved until its accuracy is reached: each finer by the square root of two.
+"""Lattices of a refinement: each finer by the square root of two.
 
-Shifted copies of a lattice have its spacing and origins moved by fractions of it; they serve to estimate
-errors (docs/theory/error_bars.md, (A2)).
+Shifted copies of a lattice have its spacing and origins moved by fractions of it, for estimates of errors
+(docs/theory/error_bars.md, (A2)).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .problem import Problem
+from .problem import Problem
 
 RATIO = math.sqrt(2.0)  # of the spacings of a lattice and the next finer one
 LEAST_LEVELS = 3
 # Origins of the shifted copies, in spacings along both basis vectors: multiples of (1/g, 1/g^2) with
-# g^3 = g + 1, which no row or symmetry of the lattice takes to each other.
+# g^3 = g + 1, which no row or symmetry of the lattice maps to each other.
 SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794))
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A lattice to solve the case on.
+    """A lattice of a refinement.
 
     Parameters
     ----------
@@ -47,13 +45,13 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """Say which one it is: "lattice 3", "lattice 1, shifted (2 of 4)"."""
+        """Name: "lattice 3", "lattice 1, shifted (2 of 4)"."""
         shifted = f", shifted ({self.copy} of {len(SHIFTS)})" if self.copy else ""
         return f"lattice {self.level + 1}{shifted}"
 
 
 def least_and_most(case: Problem) -> tuple[list[Problem], list[Problem]]:
-    """Return a case on all lattices of the shortest refinement, and of the longest that max_nodes allows.
+    """Return a case on all lattices of the shortest refinement, and of the longest within max_nodes.
 
     The last one is the finest.
     """

@@ -1,50 +1,51 @@
-"""The window of lattice nodes that a case needs: as the deck says, else from an estimate of the contact.
+"""The window of lattice nodes of a case: that of the deck, else from an estimate of the contact.
 
 The estimate solves the frictionless problem, for the largest load of the history, on a coarse lattice that is
 first enlarged until the contact lies inside and then refined until the contact is some sixteen nodes across
-where it is narrowest. That works for any shape; nothing here assumes Hertz. All bounds are kept in lattice
-coordinates (lengths along the two basis vectors), because the window is a rhombus and the smallest rhombus
-about a contact is found there.
+where it is narrowest, for any shape. All bounds are in lattice coordinates (lengths along the two basis
+vectors), since the window is a rhombus.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import reals
-from ..core.contact import ElasticPair, NormalContact
+from ..arrays import Array, Mask, reals
+from ..core.contact import UNILATERAL, ElasticPair, Interface, NormalContact
 from ..core.lattice import Lattice
 from ..deck.faults import MISSING, Mistake
 from ..deck.tables import Grid
 from ..deck.units import readable
 
-Array = NDArray[np.float64]
 GapFunction = Callable[[Array, Array], Array]
 """Initial gap (m) at arrays of points; inf where nothing can touch."""
 
 START_NODES = 32
 NARROW_NODES = 8  # coarse spacings in the smaller half-width of the contact: good to a few per cent
 MOST_COARSE_NODES = 40_000
-MOST_TRIALS = 24  # coarse solutions; a contact that is a line has no end and would go on for ever
+MOST_TRIALS = 24  # coarse solutions; a contact along a line has no end
 MOST_ENLARGEMENTS = 12
+GOOD_SPACINGS = 20  # in the half-width of the contact, for messages
 MARGIN = 2  # nodes of the window between the estimated contact and the rim
 GROWTH = 0.25
 MOST_NODES_PER_SIDE = 100_000
+# Decimal logarithms of the stiffness of an interface over that of the bodies.
+SOFTEST, STIFFEST = -30.0, 12.0
+DEEPEST = 12.0  # ... of the penetration under a normal load over the size of the contact
 
 
 class NoContactFound(Exception):
-    """The estimate found no bounded contact; the message says why, without a key."""
+    """Raised without a bounded contact; the message is the reason, without a key."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Where the contact is, roughly.
+    """Rough place and size of the contact.
 
     Attributes
     ----------
@@ -54,11 +55,15 @@ class Estimate:
         Smaller semi-axis (m) of the ellipse with the second moments of the contact area.
     lower, upper : ndarray, (2,)
         Smallest and largest lattice coordinates (m along the first and second basis vector, from the origin)
-        of nodes that are in contact.
+        of nodes in contact.
     cell : float
-        Coarse spacing (m); the edge of the contact lies within one cell of the bounds.
+        Coarse spacing (m); the edge of the contact is within one cell of the bounds.
     size : ndarray, (2,)
         Extent (m) of the contact in x and in y.
+    max_pressure : float
+        Largest pressure (Pa).
+    slope : float
+        Largest slope of the gap within the contact.
     """
 
     radius: float
@@ -67,22 +72,22 @@ class Estimate:
     upper: Array
     cell: float
     size: Array
+    max_pressure: float
+    slope: float
 
     @property
     def bounds(self) -> Array:
-        """Smallest and largest lattice coordinates (m), in columns, of what may be in contact."""
+        """Smallest and largest lattice coordinates (m), in columns, of the possible contact."""
         return np.stack([self.lower - self.cell, self.upper + self.cell], axis=1)
 
     def joined(self, other: Estimate) -> Estimate:
         """Return an estimate that covers both: the larger radius, the union of the bounds."""
         larger = self if self.radius >= other.radius else other
-        return Estimate(
-            larger.radius,
-            larger.half_width,
-            np.minimum(self.lower - self.cell, other.lower - other.cell) + larger.cell,
-            np.maximum(self.upper + self.cell, other.upper + other.cell) - larger.cell,
-            larger.cell,
-            np.maximum(self.size, other.size),
+        return replace(
+            larger,
+            lower=np.minimum(self.lower - self.cell, other.lower - other.cell) + larger.cell,
+            upper=np.maximum(self.upper + self.cell, other.upper + other.cell) - larger.cell,
+            size=np.maximum(self.size, other.size),
         )
 
 
@@ -130,8 +135,8 @@ def covering(window: Lattice, spacing: float, origin: tuple[float, float]) -> La
     return enclosing(lower + slack, upper - slack, spacing, 0, origin)
 
 
-def rim_sides(contact: NDArray[np.bool_]) -> tuple[bool, bool, bool, bool]:
-    """Tell where a contact reaches the rim of its window: first row, last row, first column, last column."""
+def rim_sides(contact: Mask) -> tuple[bool, bool, bool, bool]:
+    """Test whether a contact reaches first row, last row, first column and last column of its window."""
     return (
         bool(contact[0].any()),
         bool(contact[-1].any()),
@@ -155,9 +160,10 @@ def estimate_contact(
     gap: GapFunction,
     center: tuple[float, float],
     origin: tuple[float, float],
+    interface: Interface = UNILATERAL,
     **drive: float,
 ) -> Estimate:
-    """Find the contact roughly, under a normal load (N) or at an approach (m).
+    """Estimate the contact under a normal load (N) or at an approach (m).
 
     Parameters
     ----------
@@ -167,21 +173,24 @@ def estimate_contact(
         Initial gap over the plane.
     center, origin : (float, float)
         A point near the contact, and a lattice node.
+    interface : (float, float, float)
+        Coefficient (Pa/m^m) and exponent of its compliance, and stiffness (Pa/m) of its springs.
     **drive : float
         `normal_load` or `approach`, above zero.
 
     Raises
     ------
     NoContactFound
-        If nothing touches, or if the contact has no end.
+        If nothing touches, or the contact has no end.
     """
-    half = _starting_half_size(pair, gap, center, **drive)
+    half = starting_half_size(pair, gap, center, **drive)
     lattice = centered(2.5 * half / START_NODES, center, (START_NODES + 1, START_NODES + 1), origin)
     enclosed, enlargements = False, 0
     for _ in range(MOST_TRIALS):
-        contact = _solve(pair, gap, lattice, **drive)
-        if contact is None or not contact.any():
-            # Under load control there is always contact; at an approach the nodes may have missed it.
+        pressure = _solve(pair, gap, lattice, interface, **drive)
+        contact = pressure > 0
+        if not contact.any():
+            # under load control there is always contact; at an approach it may lie between the nodes
             lattice = centered(lattice.spacing / 4, center, lattice.shape, origin)
             continue
         if any(sides := rim_sides(contact)):
@@ -193,7 +202,7 @@ def estimate_contact(
                 lattice = centered(2 * lattice.spacing, center, lattice.shape, origin)
             continue
         enclosed = True
-        estimate = _measure(lattice, contact)
+        estimate = _measure(lattice, pressure, gap)
         if estimate.half_width >= NARROW_NODES * lattice.spacing:
             return estimate
         factor = min(max(math.ceil(NARROW_NODES * lattice.spacing / estimate.half_width), 2), 8)
@@ -205,14 +214,14 @@ def estimate_contact(
     raise NoContactFound("the contact has no end, or nothing touches")
 
 
-def _starting_half_size(
+def starting_half_size(
     pair: ElasticPair,
     gap: GapFunction,
     center: tuple[float, float],
     normal_load: float | None = None,
     approach: float = 0.0,
 ) -> float:
-    """Guess the contact radius: where the gap reaches the approach, or 2 E* a h(a) carries the load."""
+    """Guess the contact radius: there the gap reaches the approach, or 2 E* a h(a) the load."""
     radii = 10.0 ** np.linspace(-12, 4, 161)
     angles = 0.1 + np.linspace(0, 2 * math.pi, 16, endpoint=False)
     x = center[0] + radii[:, None] * np.cos(angles)
@@ -220,7 +229,7 @@ def _starting_half_size(
     with np.errstate(all="ignore"):
         height = reals(gap(x, y), "gap")
         height = np.where(np.isfinite(height), height, np.inf)
-        # The median over the directions: some of them may lie outside of a punch or along a groove.
+        # the median over the directions, some of which may lie outside of a punch or along a groove
         profile = np.median(height, axis=1) - height.min()
         if normal_load is not None:
             inside = 2 * pair.effective_modulus * radii * profile < normal_load
@@ -233,24 +242,37 @@ def _starting_half_size(
     return float(radii[np.flatnonzero(inside)[-1] + 1] if inside.any() else radii[0])
 
 
-def _solve(pair: ElasticPair, gap: GapFunction, lattice: Lattice, **drive: Any) -> NDArray[np.bool_] | None:
-    """Return the nodes in contact of a rough frictionless solution, or None if no node can touch."""
+def _solve(
+    pair: ElasticPair, gap: GapFunction, lattice: Lattice, interface: Interface, **drive: Any
+) -> Array:
+    """Return the pressure of a rough frictionless solution; 0 where no node can touch."""
     height = np.asarray(gap(lattice.x, lattice.y), float)
     candidate = np.isfinite(height)
     if not candidate.any():
-        return None
+        return np.zeros(lattice.shape)
     height = np.where(candidate, height, 0.0)
-    contact = NormalContact(lattice, pair, height, candidate, threads=1)
-    return np.asarray(contact.solve(**drive, tolerance=1e-4).pressure > 0)
+    contact = NormalContact(
+        lattice, pair, height, candidate, threads=1, interface=interface, rim_warning=False
+    )
+    return np.asarray(contact.solve(**drive, tolerance=1e-4).pressure)
 
 
-def _measure(lattice: Lattice, contact: NDArray[np.bool_]) -> Estimate:
+def nodes_in_contact(pair: ElasticPair, gap: Array, lattice: Lattice, drives: list[dict[str, float]]) -> int:
+    """Return the nodes of a window in contact at the largest of some drives, given the gap at all nodes."""
+    pressures = [_solve(pair, lambda *_: gap, lattice, UNILATERAL, **drive) for drive in drives]
+    return max([1, *(int((pressure > 0).sum()) for pressure in pressures)])
+
+
+def _measure(lattice: Lattice, pressure: Array, gap: GapFunction) -> Estimate:
+    contact = pressure > 0
     rows, cols = np.nonzero(contact)
     x, y = lattice.x[contact], lattice.y[contact]
     area = lattice.cell_area * len(rows)
     moments = np.cov(np.stack([x, y]), bias=True) + np.eye(2) * lattice.cell_area / 12  # a cell's own inertia
     half_width = 2 * math.sqrt(max(float(np.linalg.eigvalsh(moments)[0]), 0.0))
     indices = np.array([cols + lattice.col_first, rows + lattice.row_first]) * lattice.spacing
+    height = np.where(contact, gap(lattice.x, lattice.y), np.nan)
+    steepest = max(np.nanmax(np.abs(np.diff(height, axis=axis)), initial=0.0) for axis in (0, 1))
     return Estimate(
         radius=math.sqrt(area / math.pi),
         half_width=half_width,
@@ -258,22 +280,84 @@ def _measure(lattice: Lattice, contact: NDArray[np.bool_]) -> Estimate:
         upper=indices.max(axis=1),
         cell=lattice.spacing,
         size=np.array([np.ptp(x), np.ptp(y)]) + lattice.spacing,
+        max_pressure=float(pressure.max()),
+        slope=float(steepest) / lattice.spacing,
     )
+
+
+# --- the interface ------------------------------------------------------------------------------------------
+
+
+def check_interface(
+    interface: Interface,
+    pair: ElasticPair,
+    size: float,
+    full: bool,
+    normal_load: float | None = None,
+    approach: float = 0.0,
+) -> tuple[list[float], list[Mistake]]:
+    """Compare the stiffness of an interface with that of the bodies, E*/size.
+
+    That of the interface is dp/dψ at the pressure P/size^2, or at a penetration as large as the approach.
+
+    Parameters
+    ----------
+    interface : (float, float, float)
+        Coefficient (Pa/m^m), exponent m, and stiffness (Pa/m) of tangential springs.
+    pair : ElasticPair
+        The materials.
+    size : float
+        Size (m) of the contact.
+    full : bool
+        Whether the contact is full.
+    normal_load, approach : float
+        Normal load (N), or approach (m), above zero.
+
+    Returns
+    -------
+    ratios : list of float
+        Decimal logarithms of the ratio, of the coefficient and of the springs if there are any.
+    problems : list of Mistake
+        An interface that is far softer than the bodies, or takes a penetration far beyond the size of the
+        contact, or is far stiffer in a full contact.
+    """
+    coefficient, exponent, springs = interface
+    bodies, power, least = math.log10(pair.effective_modulus / size), 1.0, SOFTEST
+    if normal_load is None:
+        normal = math.log10(coefficient) + (exponent - 1.0) * math.log10(approach)
+    else:
+        pressure, power = math.log10(normal_load) - 2.0 * math.log10(size), exponent
+        normal = math.log10(coefficient) / exponent + (1.0 - 1.0 / exponent) * pressure
+        least = max(SOFTEST, math.log10(exponent / size) + pressure - bodies - DEEPEST)
+    found = [("coefficient", coefficient, normal + math.log10(exponent) - bodies, least, power)]
+    if springs:
+        found.append(("tangential_stiffness", springs, math.log10(springs) - bodies, SOFTEST, 1.0))
+    problems = []
+    for key, given, ratio, low, power in found:
+        bound = min(max(ratio, low), STIFFEST if full else math.inf)
+        if ratio != bound:
+            needed = math.log10(given) + (bound - ratio) * power
+            limit = f"least 1e{math.ceil(needed)}" if ratio < bound else f"most 1e{math.floor(needed)}"
+            sentence = (
+                f"expected at {limit}: the interface has 1e{ratio:.0f} times the stiffness of the bodies"
+            )
+            problems.append(Mistake(("interface", key), given, sentence))
+    return [ratio for _, _, ratio, _, _ in found], problems
 
 
 # --- the window ---------------------------------------------------------------------------------------------
 
 
 def is_fixed(grid: Grid) -> bool:
-    """Tell whether the deck gives the size of the window, so that it must not grow."""
+    """Test whether the deck gives the size of the window, which then does not grow."""
     return grid.window is not None or grid.extent != "auto"
 
 
 def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Lattice:
-    """Return the window that a deck asks for, given an estimate of the contact.
+    """Return the window of a deck, given an estimate of the contact.
 
-    ``extent = "auto"`` gives the smallest rhombus about the estimated contact (its bounds plus one coarse
-    cell, since the edge lies somewhere in it) with a margin of two nodes.
+    ``extent = "auto"`` is the smallest rhombus about the estimated contact (its bounds plus the coarse cell
+    with the edge) with a margin of two nodes.
     """
     lower, upper = estimate.bounds.T
     spacing = grid.spacing or (estimate.radius / grid.nodes_in_radius if grid.nodes_in_radius else None)
@@ -293,7 +377,7 @@ def window(grid: Grid, center: tuple[float, float], estimate: Estimate) -> Latti
         center_coordinates = (lower + upper) / 2
         center = tuple(grid.origin + center_coordinates @ Lattice(1.0, 0, 0, 1, 1).basis)
         margin = MARGIN if nodes >= 11 else 1
-    # Half a spacing may be lost where the middle is no node; try without first.
+    # half a spacing may be lost if the middle is no node; the first attempt is without
     for intervals in (nodes - 1 - 2 * margin, nodes - 2 - 2 * margin):
         lattice = centered(float(np.max(upper - lower)) / intervals, center, shape, grid.origin)
         if not _outside(lattice, lower, upper):
@@ -312,7 +396,7 @@ def _corners(
 
 
 def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
-    """Tell whether bounds in lattice coordinates reach out of a window."""
+    """Test whether bounds in lattice coordinates reach out of a window."""
     slack = 1e-9
     first = np.array([lattice.col_first, lattice.row_first])
     last = first + np.array([lattice.n_col, lattice.n_row]) - 1
@@ -322,16 +406,20 @@ def _outside(lattice: Lattice, lower: Array, upper: Array) -> bool:
 
 
 def check(grid: Grid, lattice: Lattice, estimate: Estimate) -> list[Mistake]:
-    """Return what is wrong with a window: too coarse or too small for the contact, or beyond all bounds."""
+    """Return the faults of a window: too coarse or too small for the contact, or too many nodes."""
     problems = []
     given = "spacing" if grid.spacing else "nodes_across" if grid.nodes_across else "nodes_in_radius"
     size = "window" if grid.window is not None else "extent" if grid.extent != "auto" else given
     if max(lattice.shape) > MOST_NODES_PER_SIDE:
-        sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(lattice.shape)}"
+        least = readable(lattice.spacing * max(lattice.shape) / MOST_NODES_PER_SIDE * 1.01)
+        sentence = f"expected at most {MOST_NODES_PER_SIDE} nodes along a side, not {max(lattice.shape)}: "
+        sentence += f"a spacing of {least} or more"
         problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
     if lattice.spacing > estimate.half_width:
         sentence = f"the spacing of {readable(lattice.spacing)} is larger than the contact: "
-        sentence += f"expected a spacing well below its half-width of about {readable(estimate.half_width)}"
+        fitting = readable(estimate.half_width / GOOD_SPACINGS)
+        sentence += f"expected a spacing well below its half-width of about {readable(estimate.half_width)}, "
+        sentence += f'such as "{fitting}"'
         problems.append(Mistake(("grid", given), getattr(grid, given), sentence))
     if is_fixed(grid) and _outside(lattice, estimate.lower, estimate.upper):
         if size == "extent":

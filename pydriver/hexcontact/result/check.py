@@ -1,38 +1,35 @@
-"""Refuses results and records of journals whose parts are missing or of the wrong kind.
-
-Whatever looks at a result relies on what is checked here: that quantities have their dimensions and numbers,
-attributes their kind, and that what a run always writes is there.
-"""
+"""Faults of results and of records of journals: missing parts, wrong kinds, impossible numbers."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..variables import FIELDS, LARGEST, NOT_KEPT, RESIDUALS, VARIABLES, names_where
+from ..deck.tables import BULK_STATES
+from ..variables import FIELDS, INTERFACE, LARGEST, NOT_KEPT, RESIDUALS, VARIABLES, names_where
 from .layout import Metadata, history_of, lattice_of
+from .step import Step
 
 if TYPE_CHECKING:
     import xarray
 
-    from .step import Step
-
-_CLOSE = 1e-6  # spacings by which a node may be away from where it belongs; relative difference of sums
-_ROUNDED = 1 + 1e-5  # of tolerances in the story of a run
+_CLOSE = 1e-6  # spacings by which a node may be off its place; relative difference of sums
+_ROUNDED = 1 + 1e-5  # for tolerances in the story of a run
 _CHANGED = re.compile(r"(?<!step_)tolerance = (\S+) instead of ([^\s,]+)")
 
 _ALWAYS = names_where(lambda v: v.required == "always")
 _WITH_FRICTION = names_where(lambda v: bool(v.required))
+_NOISE = 1e-3  # of energies beside the normal load times the contact radius
 _NO_STEP = "{} holds numbers that no load step has"
 
 
-Fits = Callable[[Any], bool]  # whether a value is what it should be
+Fits = Callable[[Any], bool]  # test of a value
 
 
 def _is_number(value: Any) -> bool:
@@ -55,11 +52,11 @@ def _numbers(count: int) -> Fits:
     return lambda value: np.shape(value) == (count,) and bool(np.isfinite(value).all())
 
 
-_PARAMETERS: dict[str, Fits] = {  # that describe the case: all of them or, in a test, none
+_PARAMETERS: dict[str, Fits] = {  # of the case: all of them or, in tests, none
     "effective_modulus": _is_positive,
     "dundurs_beta": _is_number,
     "tangential_compliance_ratio": _is_number,
-    "friction_coefficient": lambda value: _is_number(value) and value >= 0,
+    "friction_coefficient": lambda value: np.ndim(value) == 0 and not float(value) < 0,  # NaN: another law
     "algorithm": _one_of("frictionless", "static", "incremental"),
     "coupling": _one_of("full", "goodman"),
     "tolerance": _is_positive,
@@ -75,16 +72,24 @@ _ATTRIBUTES: dict[str, Fits] = {
     "lattice_basis": _numbers(4),
     "lattice_origin": _numbers(2),
 }
-_LATER = {"entry": _one_of("implicit", "interpolated"), "machine": _is_text, "stopped": _is_text}
+_LATER = {
+    INTERFACE[0]: _is_positive,
+    INTERFACE[2]: lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: no springs
+    INTERFACE[1]: lambda value: _is_number(value) and 1 <= value < math.inf,
+    "cycle_tolerance": _is_positive,
+    "entry": _one_of("implicit", "interpolated"),
+    "bulk_state": _one_of(*BULK_STATES),
+    **dict.fromkeys(("friction_law", "machine", "stopped"), _is_text),
+}
 
 
 def fault_of_result(dataset: xarray.Dataset) -> str:
-    """Return what is wrong with a result that was read from a file; empty if nothing is.
+    """Return a fault of a result that was read from a file; empty if there is none.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        As it was opened; fields need not be in memory.
+        Its data set; fields need not be in memory.
     """
     attributes = {str(name): value for name, value in dataset.attrs.items()}
     if fault := _fault_of_attributes(attributes):
@@ -105,7 +110,7 @@ def fault_of_result(dataset: xarray.Dataset) -> str:
 
 
 def fault_of_dimensions(name: str, dimensions: tuple[str, ...]) -> str:
-    """Return what is wrong with the dimensions of a variable of a file; empty if nothing is."""
+    """Return a fault of the dimensions of a variable of a file; empty if there is none."""
     known = VARIABLES.get(name)
     if known is None:
         fits = len(set(dimensions)) == len(dimensions)
@@ -126,7 +131,7 @@ def _fault_of_attributes(attributes: Mapping[str, Any]) -> str:
 
 
 def _fault_of_coordinates(dataset: xarray.Dataset) -> str:
-    """Return a fault of steps, rows and columns: they are numbered one by one."""
+    """Return a fault of steps, rows and columns, which count one by one."""
     if dataset["step"].values[0] != 1:
         return "its steps do not begin with 1"
     for name in ("step", "row", "col"):
@@ -148,18 +153,21 @@ def _fault_of_histories(dataset: xarray.Dataset) -> str:
         always = VARIABLES[name].required and not name.startswith("stick_center")
         if always and np.isnan(history[name]).any():
             return _NO_STEP.format(name)
-    return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]))
+    lattice = lattice_of(dataset)
+    window = lattice.size * lattice.cell_area
+    return _fault_of_numbers(history, dataset.attrs, str(dataset.attrs["history"]), window)
 
 
-def _fault_of_numbers(history: Mapping[str, Any], parameters: Mapping[Any, Any], story: str) -> str:
-    """Return a fault of values by step; a run that was resumed may have had several tolerances."""
-    tolerances = [parameters.get("tolerance", 1.0), *map(float, chain(*_CHANGED.findall(story)))]
+def _fault_of_numbers(
+    history: Mapping[str, Any], parameters: Mapping[Any, Any], story: str, window: float
+) -> str:
+    """Return a fault of values by step; a resumed run may have several tolerances."""
+    given = [parameters.get("tolerance", 1.0), parameters.get("cycle_tolerance", 0.0)]
+    tolerances = [*given, *map(float, chain(*_CHANGED.findall(story)))]
     cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
     for name, values in history.items():
-        low, high = VARIABLES[name].least, LARGEST
-        if VARIABLES[name].dtype != "f8":
-            low, high = NOT_KEPT, max(VARIABLES[name].flags, default=LARGEST)
-        elif name in RESIDUALS.values():
+        low, high = _bounds(name, history, window)
+        if name in RESIDUALS.values():
             high = max(tolerances) * _ROUNDED
             if name == RESIDUALS["R_t"]:  # parts of a step are solved from one to the next
                 values = np.where(cut, np.minimum(values, high), values)
@@ -168,8 +176,24 @@ def _fault_of_numbers(history: Mapping[str, Any], parameters: Mapping[Any, Any],
     return ""
 
 
+def _bounds(name: str, history: Mapping[str, Any], window: float) -> tuple[Any, Any]:
+    """Return the smallest and the largest possible value by step."""
+    known = VARIABLES[name]
+    if known.dtype != "f8":
+        return max(NOT_KEPT, known.least), max(known.flags, default=LARGEST)
+    low: Any = known.least
+    high: Any = known.most
+    beside, power = known.scale
+    if low > -LARGEST and beside:
+        scale = np.abs(history.get(beside, 0.0)) * history.get("contact_radius", 0.0) ** power
+        low = np.where(np.greater(scale, 0.0), low - _NOISE * scale, -LARGEST)
+    if isinstance(high, str):
+        high = np.multiply({**history, "window": window}.get(high, LARGEST), 1 + _CLOSE)
+    return low, high
+
+
 def fault_of_fields(dataset: xarray.Dataset) -> str:
-    """Return what is wrong with the fields of a result; empty if nothing is. Reads them, step by step."""
+    """Return a fault of the fields of a result, which are read step by step; empty if there is none."""
     numbers, every = dataset["step"].values, int(dataset.attrs["output_every"])
     for place, number in enumerate(numbers):
         step = dataset.isel(step=place)
@@ -184,7 +208,7 @@ def fault_of_fields(dataset: xarray.Dataset) -> str:
 def _fault_of_values(
     fields: Mapping[str, NDArray[Any]], history: Mapping[str, Any], spacing: float, kept: bool = True
 ) -> str:
-    """Return a fault of values at nodes: they are those of a load step, and fit to its history."""
+    """Return a fault of nodal values, which have bounds and fit the history."""
     zone, pressure = fields.get("zone"), fields.get("pressure")
     contact = zone > 0 if zone is not None else pressure > 0 if pressure is not None else None
     for name, values in fields.items():
@@ -195,7 +219,7 @@ def _fault_of_values(
             wrong = (values < 0) | (values > max(known.flags))
         else:
             wrong = ~(abs(values) < LARGEST)
-            if known.padding != 0:  # there may be no value out of contact
+            if known.padding != 0:  # which may have no value out of contact
                 wrong &= contact is not None and contact
             wrong |= values < known.least
         if wrong.any():
@@ -212,7 +236,7 @@ def _fault_of_values(
 
 
 def fault_of_record(metadata: Metadata, step: Step) -> str:
-    """Return what is wrong with a record of a journal that was read; empty if nothing is."""
+    """Return a fault of a record of a journal; empty if there is none."""
     planned = metadata.planned_steps or (1 if step.control else 0)  # not known of adaptive steps
     counts = {"every": metadata.every, "planned_steps": planned, "index": step.index + 1}
     for name in ("title", "deck", "run", "created", "version", "deck_file"):
@@ -221,6 +245,8 @@ def fault_of_record(metadata: Metadata, step: Step) -> str:
     for name, value in counts.items():
         if not isinstance(value, int) or value < 1:
             return f"its {name} is no count"
+    if metadata.planned_steps and step.number > metadata.planned_steps:
+        return f"its index is beyond the {metadata.planned_steps} planned steps"
     if not all(isinstance(line, str) for line in metadata.resumed) or set(metadata.fields) - set(FIELDS):
         return "its metadata hold other things than text"
     if not isinstance(metadata.parameters, dict):
@@ -235,9 +261,45 @@ def fault_of_record(metadata: Metadata, step: Step) -> str:
     history = {name: value for name, value in step.history.items() if not isinstance(value, str)}
     return (
         _fault_of_step(step)
-        or _fault_of_numbers(history, metadata.parameters, metadata.story)
+        or _fault_of_control(step)
+        or _fault_of_numbers(
+            history, metadata.parameters, metadata.story, step.lattice.size * step.lattice.cell_area
+        )
         or _fault_of_values(step.fields, history, step.lattice.spacing)
     )
+
+
+_CHOOSER = ("size", "first", "stick", "traction")  # and a memory of the last two
+_CONTROL: dict[str, Fits] = {  # of adaptive load steps
+    **dict.fromkeys(("position", "load_steps"), lambda value: type(value) is int and value >= 0),
+    **dict.fromkeys(("fraction", "done"), lambda value: _is_number(value) and 0 <= value <= 1),
+    "chooser": lambda value: (
+        _has_numbers(value, _CHOOSER) and _has_numbers(value.get("memory"), _CHOOSER[2:])
+    ),
+}
+
+
+def _has_numbers(table: Any, names: Sequence[str]) -> bool:
+    return isinstance(table, dict) and all(_is_number(table.get(name, "")) for name in names)
+
+
+def _fault_of_control(step: Step) -> str:
+    """Return a fault of the place of an adaptive load step in the load history; empty if there is none."""
+    control = step.control
+    if not control:
+        return ""
+    of_wear = "until" in control
+    for name, fits in (_CONTROL | ({} if of_wear else {"area": _is_positive})).items():
+        if name not in control or not fits(control[name]):
+            return f"its control.{name} is not what it should be"
+    if of_wear:
+        ahead = _is_number(control["until"]) and control["until"] >= 0
+        placed = ahead and control["done"] == control["fraction"]
+        return "" if placed else "its place among the cycles that wear the surfaces is not what it should be"
+    done = (control["position"] + control["fraction"]) / max(control["load_steps"], 1)
+    if done > 1 or not math.isclose(done, control["done"], rel_tol=_CLOSE):
+        return "its control.done does not fit to its place in the load history"
+    return ""
 
 
 def _fault_of_step(step: Step) -> str:

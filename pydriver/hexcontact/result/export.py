@@ -5,21 +5,26 @@ from __future__ import annotations
 import base64
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..deck.below import Fatigue
 from ..errors import DeckError
+from ..files import replacing
+from ..interior.stress import TENSOR
+from ..interior.tables import as_volume, computed, tables_of
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, VARIABLES, VECTORS
 from . import mesh
 from .interpolate import is_kept
+from .result import Result
 
 if TYPE_CHECKING:
-    from .result import Result
+    import xarray
 
 _VTK_TYPES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "i1": "Int8", "u1": "UInt8"}
 _TRIANGLE = 5  # number of this kind of cell in VTK
@@ -38,7 +43,7 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
     Raises
     ------
     DeckError
-        If there is no such step, or nothing was kept of it.
+        If there is no such step, or the output lacks its fields.
     """
     wanted = [int(step) for step in result.dataset["step"].values]
     if numbers is not None:
@@ -55,7 +60,7 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
 
 
 def _meshed_steps(result: Result, numbers: Sequence[int] | None) -> list[int]:
-    """Return `kept_steps` of a result whose window has triangles; DeckError for others."""
+    """Return `kept_steps` of a result; DeckError if its window has no triangles."""
     steps = kept_steps(result, numbers)
     if min(result.lattice.shape) < 2:
         raise DeckError("a window of one row or one column has no triangles to export")
@@ -78,7 +83,7 @@ def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
     result : Result
         The result.
     folder : Path
-        Folder for the files; made if it is not there.
+        Folder for the files, created if missing.
     stem : str
         Start of the names of the files.
     numbers : sequence of int, optional
@@ -96,21 +101,68 @@ def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
     """
     steps = _meshed_steps(result, numbers)
     _make(folder)
+    return _series(folder, stem, "vtu", {number: _vtu(result, number) for number in steps})
+
+
+def volumes_to_vtk(result: Result, folder: Path, stem: str) -> list[Path]:
+    """Write the tables [[stress]] and [[fatigue]] of the deck of a result as structured grids.
+
+    Returns
+    -------
+    list of Path
+        A ``.pvd`` file for each table ``[[stress]]`` and ``[[fatigue]]``.
+    """
+    written = []
+    for name, found in computed(result, kept_steps(result)):
+        _make(folder)
+        if "step" not in found.coords:  # of a cycle, at its end
+            found = found.expand_dims(step=[int(found.attrs["steps"][-1])])
+        pages = {number: _vts(result, found.sel(step=number)) for number in found["step"].values.tolist()}
+        written.append(_series(folder, f"{stem}_{name}", "vts", pages))
+    return written
+
+
+def histories_to_csv(result: Result, folder: Path, stem: str) -> list[Path]:
+    """Write the stress histories of the tables ``[[fatigue]]`` of the deck, in the format of pyLife.
+
+    A line has point, load step, place (m) and the six stresses (MPa); points are written block by block.
+
+    Raises
+    ------
+    DeckError
+        If the deck has no such table.
+    """
+    tables = {name: table for name, table in tables_of(result.deck).items() if isinstance(table, Fatigue)}
+    if not tables:
+        raise DeckError("--histories: expected a table [[fatigue]] in the deck, which says of which points")
+    _make(folder)
+    written = [folder / f"{stem}_{name}_histories.csv" for name in tables]
+    for target, table in zip(written, tables.values(), strict=True):
+        blocks = result.stress_histories(table.segment, table.steps, table.body, **table.where)
+        for number, block in enumerate(blocks):
+            block.to_csv(target, mode="a" if number else "w", header=not number, float_format="%.8g")
+    return written
+
+
+def _series(folder: Path, stem: str, kind: str, pages: Mapping[int, str]) -> Path:
+    """Write a file for each load step, and their list."""
+    steps = list(pages)
     width = max(4, len(str(steps[-1])))
-    names = []
-    for number in steps:
-        names.append(f"{stem}_{number:0{width}d}.vtu")
-        (folder / names[-1]).write_text(_vtu(result, number), encoding="utf-8")
+    names = [f"{stem}_{number:0{width}d}.{kind}" for number in steps]
+    for name, page in zip(names, pages.values(), strict=True):
+        with replacing(folder / name) as path:
+            path.write_text(page, encoding="utf-8")
     series = folder / f"{stem}.pvd"
     sets = "".join(
         f'    <DataSet timestep="{number}" part="0" file="{escaped(name)}"/>\n'
         for number, name in zip(steps, names, strict=True)
     )
-    series.write_text(
-        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n'
-        f"  <Collection>\n{sets}  </Collection>\n</VTKFile>\n",
-        encoding="utf-8",
-    )
+    with replacing(series) as path:
+        path.write_text(
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">\n'
+            f"  <Collection>\n{sets}  </Collection>\n</VTKFile>\n",
+            encoding="utf-8",
+        )
     return series
 
 
@@ -131,27 +183,44 @@ def _vtu(result: Result, number: int) -> str:
         _array("offsets", np.arange(3, 3 * len(faces) + 1, 3, dtype="i4")),
         _array("types", np.full(len(faces), _TRIANGLE, dtype="u1")),
     ]
-    return (
-        '<?xml version="1.0"?>\n'
-        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
-        'compressor="vtkZLibDataCompressor">\n'
-        f"<!-- {re.sub('-(?=-)', '- ', escaped(_about(result, number)))} -->\n"
+    return _vtk(
+        *("UnstructuredGrid", result, number),
         f"<UnstructuredGrid>\n<FieldData>\n{''.join(data)}</FieldData>\n"
         f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(faces)}">\n'
         f"<PointData>\n{''.join(fields)}</PointData>\n<CellData/>\n"
         f"<Points>\n{_array('Points', points, 'm')}</Points>\n<Cells>\n{''.join(cells)}</Cells>\n"
-        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
+        "</Piece>\n</UnstructuredGrid>\n",
     )
 
 
-def _about(result: Result, number: int) -> str:
+def _vts(result: Result, found: xarray.Dataset) -> str:
+    """Return quantities below the surface as a structured grid in XML; z points into body 1."""
+    points, shape = as_volume(found)
+    extent = " ".join(f"0 {n - 1}" for n in reversed(shape))
+    values = {str(name): field.values.ravel() for name, field in found.data_vars.items()}
+    fields = [_array(name, field, str(found[name].attrs["units"])) for name, field in values.items()]
+    if all(name in values for name in TENSOR):  # in the order of a symmetric tensor, as filters take it
+        fields.append(_array("stress", np.stack([values[name] for name in TENSOR], axis=1), "Pa"))
+    return _vtk(
+        *("StructuredGrid", result, int(found["step"].item())),
+        f'<StructuredGrid WholeExtent="{extent}">\n<Piece Extent="{extent}">\n'
+        f"<PointData>\n{''.join(fields)}</PointData>\n<CellData/>\n"
+        f"<Points>\n{_array('Points', points, 'm')}</Points>\n</Piece>\n</StructuredGrid>\n",
+    )
+
+
+def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
+    """Return a file of VTK in XML about a load step."""
+    title, source = result.case_title or "hexcontact", result.dataset.attrs["source"]
+    about = re.sub("-(?=-)", "- ", escaped(f"{title}, load step {number}; {source}; SI units"))
     return (
-        f"{result.case_title or 'hexcontact'}, load step {number}; {result.dataset.attrs['source']}; SI units"
+        f'<?xml version="1.0"?>\n<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" '
+        f'header_type="UInt64" compressor="vtkZLibDataCompressor">\n<!-- {about} -->\n{grid}</VTKFile>\n'
     )
 
 
 def _point_data(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any], str]]:
-    """Yield name, values at the nodes and unit of what a step holds; components joined to vectors."""
+    """Yield name, nodal values and unit of the fields of a step, with components joined to vectors."""
     fields = dict(_fields(result, number))
     if "initial_gap" in result.dataset:
         yield "initial_gap", result.dataset["initial_gap"].values.ravel(), "m"
@@ -165,11 +234,11 @@ def _point_data(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any]
 
 
 def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
-    """Return an array in XML, compressed, with its unit as ParaView shows it."""
+    """Return a compressed array in XML, with its unit for ParaView."""
     data = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
     raw = data.tobytes()
     packed = zlib.compress(raw, 6)
-    header = np.array([1, len(raw), 0, len(packed)], dtype="<u8").tobytes()  # one block, not a partial one
+    header = np.array([1, len(raw), 0, len(packed)], dtype="<u8").tobytes()  # one whole block
     text = (base64.b64encode(header) + base64.b64encode(packed)).decode()
     shape = f' NumberOfComponents="{data.shape[1]}"' if data.ndim > 1 else ""
     alone = ' NumberOfTuples="1"' if data.size == 1 else ""
@@ -187,7 +256,7 @@ def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
 def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None) -> Path:
     """Write a netCDF file whose fields lie on the nodes of a mesh, for xugrid and others.
 
-    The result itself describes the same mesh, but has its fields by row and column.
+    The result has the same mesh, but its fields by row and column.
 
     Parameters
     ----------
@@ -212,7 +281,7 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
 
     steps = _meshed_steps(result, numbers)
     _make(target.parent)
-    with netCDF4.Dataset(target, "w", format="NETCDF4_CLASSIC") as file:
+    with replacing(target) as path, netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC") as file:
         known = result.dataset.attrs
         named = {name: known[name] for name in ("title", "source", "history") if name in known}
         file.setncatts({"Conventions": CONVENTIONS, **named})
@@ -238,14 +307,14 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
 
 
 def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | None = None) -> list[Path]:
-    """Write the history as a table, and of the chosen steps the fields, a line for each node.
+    """Write the history as a table, and the fields of some steps, a line for each node.
 
     Parameters
     ----------
     result : Result
         The result.
     folder : Path
-        Folder for the files; made if it is not there.
+        Folder for the files, created if missing.
     stem : str
         Start of the names of the files.
     numbers : sequence of int, optional
@@ -266,18 +335,20 @@ def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
     steps = [] if numbers is None else kept_steps(result, numbers)
     _make(folder)
     written = [folder / f"{stem}_history.csv"]
-    result.history.rename(columns=_with_unit).map(_cell).to_csv(written[0])
+    with replacing(written[0]) as path:
+        result.history.rename(columns=_with_unit).map(_cell).to_csv(path)
     for number in steps:
         rows, cols = np.meshgrid(result.lattice.rows, result.lattice.cols, indexing="ij")
         columns = {"row": rows, "col": cols, "x": result.lattice.x, "y": result.lattice.y}
         table = pd.DataFrame({k: v.ravel() for k, v in (columns | dict(_fields(result, number))).items()})
         written.append(folder / f"{stem}_{number:04d}.csv")
-        table.rename(columns=_with_unit).to_csv(written[-1], index=False)
+        with replacing(written[-1]) as path:
+            table.rename(columns=_with_unit).to_csv(path, index=False)
     return written
 
 
 def _cell(value: Any) -> Any:
-    """Return what stands in a table; text that a spreadsheet would run as a formula begins with ' there."""
+    """Return the cell of a table; text that a spreadsheet would run as a formula gets a leading '."""
     if not isinstance(value, str):
         return value
     text = visible(value)

@@ -1,30 +1,37 @@
-"""What the history of a load step, or of a run, says in words and numbers for people."""
+"""Words and tables for the history of a load step or of a run."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..text import listed, percent, quantity
-from ..variables import RESIDUALS as RESIDUALS
-from ..variables import SUMMARY, VARIABLES, label_of, names_where, spelled
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analytic.shear import line_of
+from ..core.measures import cycles as cycles_of
+from ..core.measures import turning_points
+from ..deck.below import Stage
+from ..text import Row, listed, percent, quantity
+from ..variables import BULK_STRESS, LOADS, RESIDUALS, SUMMARY, VARIABLES, label_of, names_where, spelled
 
 History = Mapping[str, Any]
-Row = tuple[str, ...]
 
 LOADS_AND_MOTIONS = {
     name: (label_of(name), VARIABLES[name].units) for name in names_where(lambda v: v.motion)
 }
-"""What each load and motion is called where there is little room, and its unit."""
+"""Short name and unit of each load and motion."""
 
-_NOTICED = 1e-6  # share of the normal load or approach from which something tangential is worth showing
-_NOISE = 1e-9  # ... below which it is written as zero
+_NOTICED = 1e-6  # share of the normal load or approach from which tangential ones are shown
+_NOISE = 1e-9  # ... below which they are written as zero
+ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
 _MOST_NAMED = 8  # load steps named in a sentence
 
 
 def _scale(name: str, history: History) -> float:
-    """Return what a load or motion of a step is to be compared with to tell whether it is noise."""
+    """Return the quantity beside which a load or motion of a step may be noise."""
     beside, power = VARIABLES[name].scale
     if not beside:
         return 0.0
@@ -33,7 +40,7 @@ def _scale(name: str, history: History) -> float:
 
 
 def worth_showing(histories: Iterable[History]) -> list[str]:
-    """Return those of `LOADS_AND_MOTIONS` to show: the normal ones, and others that are more than noise."""
+    """Return the normal ones of `LOADS_AND_MOTIONS`, and others that are more than noise."""
     histories = list(histories)
 
     def shown(name: str) -> bool:
@@ -50,13 +57,28 @@ def load_or_motion(name: str, history: History) -> str:
 
 
 def fitted(name: str, history: History) -> float:
-    """Return an area or radius to the edge between the nodes; as its nodes have it where no fit was kept."""
+    """Return an area or radius to the edge between the nodes; that of its nodes without a fit."""
     value = float(history.get(f"{name}_fit", math.nan))
     return float(history[name]) if math.isnan(value) else value
 
 
+def half_axes(history: History) -> tuple[float, float] | None:
+    """Return the half-axes (m) of a contact; None if it is a circle, or they are unknown."""
+    major, minor = (float(history.get(f"contact_semi_{axis}", math.nan)) for axis in ("major", "minor"))
+    return (major, minor) if minor < ROUND * major else None
+
+
+def contact_size(history: History) -> tuple[str, str]:
+    """Return name and value of the radius of the contact, or its half-axes, with the estimated error."""
+    if (axes := half_axes(history)) is None:
+        error = error_of("contact_radius", history)
+        return "contact radius", quantity(fitted("contact_radius", history), "m") + error
+    words = " by ".join(quantity(axis, "m") for axis in axes)
+    return "contact half-axes", words + error_of("contact_semi_major", history)
+
+
 def error_of(name: str, history: History) -> str:
-    """Write the estimated error of what `fitted` or `load_or_motion` give, as " ± 0.05 %"; empty if none."""
+    """Write the estimated error of `fitted` or `load_or_motion`, as " ± 0.05 %"; empty if there is none."""
     own = name if math.isnan(float(history.get(f"{name}_fit", math.nan))) else f"{name}_fit"
     value, error = abs(float(history[own])), float(history.get(f"{own}_error", 0.0))
     least = _NOISE * _scale(name, history)
@@ -64,7 +86,7 @@ def error_of(name: str, history: History) -> str:
 
 
 def stick_share(history: History) -> str:
-    """Write how much of the contact area sticks."""
+    """Write the sticking share of the contact area."""
     area = fitted("contact_area", history)
     return f"{100 * fitted('stick_area', history) / area:.1f} %" if area else "-"
 
@@ -76,19 +98,29 @@ def step_error_share(history: History) -> float | None:
 
 
 def halved(history: History) -> str:
-    """Say how often a step was halved until the solver converged; empty if it was not."""
+    """Return "halved 2 times" for a step that was halved until the solver converged; else nothing."""
     cuts = int(history.get("cuts", 0))
     return f"halved {cuts} time{'s' * (cuts > 1)}" if cuts else ""
 
 
+def in_halves(history: History) -> bool:
+    """Test whether a step was solved in two halves, like adaptive ones with shear."""
+    return float(history.get("traction_step_change", math.nan)) > 0.0
+
+
+def parts_of(history: History) -> str:
+    """Describe the parts in which a step was solved; empty if it was solved as a whole."""
+    return ", ".join(filter(None, ("in two halves" * in_halves(history), halved(history))))
+
+
 def residuals(history: History) -> dict[str, float]:
-    """Return the residuals that there are, by the symbol of the theory."""
+    """Return the known residuals, by the symbol of the theory."""
     found = {sign: float(history.get(name, math.nan)) for sign, name in RESIDUALS.items()}
     return {sign: value for sign, value in found.items() if not math.isnan(value)}
 
 
 def is_frictional(history: History) -> bool:
-    """Tell whether a step was solved with friction."""
+    """Test whether a step was solved with friction."""
     return "stick_area" in history
 
 
@@ -104,22 +136,24 @@ def describe(history: History, short: bool = False) -> str:
     else:
         parts.append(f"p_max {quantity(history['max_pressure'], 'Pa')}")
         if not short:
-            parts.append(f"radius {quantity(fitted('contact_radius', history), 'm')}")
+            parts.append(" ".join(contact_size(history)).removeprefix("contact "))
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
-    parts.append(halved(history))
+    parts.append(parts_of(history))
     if not short:
         parts.append(quantity(history["seconds"], "s", 3))
     return "  ".join(part for part in parts if part)
 
 
 def step_rows(history: History) -> list[Row]:
-    """Return what a load step came to, with its estimated errors and residuals."""
+    """Return rows of a table of a load step, with estimated errors and residuals."""
     rows = [
         (spelled(name), load_or_motion(name, history) + error_of(name, history))
         for name in worth_showing([history])
     ]
     rows += [
-        (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
+        contact_size(history)
+        if name == "contact_radius"
+        else (spelled(name), quantity(fitted(name, history), VARIABLES[name].units) + error_of(name, history))
         for name in SUMMARY
         if name in history
     ]
@@ -138,31 +172,135 @@ def _stick(history: History) -> str:
     if not history["stick_area"]:
         return "nowhere"
     center = [float(history[f"stick_center_{axis}"]) for axis in "xy"]
-    near = 1e-6 * history["contact_radius"]  # as good as zero
+    near = 1e-6 * history["contact_radius"]  # rounding errors
     place = ", ".join(quantity(0.0 if abs(value) < near else value, "m") for value in center)
     return f"{stick_share(history)} of the contact area, about ({place})"
 
 
 def _work(history: History) -> str:
-    parts = f"{halved(history)}, " if halved(history) else ""
+    parts = f"{parts_of(history)}, " if parts_of(history) else ""
     return (
         f"{history['sweeps']} iterations, {parts}{history['operator_applications']:.3g} operator "
         f"applications, {quantity(history['seconds'], 's', 3)}"
     )
 
 
+# --- segments and cycles ------------------------------------------------------------------------------------
+
+
+def ends_of_segments(histories: Sequence[History]) -> list[int]:
+    """Return the indices of the last steps of the segments."""
+    segments = [int(history.get("segment", 1)) for history in histories]
+    changes = [k for k, (one, other) in enumerate(itertools.pairwise(segments)) if one != other]
+    return [*changes, len(segments) - 1]
+
+
+def some_steps(histories: Sequence[History], most: int) -> list[int]:
+    """Return the indices of some steps of a long history: ends of segments, peaks, others evenly."""
+    names = [*worth_showing(histories), "max_pressure"]
+    turns = {place for name in names for place in turning_points(_column(histories, name))}
+    kept = sorted({*ends_of_segments(histories), *turns})
+    others = [k for k in range(len(histories)) if k not in kept]
+    spare = most - len(kept)
+    if spare < 0:
+        return [kept[(k + 1) * len(kept) // most - 1] for k in range(most)]
+    return sorted([*kept, *{others[k * len(others) // spare] for k in range(spare) if others}])
+
+
+def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Return the histories of motion and load of each kind of loading that is more than noise, shear first.
+
+    Shear is along the direction of the largest tangential load.
+    """
+    names, found = worth_showing(histories), {}
+    if "tangential_load_x" in histories[0]:
+        load, shift = (
+            np.stack([_column(histories, f"{name}_{axis}") for axis in "xy"])
+            for name in ("tangential_load", "shift")
+        )
+        direction = line_of(load, _NOTICED * float(_column(histories, "normal_load").max()), np.inf)
+        if direction is not None:
+            found["shear"] = np.array(direction) @ shift, np.array(direction) @ load
+    if "torque" in names:
+        found["torsion"] = _column(histories, "twist"), _column(histories, "torque")
+    return {**found, "normal": (_column(histories, "approach"), _column(histories, "normal_load"))}
+
+
+def segments(histories: Sequence[History]) -> list[dict[str, Any]]:
+    """Return number, label, first and last step and, with friction, dissipated energy (J) of each segment."""
+    ends, rows = ends_of_segments(histories), []
+    for number, (before, end) in enumerate(itertools.pairwise([-1, *ends]), start=1):
+        about = {"segment": number, "label": str(histories[end].get("label", ""))}
+        rows.append({**about, **_span(histories, before, end)})
+    return rows
+
+
+def stages(histories: Sequence[History]) -> list[Stage]:
+    """Return segment, label and loads, as far as they are more than noise, of each load step."""
+    forces = {force for force, _ in LOADS.values()}
+    names = [*(name for name in worth_showing(histories) if name in forces), *BULK_STRESS]
+    return [
+        (int(h.get("segment", 1)), str(h.get("label", "")), {n: float(h[n]) for n in names if n in h})
+        for h in histories
+    ]
+
+
+def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
+    """Return the closed cycles of a load history with friction, of the first of `loops` that has any.
+
+    A cycle goes from one turning point of the motion to the next but one. Besides number, kind of loading,
+    first and last step and dissipated energy (J) it has the area (J) of the loop of the load over its motion.
+    """
+    for kind, (motion, load) in loops(histories).items() if is_frictional(histories[-1]) else ():
+        if found := cycles_of(motion, load):
+            return [
+                {"cycle": number, "loading": kind, **_span(histories, first, last), "loop_area": area}
+                for number, (first, last, area) in enumerate(found, start=1)
+            ]
+    return []
+
+
+def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row]]:
+    """Return headers and rows of the dissipated energy of segments and cycles; no rows for one segment."""
+    headers = ("", "label", "steps", "dissipated energy", "area of the loop")
+    parts, loops = segments(histories), cycles(histories)
+    if len(parts) < 2 or not is_frictional(histories[-1]):
+        return headers, []
+    named = [(f"segment {row['segment']}", row["label"], row) for row in parts[-most:]]
+    named += [(f"cycle {row['cycle']}", row["loading"], row) for row in loops[-most:]]
+    shown, rows = 5 if loops else 4, []
+    for name, words, row in named:
+        area = quantity(row["loop_area"], "J") if "loop_area" in row else ""
+        steps = f"{row['first_step']} to {row['last_step']}"
+        rows.append((name, words, steps, quantity(row["dissipated_energy"], "J"), area)[:shown])
+    return headers[:shown], rows
+
+
+def _span(histories: Sequence[History], before: int, end: int) -> dict[str, Any]:
+    """Return first and last step of a part of the history, and the energy dissipated in it."""
+    span: dict[str, Any] = {"first_step": before + 2, "last_step": end + 1}
+    if is_frictional(histories[end]):
+        start = float(histories[before]["dissipated_energy"]) if before >= 0 else 0.0
+        span["dissipated_energy"] = float(histories[end]["dissipated_energy"]) - start
+    return span
+
+
+def _column(histories: Sequence[History], name: str) -> NDArray[np.float64]:
+    return np.array([float(history[name]) for history in histories])
+
+
 # --- remarks ------------------------------------------------------------------------------------------------
 
 
 def remarks(histories: Sequence[History], parameters: History) -> list[str]:
-    """Return sentences about the load steps of a run; none if there is nothing to say.
+    """Return sentences on the solution of the load steps of a run.
 
     Parameters
     ----------
     histories : sequence of mapping
         History of each load step, from the first on.
     parameters : mapping
-        How they were solved: what `hexcontact.solve.parameters_of` returns, or the attributes of a result.
+        Parameters of the run, `hexcontact.problem.overview.parameters_of`, or attributes of the result.
     """
     tolerance = float(parameters.get("tolerance", 0.0))
     static = parameters.get("algorithm") == "static"
@@ -173,16 +311,18 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
     ]
     in_parts = [k for k in cold if histories[k - 1]["residual_tangential"] > tolerance]
     sentences = [
+        *str(parameters.get("warnings", "")).splitlines(),
         unasked_path(in_parts, in_parts=True),
         unasked_path([k for k in cold if k not in in_parts], in_parts=False),
         halved_steps(histories, tolerance),
+        adaptive_steps(histories, tolerance),
         limited_steps(histories, float(parameters.get("step_tolerance", 0.0))),
     ]
     return [sentence for sentence in sentences if sentence]
 
 
 def unasked_path(numbers: Sequence[int], in_parts: bool) -> str:
-    """Say where halved steps come from that begin without contact, or are static; empty if there are none."""
+    """Describe the path to halved steps that begin without contact, or are static; empty without any."""
     if not numbers:
         return ""
     several, steps = len(numbers) > 1, _steps(list(map(str, numbers)))
@@ -199,22 +339,33 @@ def unasked_path(numbers: Sequence[int], in_parts: bool) -> str:
 
 
 def halved_steps(histories: Sequence[History], tolerance: float) -> str:
-    """Say which load steps were halved, and what their record is; empty if none was."""
+    """Describe halved load steps and their records; empty without any."""
     cut = {number: history for number, history in enumerate(histories, start=1) if history.get("cuts")}
     if not cut:
         return ""
     named = _steps([f"{number} ({halved(history)})" for number, history in cut.items()])
-    largest = max(float(history["residual_tangential"]) for history in cut.values())
-    record = "as they are recorded they fulfil the conditions all the same"
-    if largest > tolerance:
-        record = (
-            f"each part met solver.tolerance; R_t is of whole steps as they are recorded, up to {largest:.1e}"
-        )
+    record = _of_whole_steps(cut.values(), tolerance)
+    record = record or "as they are recorded they fulfil the conditions all the same"
     return f"{len(cut)} of {len(histories)} load steps did not converge at once: {named}; {record}"
 
 
+def adaptive_steps(histories: Sequence[History], tolerance: float) -> str:
+    """Describe the records of adaptive load steps; empty if these fulfil the conditions."""
+    in_two = [history for history in histories if in_halves(history)]
+    record = _of_whole_steps(in_two, tolerance)
+    return record and f"{len(in_two)} of {len(histories)} load steps were solved in two halves; {record}"
+
+
+def _of_whole_steps(histories: Iterable[History], tolerance: float) -> str:
+    """Describe R_t of steps that were solved in parts; empty if it is within the tolerance."""
+    largest = max((float(history["residual_tangential"]) for history in histories), default=0.0)
+    if largest <= tolerance:
+        return ""
+    return f"each part met solver.tolerance; R_t is of whole steps as they are recorded, up to {largest:.1e}"
+
+
 def limited_steps(histories: Sequence[History], tolerance: float) -> str:
-    """Say which adaptive load steps missed their tolerance; empty if none did."""
+    """Describe adaptive load steps that missed their tolerance; empty without any."""
     missed = [f"{k}" for k, history in enumerate(histories, start=1) if history.get("step_limited") == 1]
     if not missed:
         return ""

@@ -1,4 +1,4 @@
-"""Tables and small pictures of results that notebooks and terminals show."""
+"""Tables and small pictures of results for notebooks and terminals."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..text import Row, html_table, quantity, visible
 from ..variables import spelled
 from .history import step_rows
@@ -25,7 +25,7 @@ _PIXELS = 240  # of the longer side of a picture
 
 
 def result_header(dataset: xarray.Dataset, path: str) -> str:
-    """Return what a result is of: title, file, how much of it there is."""
+    """Return the header of a result: title, file, steps, nodes, spacing."""
     sizes, attributes = dataset.sizes, dataset.attrs
     steps = f"{sizes['step']} load step{'s' * (sizes['step'] != 1)}"
     if not attributes.get("complete", True):
@@ -39,12 +39,12 @@ def result_header(dataset: xarray.Dataset, path: str) -> str:
 
 
 def result_rows(dataset: xarray.Dataset) -> list[Row]:
-    """Return what the last step of a result came to."""
+    """Return rows of a table of the last step of a result."""
     last = dataset.isel(step=-1)
     history = {name: last[name].item() for name in history_of(dataset)}
     try:
         return list(step_rows(history))
-    except KeyError:  # a result that was put together by hand, of some quantities
+    except KeyError:  # a data set with some quantities only
         return [(spelled(name), f"{value}") for name, value in history.items()]
 
 
@@ -52,7 +52,8 @@ def result_html(dataset: xarray.Dataset, path: str, quantities: str) -> str:
     """Return the last step of a result as a table beside maps of it; `quantities` (HTML) unfold below."""
     title, _, about = result_header(dataset, path).partition("\n")
     last, stopped = f"Load step {int(dataset['step'][-1])}", dataset.attrs.get("stopped")
-    note = about.strip() + (f"; {stopped}" if stopped else "")
+    doubts = [f"warning: {line}" for line in str(dataset.attrs.get("warnings", "")).splitlines()]
+    note = "; ".join([about.strip(), *([stopped] if stopped else []), *doubts])
     table = html_table(f"{title}: {last}", ("", ""), result_rows(dataset), note)
     below = f"<details><summary>all quantities</summary>{quantities}</details>"
     row = "display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start"
@@ -60,7 +61,7 @@ def result_html(dataset: xarray.Dataset, path: str, quantities: str) -> str:
 
 
 def _pictures(dataset: xarray.Dataset) -> Iterable[str]:
-    """Yield maps of the last step: pressure, and where there is friction the zones."""
+    """Yield maps of the last step: pressure, and zones of a contact with friction."""
     try:
         view = StepView(dataset, -1)
     except ValueError:  # not kept
@@ -73,12 +74,12 @@ def _pictures(dataset: xarray.Dataset) -> Iterable[str]:
     shades = np.array([_rgb(color) for color in _SHADES])
     share, places = values / largest, np.linspace(0.0, 1.0, len(shades))
     colors = np.stack([np.interp(share, places, shades[:, k]) for k in range(3)], axis=-1)
-    colors[values <= 0.0] = 255.0
+    contact = view.touches(*plane.points)
+    colors[~contact] = 255.0
     width = quantity(limits[1] - limits[0], "m", 3)
     yield _figure(colors, f"pressure, up to {quantity(largest, 'Pa')}; {width} wide")
-    if view.friction and "zone" in view.data:
-        row, col, inside = plane.nearest(view)
-        zone = np.where(inside, np.maximum(view.data["zone"].values[row, col], 0), 0)
+    if view.friction and view.has("zone"):
+        zone = np.where(contact, np.where(view.sticks(*plane.points), 1, 2), 0)
         zones = np.array([_rgb(color) for color in _ZONES])[zone]
         words = zip(("stick", "slip"), _ZONES[1:], strict=True)
         yield _figure(zones, ", ".join(f'<span style="color:{c}">&#9632;</span> {word}' for word, c in words))
@@ -88,7 +89,7 @@ def _rgb(color: str) -> list[int]:
     return [int(color[k : k + 2], 16) for k in (1, 3, 5)]
 
 
-def _figure(colors: NDArray[np.float64], caption: str) -> str:
+def _figure(colors: Array, caption: str) -> str:
     """Return a picture with its caption (HTML)."""
     picture = png_of(np.round(colors).astype("u1"))
     rows, cols = colors.shape[:2]

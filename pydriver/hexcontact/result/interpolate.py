@@ -1,22 +1,24 @@
 """Fields between the nodes: at any point, and along lines.
 
 A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
-a polygon, whose corners lie where the line crosses the edges of triangles; nothing is smoothed. In
-`PressureField` alone the pressure ends at the edge of the contact, like a square root.
+a polygon with corners at the edges of triangles. Only the pressure of `PressureField` ends at the edge of the
+contact, like a square root.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Array
 from ..core.edges import ContactEdges
-from ..core.interpolation import linear, nearest, pressure_between
+from ..core.interpolation import crossings, linear, nearest, pressure_between, section_ends
+from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..text import did_you_mean
 from ..variables import NOT_KEPT, VARIABLES
@@ -24,32 +26,19 @@ from ..variables import NOT_KEPT, VARIABLES
 if TYPE_CHECKING:
     import xarray
 
-    from ..core.lattice import Lattice
-
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 Fields = Mapping[str, NDArray[Any]]
 
-_MARGIN = 0.15  # of a section on both sides, in widths of the contact
-_SAME = 1e-9  # spacings between corners that are one
-
-
-def first_node(lattice: Lattice) -> Point:
-    """Return the position (m) of the first node of a window."""
-    alone = replace(lattice, n_row=1, n_col=1)
-    return alone.x.item(), alone.y.item()
-
 
 def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike, y: ArrayLike) -> Array:
-    """Return a field at points of the plane, as the solution means it: linear on the triangles.
+    """Return a field at points of the plane, linear on the triangles of the lattice like the solution.
 
     Parameters
     ----------
     lattice : Lattice
         The window.
     name : str
-        Name of the field, see `hexcontact.variables`. The zone has no values in between: that of the nearest
-        node is returned.
+        Name of the field, see `hexcontact.variables`. The zone at a point is that of the nearest node.
     values : ndarray, (n_row, n_col)
         Its values at the nodes.
     x, y : array_like
@@ -63,7 +52,7 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     variable = VARIABLES[name]
     between = nearest if variable.flags else linear
-    return between(values, lattice.basis, first_node(lattice), x, y, variable.padding)
+    return between(values, lattice.basis, lattice.start, x, y, variable.padding)
 
 
 class PressureField:
@@ -75,7 +64,7 @@ class PressureField:
     Parameters
     ----------
     pressure, gap : ndarray, shape (n_row, n_col)
-        Contact pressure (Pa) and gap (m) at the nodes; the gap is NaN where nothing can touch.
+        Contact pressure (Pa) and gap (m) at the nodes; the gap is NaN where the bodies cannot touch.
     basis : ndarray, shape (2, 2)
         Basis vectors of the lattice as rows, m.
     start : tuple of float
@@ -87,7 +76,7 @@ class PressureField:
         self._squares = ContactEdges(pressure, gap, pressure > 0.0, np.isfinite(gap), basis, start).squares()
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Return the pressure (Pa) at some points (m), in their shape; 0 outside the window."""
+        """Return the pressure (Pa) at points (m), in their shape; 0 outside the window."""
         return pressure_between(self._pressure, self._squares, self._basis, self._start, x, y)
 
 
@@ -96,16 +85,16 @@ class PressureField:
 
 @dataclass(frozen=True)
 class Line:
-    """A piece of a straight line in the plane.
+    """A straight line between two points of the plane.
 
     Attributes
     ----------
     start : tuple of float
-        Where it starts, m.
+        First point, m.
     end : tuple of float
-        Where it ends, m.
+        Last point, m.
     zero : float
-        Distance (m) from the start at which distances along the line are counted as 0.
+        Distance (m) from the start at which distances along the line are 0.
     """
 
     start: Point
@@ -130,21 +119,9 @@ class Line:
         Parameters
         ----------
         lattice : Lattice
-            The lattice; its edges count outside of its window too.
+            The lattice, also outside of its window.
         """
-        origin = np.asarray(lattice.origin)
-        ends = (np.array([self.start, self.end], dtype=float) - origin) @ np.linalg.inv(lattice.basis)
-        shares = []
-        for first, last in (*ends.T, ends.sum(axis=1)):  # columns, rows, and the edges between them
-            low, high = sorted((first, last))
-            if high - low > _SAME:
-                lines = np.arange(math.ceil(low), math.floor(high) + 1)
-                shares.append((lines - first) / (last - first))
-        share = np.unique(np.concatenate(shares))
-        same = _SAME * lattice.spacing / self.length
-        inside = share[(share > same) & (share < 1.0 - same)]
-        inside = inside[np.diff(inside, prepend=-1.0) > same]
-        return np.concatenate([[0.0], inside, [1.0]]) * self.length
+        return crossings(lattice, self.start, self.end)
 
     def points(self, distance: Array) -> tuple[Array, Array]:
         """Return the coordinates (m) of points at some distances (m) from the start."""
@@ -171,38 +148,26 @@ def section_line(lattice: Lattice, pressure: Array, angle: float, through: Point
     DeckError
         If nothing is in contact.
     """
-    contact = pressure > 0.0
-    if not contact.any():
-        raise DeckError("there is no contact in this load step, so it has no section; give start and end")
-    x, y = lattice.x, lattice.y
-    if through is None:
-        center = np.average([x[contact], y[contact]], axis=1, weights=pressure[contact])
-        node = np.argmin(np.hypot(x - center[0], y - center[1]))
-        through = float(x.flat[node]), float(y.flat[node])
-    way = math.cos(angle), math.sin(angle)
-    along = (x[contact] - through[0]) * way[0] + (y[contact] - through[1]) * way[1]
-    margin = max(_MARGIN * float(np.ptp(along)), 2.0 * lattice.spacing)
-    first, last = float(along.min()) - margin, float(along.max()) + margin
-    ends = [(through[0] + place * way[0], through[1] + place * way[1]) for place in (first, last)]
-    return Line(ends[0], ends[1], zero=-first)
+    start, end, zero = section_ends(lattice, pressure, angle, through)
+    return Line(start, end, zero)
 
 
 def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, NDArray[Any]]:
-    """Return the named fields of a load step; without names, all that the output has of it.
+    """Return the named fields of a load step; without names, all of the output.
 
     Parameters
     ----------
     names : sequence of str
         Names of fields.
     fields : mapping of str to array_like
-        The fields that there are.
+        The fields of the step.
     step : int
         Number of the step, for messages.
 
     Raises
     ------
     DeckError
-        If there is no such field, or it was not kept.
+        If there is no such field in the output.
     """
     for name in names:
         if name not in fields:
@@ -221,7 +186,7 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
 
 
 def is_kept(values: NDArray[Any]) -> bool:
-    """Tell whether the output holds a field of a step, by its values."""
+    """Test by its values whether the output has a field of a step."""
     return bool((values != NOT_KEPT).any() if values.dtype.kind == "i" else np.isfinite(values).any())
 
 
@@ -239,10 +204,10 @@ def profile(
     line : Line
         The line.
     points : int, optional
-        Number of points, evenly spaced. By default the points are the corners of the polygon that a field is
-        along the line, so that joining them by straight lines is exact.
+        Number of points, evenly spaced. By default the points are the corners of the polygon of a field along
+        the line, so that straight lines between them are exact.
     **attributes
-        What the data set says about itself.
+        Attributes of the data set.
 
     Returns
     -------

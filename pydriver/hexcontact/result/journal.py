@@ -1,8 +1,8 @@
 """The journal of a run: its finished load steps, each in a file of its own beside the output.
 
-A record is a zip archive of the fields as numpy writes them, uncompressed, and a text (JSON) with all the
-rest. It is written and read several times faster than a netCDF file with that many variables, checksums cover
-all of it, and damage never leads further than to an error.
+A record is an uncompressed zip archive of the fields in the format of numpy, and a text (JSON) with all other
+data. It is written and read several times faster than a netCDF file of as many variables; checksums cover all
+of it, so that damage is an error.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from .result import Result
 from .step import Step
 
 SUFFIX = ".npz"
-STOPPED = "stopped.txt"  # why the run ended before its time
-_LONGEST_REASON = 10_000  # bytes of it that are read
+STOPPED = "stopped.txt"  # the reason of an early end
+_LONGEST_REASON = 10_000  # bytes of it
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _TEMPORARY = ".tmp"
 VERSION = 1
-_ABOUT = "about"  # the text, among the arrays
-_COMPANION = "companion_"  # before the names of the fields of a second solution
-_CLOSE = 1e-9  # relative difference of moduli that are the same
-PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that decide what is solved
-_NOT_PHYSICS = ("title", "solver", "output")  # tables of a deck that do not
-_OF_NODES = {"spacing", "origin"}  # keys of [grid], which a session writes when a load is added
-_OF_SESSIONS = ("grid", "load", "accuracy")  # tables of a deck that change then
+_ABOUT = "about"  # name of the text among the arrays
+_COMPANION = "companion_"  # prefix of the names of fields of a second solution
+_CLOSE = 1e-9  # relative difference of equal moduli
+PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that belong to the problem
+_NOT_PHYSICS = ("title", "solver", "output", "stress")  # tables of a deck that do not
+_OF_NODES = {"spacing", "origin"}  # keys of [grid] that a session writes with a load
+_OF_SESSIONS = ("grid", "load", "accuracy")  # tables of a deck that it changes
 
 
 def journal_of(path: Path) -> Path:
@@ -56,11 +56,13 @@ class Journal:
     Parameters
     ----------
     folder : Path
-        The folder; one that is not there is an empty journal.
+        The folder; a missing one is an empty journal.
+    companions : bool
+        Read the companions of steps, too.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, companions: bool = False) -> None:
+        self.folder, self._companions = folder, companions
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
         unfinished = [name for name in names if _is_temporary(name, folder)]
@@ -71,12 +73,12 @@ class Journal:
         return len(self.records)
 
     def __iter__(self) -> Iterator[Step]:
-        """Read the steps; DeckError if one is missing between others, damaged or of another run."""
+        """Read the steps; DeckError if one is missing, damaged or of another run."""
         before = None
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
                 raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
-            metadata, step = read_record(record)
+            metadata, step = read_record(record, self._companions)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
             with reading(record, "a record of a journal"):
@@ -87,22 +89,22 @@ class Journal:
 
     @property
     def metadata(self) -> Metadata:
-        """Where the steps come from, as the last of them tells."""
-        return read_record(self.records[-1])[0]
+        """Metadata of the run in the last record."""
+        return read_record(self.records[-1], companion=False)[0]
 
     @property
     def stopped(self) -> str:
-        """Why the run ended before its time; empty if it goes on, was killed or has finished."""
+        """Reason of an early end; empty if the run goes on, was killed or has finished."""
         return beginning(self.folder / STOPPED, _LONGEST_REASON).decode(errors="replace")
 
     @property
     def complete(self) -> bool:
-        """Whether all planned steps are there."""
-        metadata, last = read_record(self.records[-1])
+        """Whether it has all planned steps."""
+        metadata, last = read_record(self.records[-1], companion=False)
         return len(self) == metadata.planned_steps or last.done == 1.0
 
     def result(self, path: Path) -> Result:
-        """All finished steps as a result in memory; `path` is what the user calls it."""
+        """Return all finished steps as a result in memory; `path` is its name."""
         with reading(self.folder, "a journal"):
             dataset = assemble(self.metadata, self, self.complete)
         if self.stopped:
@@ -116,23 +118,23 @@ class Journal:
 
     @property
     def files(self) -> list[Path]:
-        """The records, why they are not all, and what an interrupted write left."""
+        """The records, the reason of an early end, and remains of an interrupted write."""
         return [*self.records, *self._besides]
 
     def remove(self) -> None:
-        """Delete all `files`; the lock stays."""
+        """Delete all `files`, but not the lock."""
         for path in self.records:
             path.unlink(missing_ok=True)
         self.tidy()
 
     def tidy(self) -> None:
-        """Delete why the steps are not all, and what an interrupted write left."""
+        """Delete the reason of an early end, and remains of an interrupted write."""
         for path in Journal(self.folder)._besides:
             path.unlink(missing_ok=True)
 
 
 def _is_temporary(name: str, folder: Path) -> bool:
-    """Tell whether a run writes a record, or its output, under this name before it is whole."""
+    """Test whether a run writes a record, or its output, under this temporary name."""
     stem = name.removesuffix(_TEMPORARY)
     return stem != name and bool(_RECORD.fullmatch(stem) or stem == folder.name.removesuffix(".d"))
 
@@ -146,9 +148,9 @@ def write_record(path: Path, metadata: Metadata, step: Step) -> None:
     Parameters
     ----------
     path : Path
-        File to write; replaced if it is there.
+        File to write or replace.
     metadata : Metadata
-        Where the step comes from.
+        Metadata of the run.
     step : Step
         The step.
 
@@ -176,15 +178,15 @@ def write_record(path: Path, metadata: Metadata, step: Step) -> None:
         np.savez(file, **{_ABOUT: np.frombuffer(text, "u1")}, **fields)  # type: ignore[arg-type]
 
 
-def read_record(path: Path) -> tuple[Metadata, Step]:
-    """Read a record.
+def read_record(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
+    """Read a record, with its companion or without.
 
     Raises
     ------
     DeckError
         If the file is damaged or of another version.
     FileNotFoundError
-        If it is not there.
+        If it is missing.
     """
     with reading(path, "a record of a journal"):
         with zipfile.ZipFile(path) as file:
@@ -195,22 +197,27 @@ def read_record(path: Path) -> tuple[Metadata, Step]:
                     f"layout {about['journal_version']}; this version reads layout {VERSION}"
                 )
             fields = {name: _array(file, name) for name in about["fields"]}
-            companion = {name: _array(file, _COMPANION + name) for name in about.get("companion", ())}
+            beside = about.get("companion", ())
+            fields_beside = {name: _array(file, _COMPANION + name) for name in beside if companion}
         origin = tuple(about["lattice"].pop("origin"))
         lattice = Lattice(**about["lattice"], origin=origin)
         metadata = Metadata.from_plain(about["metadata"])
         step = Step(
             *(about["index"], lattice, fields, about["history"]),
-            companion=companion,
+            companion=fields_beside,
             control=about.get("control", {}),
         )
-        if fault := fault_of_record(metadata, step):
+        fault = fault_of_record(metadata, step)
+        adaptive = step.control and "until" not in step.control
+        if not fault and adaptive and bool(beside) != isinstance(step.control.get("companion"), dict):
+            fault = "its second solution is not whole"
+        if fault:
             raise DeckError(f"{path} is damaged: {fault}")
         return metadata, step
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """Return an array of a record; zipfile compares the checksum at its end."""
+    """Return an array of a record; zipfile compares its checksum at the end."""
     with archive.open(f"{name}.npy") as member:
         values: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
         if member.read(1):
@@ -219,15 +226,15 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
 
 
 def begins_like_record(path: Path) -> bool:
-    """Tell whether a file begins like a record, be it damaged."""
+    """Test whether a file begins like a record, which may be damaged."""
     head = beginning(path, 30 + len(_ABOUT))
     return head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode()
 
 
 def fault_of_sequence(before: Metadata, after: Metadata) -> str:
-    """Return why a record cannot follow another of the same journal; empty if it can.
+    """Return the reason why a record cannot follow another of the same journal; empty if it can.
 
-    Tolerances may change when a run goes on, and a session adds to the loads.
+    Tolerances may change when a run is resumed, and a session adds loads.
     """
     for name in ("run", "created", "title", "version", "fields", "every"):
         if getattr(before, name) != getattr(after, name):
@@ -247,13 +254,14 @@ def fault_of_sequence(before: Metadata, after: Metadata) -> str:
 
 
 def physics(deck: str) -> dict[str, Any]:
-    """Return what a deck says about the problem, not about how it is solved and what is kept."""
+    """Return the tables of a deck that belong to the problem, without those of solution and output."""
     tables = tomllib.loads(deck)
     solver = {key: value for key, value in tables.get("solver", {}).items() if key in PHYSICS}
     return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Compare what describes a case; another version may round otherwise."""
+    """Compare parameters of a case; numbers may differ by rounding."""
     numbers = isinstance(one, float) and isinstance(other, float)
-    return bool(one == other or (numbers and math.isclose(one, other, rel_tol=_CLOSE)))
+    close = numbers and (math.isclose(one, other, rel_tol=_CLOSE) or (math.isnan(one) and math.isnan(other)))
+    return bool(one == other or close)

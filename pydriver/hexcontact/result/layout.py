@@ -1,7 +1,7 @@
-"""How the load steps of a run are laid out in a data set or a file.
+"""Layout of the load steps of a run in a data set or a file.
 
-The quantities are those of `hexcontact.variables`. `Layout` turns a run into dimensions, coordinates
-and attributes (CF-1.11); `assemble` fills an `xarray.Dataset` with it, `hexcontact.result.netcdf` a file.
+The quantities are those of `hexcontact.variables`. `Layout` has dimensions, coordinates and attributes
+(CF-1.11) of a run; `assemble` fills an `xarray.Dataset`, `hexcontact.result.netcdf` a file.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..core.lattice import Lattice
-from ..variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES
+from ..text import did_you_mean, html_table, text_table
+from ..variables import CONVENTIONS, FIELDS, SCHEMA_VERSION, VARIABLES, Variable
 from .step import Step
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def now() -> str:
 
 @dataclass(frozen=True)
 class Metadata:
-    """What a result says about the run it comes from.
+    """Data about a run in its result.
 
     Attributes
     ----------
@@ -48,23 +49,23 @@ class Metadata:
     deck : str
         The whole deck as text; empty for a case that was built in Python.
     fields : tuple of str
-        Fields the output keeps; empty: all that there are.
+        Fields of the output; empty: all.
     every : int
-        The output keeps the fields of each step whose number is a multiple of this, and of the last one.
+        The output has the fields of each step whose number is a multiple of this, and of the last one.
     planned_steps : int
-        Load steps the whole run has; 0 while adaptive steps leave it open.
+        Load steps of the whole run; 0 while it is open.
     parameters : mapping of str to number or text
-        What else describes the case: materials, tolerance, ...
+        Materials, tolerance and other parameters of the case.
     run : str
-        A name of this run that no other run has.
+        Unique name of the run.
     created : str
         Start of the run, UTC.
     version : str
-        Version of the program that started it.
+        Version of the program at its start.
     resumed : tuple of str
         A line for each time that the run was resumed.
     deck_file : str
-        The file that the deck was read from, which its relative file names belong to; not in the output.
+        The file of the deck, to which its file names are relative; not in the output.
     """
 
     title: str = ""
@@ -81,11 +82,11 @@ class Metadata:
 
     @property
     def story(self) -> str:
-        """When the run was started and resumed, a line for each."""
+        """Times at which the run was started and resumed, a line for each."""
         return "\n".join([f"{self.created} started by hexcontact {self.version}", *self.resumed])
 
     def attributes(self) -> dict[str, Any]:
-        """Global attributes of a file."""
+        """Return the global attributes of a file."""
         own = {
             "title": self.title,
             "output_fields": " ".join(self.fields),
@@ -99,18 +100,18 @@ class Metadata:
 
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
-        """Return what `dataclasses.asdict` had, from JSON."""
+        """Return the metadata of what `dataclasses.asdict` gave, after JSON."""
         tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
         return cls(**{**values, **tuples})
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:
-        """Read them back.
+        """Return the metadata of the attributes of a file.
 
         Raises
         ------
         KeyError, ValueError
-            If one is missing or not what it should be.
+            If one is missing or wrong.
         """
         return cls(
             title=str(attributes["title"]),
@@ -132,11 +133,11 @@ class Layout:
     Parameters
     ----------
     metadata : Metadata
-        Where the result comes from, and which fields it keeps.
+        Metadata of the run.
     steps : sequence of Step
         All its steps (heads are enough), in order.
     trials : mapping of str to sequence, optional
-        What was solved on other lattices, by the names of `hexcontact.variables`: values by trial.
+        Solutions on other lattices: values by trial, by the names of `hexcontact.variables`.
     """
 
     def __init__(
@@ -160,14 +161,14 @@ class Layout:
             self.sizes["trial"] = len(next(iter(self.trials.values())))
 
     def attributes_of(self, name: str) -> dict[str, Any]:
-        """CF attributes of a variable; those with an estimated error name it."""
+        """Return the CF attributes of a variable, with the name of its estimated error."""
         attributes = VARIABLES[name].attributes
         if (error := f"{name}_error") in self.variables:
             attributes["ancillary_variables"] = error
         return attributes
 
     def coordinates(self) -> dict[str, NDArray[Any]]:
-        """Values of the coordinates."""
+        """Return the values of the coordinates."""
         return {
             "step": np.array([step.number for step in self.steps], dtype="i4"),
             "row": np.asarray(self.window.rows, dtype="i4"),
@@ -177,7 +178,7 @@ class Layout:
         }
 
     def attributes(self, complete: bool) -> dict[str, Any]:
-        """Global attributes; `complete` says whether all planned steps are there."""
+        """Return the global attributes; `complete`: the result has all planned steps."""
         window = self.window
         return {
             "Conventions": CONVENTIONS,
@@ -193,17 +194,17 @@ class Layout:
         }
 
     def keeps(self, position: int) -> bool:
-        """Whether the fields of the step at `position` are kept."""
+        """Test whether the output has the fields of the step at `position`."""
         last = position == len(self.steps) - 1
         return last or self.steps[position].number % self.metadata.every == 0
 
     @property
     def fields(self) -> list[str]:
-        """Names of what has a value at every node."""
+        """Names of the quantities with a value at every node."""
         return [name for name, variable in self.variables.items() if variable.dims[-2:] == ("row", "col")]
 
     def histories(self) -> dict[str, NDArray[Any]]:
-        """Values of what has one value by step; texts as objects."""
+        """Return the values of quantities with one value by step; texts as objects."""
         return {
             name: np.array(
                 [step.history.get(name, "" if v.dtype == "str" else v.missing) for step in self.steps],
@@ -214,7 +215,7 @@ class Layout:
         }
 
     def field(self, name: str, position: int, step: Step) -> NDArray[Any]:
-        """Values of a field in one step, padded to the whole window."""
+        """Return a field in one step, padded to the whole window."""
         if self.keeps(position) and name in step.fields:
             return self.padded(name, step)
         variable = self.variables[name]
@@ -233,13 +234,13 @@ class Layout:
         return np.asarray(step.lattice.embed(values, self.window, variable.padding), dtype=variable.dtype)
 
     def initial_gap(self, known: NDArray[Any] | None, step: Step) -> NDArray[Any]:
-        """Return the initial gap on the whole window: what is `known` so far, completed by `step`."""
+        """Return the initial gap on the whole window: the `known` part, completed by `step`."""
         values = self.padded("initial_gap", step)
         return values if known is None else np.where(np.isnan(known), values, known)
 
 
 def _union(windows: Sequence[Lattice]) -> Lattice:
-    """Return the smallest window that holds all `windows` of one lattice."""
+    """Return the smallest window about `windows` of one lattice."""
     first = windows[0]
     if any((w.spacing, w.origin) != (first.spacing, first.origin) for w in windows):
         raise ValueError("the steps of a result share one lattice: spacing and origin must not change")
@@ -255,14 +256,14 @@ def _union(windows: Sequence[Lattice]) -> Lattice:
 
 
 def window_of(attributes: Mapping[str, Any], rows: NDArray[Any], cols: NDArray[Any]) -> Lattice:
-    """Return the lattice window that the attributes and index coordinates of a file describe."""
+    """Return the lattice window of the attributes and index coordinates of a file."""
     x0, y0 = np.asarray(attributes.get("lattice_origin", (0.0, 0.0)), dtype=float).tolist()
     spacing = float(attributes["lattice_spacing"])
     return Lattice(spacing, int(rows[0]), int(cols[0]), len(rows), len(cols), (x0, y0))
 
 
 def lattice_of(dataset: xarray.Dataset) -> Lattice:
-    """Return the lattice window that a result covers."""
+    """Return the lattice window of a result."""
     return window_of(dataset.attrs, dataset["row"].values, dataset["col"].values)
 
 
@@ -277,7 +278,7 @@ def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
 
 
 def history_of(dataset: xarray.Dataset) -> list[str]:
-    """Return the names of all that a result has one value of by step."""
+    """Return the names of the quantities of a result with one value by step."""
     return [str(name) for name, values in dataset.data_vars.items() if values.dims == ("step",)]
 
 
@@ -287,14 +288,14 @@ def assemble(
     complete: bool = True,
     trials: Mapping[str, Sequence[Any]] | None = None,
 ) -> xarray.Dataset:
-    """Put the steps of a run together.
+    """Return the data set of the steps of a run.
 
     Parameters
     ----------
     metadata : Metadata
-        Where the steps come from.
+        Metadata of the run.
     steps : iterable of Step
-        The finished steps in order; gone through twice, so not a generator.
+        The finished steps in order, which are read twice: no generator.
     complete : bool
         Whether these are all steps of the run.
     trials : mapping of str to sequence, optional
@@ -329,3 +330,54 @@ def assemble(
     }
     coordinates = {name: variables.pop(name) for name in COORDINATES}
     return xarray.Dataset(variables, coords=coordinates, attrs=layout.attributes(complete))
+
+
+# --- list of quantities ----------------------------------------------------------------------------------
+
+_HEADERS = ("quantity", "unit", "given", "meaning")
+_GIVEN = {
+    ("step", "row", "col"): "at each node, by step",
+    ("row", "col"): "at each node",
+    ("step",): "by step",
+}
+
+
+class Quantities(Mapping[str, Variable]):
+    """The quantities of a result by name; printed, a table.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Names, see `hexcontact.variables`.
+    """
+
+    def __init__(self, names: list[str]) -> None:
+        self._names = [name for name in VARIABLES if name in names]
+
+    def __getitem__(self, name: str) -> Variable:
+        """Return units, long_name, dims and more of a quantity."""
+        if name not in self._names:
+            raise KeyError(f"the result has no {name}{did_you_mean(name, self._names)}")
+        return VARIABLES[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return the number of quantities."""
+        return len(self._names)
+
+    def _rows(self) -> list[tuple[str, str, str, str]]:
+        return [
+            (name, v.unit.replace("m2", "m²"), _GIVEN[v.dims], v.long_name)
+            for name, v in self.items()
+            if v.dims in _GIVEN
+        ]
+
+    def __repr__(self) -> str:
+        """Return the table as text."""
+        return text_table(_HEADERS, self._rows())
+
+    def _repr_html_(self) -> str:
+        return html_table("", _HEADERS, self._rows())

@@ -1,4 +1,4 @@
-"""The triangular lattice as a mesh: its triangles, and how a netCDF file describes them (UGRID-1.0)."""
+"""The triangular lattice as a mesh: its triangles, and their description in netCDF (UGRID-1.0)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.lattice import Lattice
+
 if TYPE_CHECKING:
     import netCDF4
-
-    from ..core.lattice import Lattice
 
 NODE, FACE, CORNER = "mesh_node", "mesh_face", "mesh_corner"  # dimensions
 TOPOLOGY, FACE_NODES = "mesh", "mesh_face_nodes"
@@ -22,8 +22,7 @@ _CHUNK = 1 << 16  # triangles
 def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
     """Return the triangles between the nodes of a window.
 
-    The short diagonal halves each cell, so that all triangles are equilateral: the tractions of the solution
-    are linear on them.
+    The short diagonal halves each cell into equilateral triangles, on which tractions are linear.
 
     Parameters
     ----------
@@ -41,7 +40,7 @@ def triangles(n_row: int, n_col: int) -> NDArray[np.int32]:
 
 
 def write_mesh(file: netCDF4.Dataset, lattice: Lattice) -> None:
-    """Describe the window of a result in its file, if it is wide enough for triangles.
+    """Write the mesh of a window, unless it has one row or column only.
 
     Parameters
     ----------
@@ -88,20 +87,20 @@ def add_column(
     values: Any = None,
     **options: Any,
 ) -> netCDF4.Variable:
-    """Add a variable to a file, with its attributes and, if they are given, its values.
+    """Add a variable to a file.
 
     Parameters
     ----------
     file : netCDF4.Dataset
         File open for writing.
     name, dtype, dims
-        What it is called, its type and its dimensions.
+        Its name, type and dimensions.
     attributes : mapping
         Its attributes.
     values : array_like, optional
         Its values.
     **options
-        How it is stored, see `netCDF4.Dataset.createVariable`.
+        Options of `netCDF4.Dataset.createVariable`.
     """
     column = file.createVariable(name, dtype, dims, **options)
     column.setncatts(attributes)

@@ -1,8 +1,8 @@
-"""One result file: writing it step by step, reading it back, refusing what is damaged or foreign.
+"""Result files: writing step by step, reading, refusal of damaged and foreign files.
 
-HDF5 files may be longer than what belongs to them. After it a result holds 48 bytes, its seal: a mark, and a
-SHA-256 of the SHA-256 of each block of all that comes before. So damage is noticed before HDF5 reads it,
-wherever it is, in indices of chunks too. What rewrites the file with HDF5 takes the seal away.
+HDF5 files may have further bytes at their end. Those of a result are its seal of 48 bytes: a mark, and a
+SHA-256 of the SHA-256 of each block before it. So damage shows before HDF5 reads it, also in indices of
+chunks. A program that rewrites the file with HDF5 removes the seal.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ _BLOCK = 1 << 22  # bytes
 _HDF5 = b"\x89HDF\r\n\x1a\n\x02\x08\x08"  # version of the head, then sizes of addresses and lengths
 _END = slice(28, 36)  # in the head: the address where the file ends
 
-_netcdf = threading.Lock()  # the netCDF library must not be entered by two threads
+_netcdf = threading.Lock()  # the netCDF library is for one thread at a time
 
 
 @contextlib.contextmanager
 def _alone() -> Iterator[None]:
-    """Keep other threads out of the netCDF library, those that read through xarray too."""
+    """Keep other threads out of the netCDF library, also those that read through xarray."""
     backend = sys.modules.get("xarray.backends.netCDF4_")
     with _netcdf, getattr(backend, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
         yield
@@ -60,13 +60,13 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
     Parameters
     ----------
     path : Path
-        File to write; replaced if it is there.
+        File to write or replace.
     layout : Layout
         Layout of all the steps.
     steps : iterable of Step
-        The steps with their fields; gone through once, none is kept.
+        The steps with their fields, which are read once.
     complete : bool
-        Whether these are all steps of the run.
+        Whether they are all steps of the run.
 
     Raises
     ------
@@ -100,11 +100,11 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
 
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    """Create a file; in the end close it and add its checksum."""
+    """Create a file; at the end close it and add its checksum."""
     import netCDF4
 
     memory.give_back()
-    memory.claim(memory.WRITING)  # it crashes without
+    memory.claim(memory.WRITING)  # netCDF crashes without
     try:
         with _alone():
             file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
@@ -113,7 +113,7 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
         finally:
             with _alone():
                 file.close()
-    except RuntimeError as error:  # the HDF5 library hides the reason, a full disk mostly
+    except RuntimeError as error:  # HDF5 hides the reason, mostly a full disk
         raise OSError(None, str(error), str(path)) from error
     seal(path)
 
@@ -125,7 +125,7 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     if variable.dims[-2:] == ("row", "col"):
         sizes = [1 if dim == "step" else len(file.dimensions[dim]) for dim in variable.dims]
         options = {"compression": "zlib", "complevel": 1, "chunksizes": [min(_CHUNK, n) for n in sizes]}
-        options["fletcher32"] = True  # damage becomes an error, not wrong numbers
+        options["fletcher32"] = True  # damage is an error
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
     attributes = layout.attributes_of(name)
@@ -133,14 +133,14 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
         attributes["coordinates"] = "x y"
     column = mesh.add_column(file, name, variable.dtype, variable.dims, attributes, **options)
     if options:
-        column.set_var_chunk_cache(size=0)  # chunks are written once; HDF5 kept 64 MB of each variable
+        column.set_var_chunk_cache(size=0)  # chunks are written once; the default is 64 MB for each variable
     return column
 
 
 def _write_text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> None:
     """Write the text variable `name`.
 
-    Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
+    Characters, not netCDF strings, on which HDF5 crashes if a file is open more than once.
     """
     variable = VARIABLES[name]
     characters = np.array([text.encode() for text in texts]).view("S1").reshape(len(texts), -1)
@@ -155,6 +155,8 @@ def _write_text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> None:
 
 
 def _check_ours(attributes: dict[str, Any], path: Path) -> None:
+    if content := attributes.get("content"):
+        raise DeckError(f"{path} holds {content}, not load steps; expected the result of the run beside it")
     version = attributes.get("schema_version")
     if version is None or "hexcontact_version" not in attributes:
         raise DeckError(f"{path} was not written by hexcontact: its attributes name no schema_version")
@@ -166,40 +168,56 @@ def _check_ours(attributes: dict[str, Any], path: Path) -> None:
 
 
 def is_ours(path: Path) -> bool:
-    """Tell whether a file is a result, of whatever version, or was one before it was damaged."""
+    """Test whether a file is a result of any version, which may be damaged."""
+    return is_sealed(path) or {"schema_version", "hexcontact_version"} <= _names_of_attributes(path)
+
+
+def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
+    """Refuse to overwrite files of stresses, or other files even with `overwrite`.
+
+    Raises
+    ------
+    DeckError
+        If there is such a file.
+    """
+    for path in stresses:
+        if not overwrite and os.path.lexists(path):
+            raise DeckError(f"{path} exists already; --overwrite (overwrite=True in Python) replaces it")
+        ours = {"stress_of", "hexcontact_version"}
+        if os.path.lexists(path) and not (path.is_file() and ours <= _names_of_attributes(path)):
+            raise DeckError(
+                f"{path} does not hold stresses that hexcontact has written, so it is not overwritten; "
+                "delete it, or choose another output or name of [[stress]] or [[fatigue]]"
+            )
+
+
+def _names_of_attributes(path: Path) -> set[str]:
     import netCDF4
 
-    if is_sealed(path):
-        return True
     with contextlib.suppress(OSError, RuntimeError), _alone(), netCDF4.Dataset(path) as file:
-        return {"schema_version", "hexcontact_version"} <= set(file.ncattrs())
-    return False
-
-
-def _attributes(file: netCDF4.Dataset) -> dict[str, Any]:
-    return {name: file.getncattr(name) for name in file.ncattrs()}
+        return set(file.ncattrs())
+    return set()
 
 
 def read_output(path: Path) -> Result:
-    """Open an output file; its fields are read when they are first used.
+    """Open an output file; its fields are read at their first use.
 
-    All bytes are checked first. In a file without a checksum, of an earlier version or rewritten by another
-    program, the fields are read once to see that they can be values of a solution.
+    All bytes are checked first. In a file without a seal, of an earlier version or rewritten by another
+    program, the fields are read and checked instead.
 
     Raises
     ------
     DeckError
         If the file is damaged, of another kind or of another version.
     FileNotFoundError
-        If it is not there.
+        If it is missing.
     """
     import netCDF4
 
     with reading(path):
         sealed = check_seal(path)
     with reading(path), _alone(), netCDF4.Dataset(path) as file:
-        attributes = _attributes(file)
-        _check_ours(attributes, path)
+        _check_ours({name: file.getncattr(name) for name in file.ncattrs()}, path)
         for name in COORDINATES:
             if 0 in file[name].shape:
                 raise DeckError(f"{path} is damaged: it has no usable {name} coordinate")
@@ -209,7 +227,7 @@ def read_output(path: Path) -> Result:
     with reading(path):
         import xarray
 
-        # rows and columns say the same as the mesh, which is for other programs
+        # the mesh, for other programs, repeats rows and columns
         dataset = xarray.open_dataset(path, engine="netcdf4", drop_variables=mesh.VARIABLES)
         result = Result(dataset, str(path))
         for variable in result.dataset.variables.values():
@@ -231,31 +249,31 @@ def _digest(descriptor: int, size: int) -> bytes:
     def of_block(start: int) -> bytes:
         return hashlib.sha256(os.pread(descriptor, min(_BLOCK, size - start), start)).digest()
 
-    with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:  # which hashing lets run
+    with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:  # hashing releases the interpreter
         return hashlib.sha256(b"".join(pool.map(of_block, range(0, size, _BLOCK)))).digest()
 
 
 def seal(path: Path) -> None:
-    """Add the checksum to a file."""
+    """Add the seal to a file."""
     with path.open("r+b") as file:
         size = file.seek(0, os.SEEK_END)
         file.write(_MARK + _digest(file.fileno(), size))
 
 
 def is_sealed(path: Path) -> bool:
-    """Tell whether a file ends with a seal, be it broken."""
+    """Test whether a file ends with a seal, which may be broken."""
     with path.open("rb") as file:
         file.seek(-min(_SIZE, path.stat().st_size), os.SEEK_END)
         return file.read(len(_MARK)) == _MARK
 
 
 def check_seal(path: Path) -> bool:
-    """Tell whether a file is as it was written; False if it has no seal to tell by.
+    """Test whether a file has a valid seal; False without a seal.
 
     Raises
     ------
     DeckError
-        If it has changed since.
+        If the seal is broken.
     """
     with path.open("rb") as file:
         head, size = file.read(_END.stop), file.seek(0, os.SEEK_END)

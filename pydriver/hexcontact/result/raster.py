@@ -1,4 +1,4 @@
-"""Fields of a result as small pictures: points of a plane, and their shades."""
+"""Small pictures of fields: points of a plane, and images."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.interpolation import nearest
-from .view import StepView
+from ..arrays import Array
 
-Array = NDArray[np.float64]
-
-# of zones in all pictures: dark and light, so that they differ in black and white too
+# Colors of zones in all pictures, which differ in black and white, too.
 STICK, SLIP = "#0072b2", "#f0c05a"
 
 
@@ -50,13 +47,6 @@ class Plane:
         y = y1 - (np.arange(rows) + 0.5) * (y1 - y0) / rows
         x, y = np.meshgrid(x, y)
         return x, y
-
-    def nearest(self, view: StepView) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
-        """Return row and column of the node next to each pixel, and whether the window has it."""
-        numbers = np.arange(view.lattice.size).reshape(view.lattice.shape)
-        node = nearest(numbers, view.basis, view.start, *self.points, outside=-1).astype(np.intp)
-        row, col = np.divmod(np.maximum(node, 0), view.lattice.n_col)
-        return row, col, node >= 0
 
 
 def png_of(gray: NDArray[np.uint8]) -> str:

@@ -1,104 +1,54 @@
-"""The result of a run by the names of its quantities, and what one does with it.
-
-Fields between the nodes and along lines, tables, comparison with closed solutions.
-"""
+"""The result of a run: quantities by name, fields between the nodes and along lines, tables, comparison."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..text import did_you_mean, html_table, text_table
-from ..variables import FIELDS, VARIABLES, Variable
-from .interpolate import (
-    Line,
-    Point,
-    PressureField,
-    chosen_fields,
-    first_node,
-    interpolate,
-    profile,
-    section_line,
-)
-from .layout import Layout as Layout
-from .layout import Metadata as Metadata
-from .layout import assemble as assemble
-from .layout import history_of, lattice_of, step_of
-from .layout import now as now
-from .layout import window_of as window_of
-from .step import Step as Step
+from ..analytic.compare import Comparison
+from ..arrays import Array, number
+from ..core.lattice import Lattice
+from ..deck.below import Stage
+from ..errors import DeckError
+from ..interior.below import BelowSurface
+from ..text import did_you_mean, text_table
+from ..variables import FIELDS, VARIABLES, WORN
+from .history import cycles, segments, stages
+from .interpolate import Line, Point, PressureField, chosen_fields, interpolate, profile, section_line
+from .layout import Quantities, history_of, lattice_of, step_of
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
 
-    from ..analytic.compare import Comparison
-    from ..core.lattice import Lattice
-
-_HEADERS = ("quantity", "unit", "given", "meaning")
-_GIVEN = {
-    ("step", "row", "col"): "at each node, by step",
-    ("row", "col"): "at each node",
-    ("step",): "by step",
+_WEARING = ("pressure", "traction_x", "traction_y", "slip_increment_x", "slip_increment_y", "zone")
+_SLIP = 2  # among the zones
+_LISTED = "result.quantities lists what there is"
+_ELSEWHERE = {
+    "plot": "hexcontact.plotting draws results: hexcontact.plotting.overview(result)",
+    **dict.fromkeys(
+        ("save", "write", "to_netcdf"),
+        'a run writes its result: case.run("name.nc"); result.dataset.to_netcdf writes the data set alone',
+    ),
 }
+"""Advice for names that are no quantities."""
 
 
-class Quantities(Mapping[str, Variable]):
-    """The quantities that a result holds, by name; printed, a table of them.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names, see `hexcontact.variables`.
-    """
-
-    def __init__(self, names: list[str]) -> None:
-        self._names = [name for name in VARIABLES if name in names]
-
-    def __getitem__(self, name: str) -> Variable:
-        """Return what a quantity is: units, long_name, dims."""
-        if name not in self._names:
-            raise KeyError(f"the result has no {name}{did_you_mean(name, self._names)}")
-        return VARIABLES[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Go through the names."""
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self._names)
-
-    def _rows(self) -> list[tuple[str, str, str, str]]:
-        return [
-            (name, v.unit.replace("m2", "m²"), _GIVEN[v.dims], v.long_name)
-            for name, v in self.items()
-            if v.dims in _GIVEN
-        ]
-
-    def __repr__(self) -> str:
-        """Return the table as text."""
-        return text_table(_HEADERS, self._rows())
-
-    def _repr_html_(self) -> str:
-        return html_table("", _HEADERS, self._rows())
-
-
-class Result:
+class Result(BelowSurface):
     """A result by the names of its quantities.
 
-    ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; everything else
-    that xarray can do is there through ``result.dataset``.
+    ``result.pressure``, ``result.approach`` and so on are `xarray.DataArray`; ``result.dataset`` is the
+    `xarray.Dataset` of all.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As `assemble` makes it or `hexcontact.open_result` reads it.
     path : str
-        File it was read from; empty if there is none.
+        Its file; empty if there is none.
     """
 
     def __init__(self, dataset: xarray.Dataset, path: str = "") -> None:
@@ -115,15 +65,15 @@ class Result:
             raise AttributeError(error.args[0]) from None
 
     def __getitem__(self, name: str) -> xarray.DataArray:
-        """Return a quantity, ``step`` too, which is a method as an attribute."""
+        """Return a quantity, also ``step``, which is a method as an attribute."""
         if name in self.dataset.variables:
             return self.dataset[name]
         what = "not in this result" if name in VARIABLES else "no quantity of a result"
-        hint = did_you_mean(name, map(str, self.dataset.variables))
-        raise KeyError(f"{name} is {what}{hint or '; result.quantities lists what there is'}")
+        hint = did_you_mean(name, map(str, self.dataset.variables)) or f"; {_ELSEWHERE.get(name, _LISTED)}"
+        raise KeyError(f"{name} is {what}{hint}")
 
     def __dir__(self) -> list[str]:
-        """Name the quantities too."""
+        """List the quantities, too."""
         return [*super().__dir__(), *map(str, self.dataset.variables)]
 
     def __len__(self) -> int:
@@ -131,11 +81,11 @@ class Result:
         return int(self.dataset.sizes["step"])
 
     def __contains__(self, name: object) -> bool:
-        """Tell whether there is a quantity of this name."""
+        """Test whether there is a quantity of this name."""
         return name in self.dataset.variables
 
     def __iter__(self) -> Iterator[xarray.Dataset]:
-        """Go through the load steps."""
+        """Iterate over the load steps."""
         return (self.dataset.isel(step=place) for place in range(len(self)))
 
     @property
@@ -150,22 +100,22 @@ class Result:
 
     @property
     def complete(self) -> bool:
-        """Whether all planned load steps are there."""
+        """Whether it has all planned load steps."""
         return bool(self.dataset.attrs.get("complete", True))
 
     @property
     def stopped(self) -> str:
-        """Why the run ended before its time; empty if it did not, or could not say so."""
+        """Reason why the run ended early; empty if it did not, or was killed."""
         return str(self.dataset.attrs.get("stopped", ""))
 
     @property
     def shortfall(self) -> str:
-        """Why the accuracy that the deck demands is not reached; empty if it is, or none is demanded."""
+        """Reason why the target accuracy was not reached; empty if it was, or the deck has none."""
         return str(self.dataset.attrs.get("accuracy_shortfall", ""))
 
     @property
     def lattice(self) -> Lattice:
-        """The lattice window that the result covers."""
+        """The lattice window of the result."""
         return lattice_of(self.dataset)
 
     def step(self, number: int) -> xarray.Dataset:
@@ -199,7 +149,7 @@ class Result:
         IndexError
             If there is no such step.
         ValueError
-            If pressure or gap of the step were not kept.
+            If the output lacks pressure or gap of the step.
         """
         data = self.step(number)
         for name in ("pressure", "gap"):
@@ -209,22 +159,43 @@ class Result:
                 )
         lattice = self.lattice
         pressure, gap = data["pressure"].values, data["gap"].values
-        return PressureField(pressure, gap, lattice.basis, first_node(lattice))
+        return PressureField(pressure, gap, lattice.basis, lattice.start)
 
     @property
     def history(self) -> pandas.DataFrame:
-        """Table of everything that has one value by step."""
+        """Table of all quantities with one value by step."""
         return self.dataset[history_of(self.dataset)].to_dataframe()
+
+    @property
+    def segments(self) -> pandas.DataFrame:
+        """Segments of the load history: label, first and last step, energy that friction dissipated (J)."""
+        return self._parts(segments)
+
+    @property
+    def cycles(self) -> pandas.DataFrame:
+        """Closed cycles of a load history with friction, a line each; empty if there are none.
+
+        Columns: kind of loading ("shear", "torsion", "normal"), first and last step, energy that friction
+        dissipated (J), and area (J) of the loop of the load over its motion. A cycle begins where the motion
+        turns back, at the end of the step before its first.
+        """
+        return self._parts(cycles)
+
+    def _parts(self, of: Callable[[list[dict[str, Any]]], list[dict[str, Any]]]) -> pandas.DataFrame:
+        import pandas
+
+        rows = of(cast(Any, self.history.to_dict("records")))
+        return pandas.DataFrame(rows).set_index(next(iter(rows[0]))) if rows else pandas.DataFrame()
 
     # --- between the nodes ----------------------------------------------------------------------------------
 
-    def at(self, name: str, x: ArrayLike, y: ArrayLike, step: int = -1) -> NDArray[np.float64]:
-        """Return a field at any points of the plane, as the solution means it: linear on the triangles.
+    def at(self, name: str, x: ArrayLike, y: ArrayLike, step: int = -1) -> Array:
+        """Return a field at points of the plane, linear on the triangles of the lattice like the solution.
 
         Parameters
         ----------
         name : str
-            Name of the field, such as "pressure". Of the zone, that of the nearest node is returned.
+            Name of the field, such as "pressure". The zone at a point is that of the nearest node.
         x, y : array_like
             Points (m), broadcast.
         step : int
@@ -238,7 +209,7 @@ class Result:
         Raises
         ------
         DeckError
-            If there is no such field, or it was not kept.
+            If there is no such field in the output.
         IndexError
             If there is no such step.
         """
@@ -250,13 +221,13 @@ class Result:
     ) -> xarray.Dataset:
         """Return fields along a line between two points.
 
-        Along a line a field is a polygon. By default the points are its corners, so that the profile
-        joined by straight lines is exactly what the solution means.
+        Along a line a field is a polygon. By default the points are its corners, so that straight lines
+        between them are exact.
 
         Parameters
         ----------
         *names : str
-            Names of fields, such as "pressure"; all that were kept if none is given.
+            Names of fields, such as "pressure"; default: all of the output.
         start, end : tuple of float
             Ends of the line, m.
         step : int
@@ -272,7 +243,7 @@ class Result:
         Raises
         ------
         DeckError
-            If there is no such field, it was not kept, or the line has no length.
+            If there is no such field in the output, or the line has no length.
         IndexError
             If there is no such step.
         """
@@ -291,11 +262,11 @@ class Result:
         Parameters
         ----------
         *names : str
-            Names of fields, such as "pressure"; all that were kept if none is given.
+            Names of fields, such as "pressure"; default: all of the output.
         angle : float
             Direction of the line from x, rad.
         through : tuple of float, optional
-            A point on it (m), from which ``distance`` counts; by default the node next to the center of
+            A point on it (m), from which ``distance`` counts; default: the node next to the center of
             pressure.
         step, points : int, optional
             As for `profile`.
@@ -308,7 +279,7 @@ class Result:
         Raises
         ------
         DeckError
-            If there is no such field, it was not kept, or nothing is in contact.
+            If there is no such field in the output, or nothing is in contact.
         IndexError
             If there is no such step.
         """
@@ -316,22 +287,60 @@ class Result:
         line = section_line(self.lattice, pressure, angle, through)
         return self._along(line, names, step, points)
 
+    def wear(
+        self,
+        coefficient: float,
+        segment: str | Sequence[str] | None = None,
+        steps: Sequence[int] | None = None,
+    ) -> xarray.Dataset:
+        """Return what one cycle of the loads wears off, of a run with friction and without [wear].
+
+        `coefficient` is k of both bodies together (m2/N), the depth k p times slip whatever the law;
+        `segment` or `steps` say what the cycle is, as in `fatigue`. ``worn_depth``,
+        ``cycle_dissipation_density`` and ``cycle_slip_amplitude`` (a quarter of the slip path) are over the
+        nodes, ``wear_volume`` of all.
+        Raises DeckError if there is no friction, no such cycle, or fields of its steps were not kept.
+        """
+        import xarray
+
+        number(coefficient, "coefficient", "a number of at least 0", lambda found: found >= 0)
+        if "dissipation_density" not in self:
+            raise DeckError("nothing wears without friction: the result has no dissipation_density")
+        worn, spent, path = (np.zeros(self.lattice.shape) for _ in range(3))
+        for at in self.cycle_steps(segment, steps):
+            step = self._fields(_WEARING, at)
+            slips = step["zone"] == _SLIP
+            x, y = (np.where(slips, step[f"slip_increment_{axis}"], 0.0) for axis in "xy")
+            worn += coefficient * step["pressure"] * np.hypot(x, y)
+            spent -= step["traction_x"] * x + step["traction_y"] * y
+            path += np.hypot(x, y)
+        found = xarray.Dataset(coords=self.dataset[["x", "y"]].coords)
+        fields = (worn, spent, 0.25 * path)
+        for name, values in zip(("worn_depth", *WORN[-2:]), fields, strict=True):
+            found[name] = ("row", "col"), values, {"units": VARIABLES[name].units}
+        volume = self.lattice.cell_area * float(worn.sum())
+        return found.assign(wear_volume=((), volume, {"units": "m3"}))
+
     def _along(self, line: Line, names: Sequence[str], step: int, points: int | None) -> xarray.Dataset:
         number = int(self.step(step)["step"])
         return profile(self.lattice, self._fields(names, step), line, points, step=number)
 
     def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
-        """Return the values at the nodes of some fields of a step, or of all."""
+        """Return the nodal values of some fields of a step, or of all."""
         data = self.step(step)
         known = [str(n) for n, values in data.data_vars.items() if values.dims == ("row", "col")]
-        # xarray reads from the file only what is used
+        # xarray reads only these fields from the file
         return chosen_fields(names, {name: cast(Any, data[name]) for name in known}, int(data["step"]))
+
+    def _stages(self) -> list[Stage]:
+        """Return segment, label and loads of each load step."""
+        return stages(cast(Any, self.history.to_dict("records")))
 
     # --- tables ---------------------------------------------------------------------------------------------
 
     @property
     def quantities(self) -> Quantities:
-        """What there is: names, units, meanings. Printed, a table."""
+        """Names, units and meanings of all quantities; printed, a table."""
         return Quantities([str(name) for name in self.dataset.variables])
 
     def to_dataframe(self, *names: str, step: int | None = None) -> pandas.DataFrame:
@@ -340,10 +349,10 @@ class Result:
         Parameters
         ----------
         *names : str
-            Names of quantities. Without any, or with such as have one value by step only, a line is a load
-            step; with fields it is a node of a load step.
+            Names of quantities; default: all with one value by step. A line of the table is a load step, with
+            fields a node of a load step.
         step : int, optional
-            Number of the only step that is wanted; -1 is the last one.
+            Number of one step; -1 is the last one; default: all.
 
         Returns
         -------
@@ -372,7 +381,7 @@ class Result:
     def compare(
         self, exact: Mapping[str, float] | object | None = None, step: int = -1, name: str = "given"
     ) -> Comparison:
-        """Compare a load step with the closed solutions that hold for it, or with a solution of your own.
+        """Compare a load step with the closed solutions that hold for it, or with a given solution.
 
         Parameters
         ----------
@@ -380,21 +389,21 @@ class Result:
             Values (SI) by the names of quantities, or a solution of `hexcontact.analytic`. By default the
             closed solutions are found from the deck and the load history: Hertz, Sneddon and others for the
             pressure, Cattaneo, Mindlin and Deresiewicz for shear, Lubkin for torsion, Spence for dissimilar
-            bodies. Each is listed only where it holds.
+            bodies. The table has those that hold.
         step : int
             Number of the load step, the first is 1; -1 is the last one.
         name : str
-            What to call a solution of your own.
+            Name of a given solution.
 
         Returns
         -------
         Comparison
-            A table: quantity, solution, exact, computed, error. Empty, with a reason, where none is known.
+            A table: quantity, solution, exact, computed, error. Empty, with a reason, if none is known.
 
         Raises
         ------
         KeyError
-            If there is no quantity of a name.
+            If there is no such quantity.
         IndexError
             If there is no such step.
         """
@@ -404,21 +413,22 @@ class Result:
             self[str(quantity)]  # else KeyError
         return compare(self.dataset, self.step(step), exact, name)
 
-    # --- what is shown --------------------------------------------------------------------------------------
+    # --- display --------------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Let go of the file; only needed before the file is moved or deleted on some systems."""
+        """Close the file, which some systems need before it is moved or deleted."""
         self.dataset.close()
 
     def __repr__(self) -> str:
-        """Say in a few lines what is there."""
+        """Return a few lines about the run and its last step."""
         from . import html  # with pictures
 
         fields = [name for name in FIELDS if name in self.dataset]
         table = text_table(("", ""), html.result_rows(self.dataset))
         header = html.result_header(self.dataset, self.path)
         lines = [header, *table.splitlines(), f"fields: {', '.join(fields)}"]
-        return "\n  ".join([*lines, *([self.stopped] if self.stopped else [])])
+        notes = [f"warning: {line}" for line in str(self.dataset.attrs.get("warnings", "")).splitlines()]
+        return "\n  ".join([*lines, *notes, *([self.stopped] if self.stopped else [])])
 
     def _repr_html_(self) -> str:
         from . import html

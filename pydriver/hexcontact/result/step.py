@@ -1,10 +1,10 @@
-"""A finished load step: the state of a run between one step and the next."""
+"""A finished load step, the state of a run."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Array, Mask
+from ..core.lattice import Lattice
 from ..text import did_you_mean
 from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line
 
 if TYPE_CHECKING:
     import xarray
-
-    from ..core.lattice import Lattice
 
 Value = float | int | str
 
@@ -28,30 +28,35 @@ class Step:
     """A finished load step.
 
     Its quantities are attributes, too: ``step.pressure`` is an array over the nodes, ``step.approach`` a
-    number. They are the state of the run itself, not a copy, and cannot be written to.
+    number. The arrays are those of the run, not copies, and read-only.
 
     Attributes
     ----------
     index : int
         Position in the whole history, from 0.
     lattice : Lattice
-        Window it was solved on.
+        Its window.
     fields : mapping of str to ndarray
         Arrays of shape (n_row, n_col), SI; names of `hexcontact.variables`. ``initial_gap`` among them.
     history : mapping of str to number or text
         Values by step; names of `hexcontact.variables`.
     companion : mapping of str to ndarray
-        What else the next step starts from; for the journal only. The fields of the second solution that
-        adaptive load steps are compared with.
+        Fields of the second solution of adaptive load steps, for the journal.
     control : mapping of str to number
-        Where the step stands in the load history, and what chooses the next one; for the journal only.
-        Empty where all load steps are given.
+        Place of an adaptive load step in the history, and data for the choice of the next one, for the
+        journal; empty for given load steps.
     prescribed : mapping of str to float
-        The loads (N, N m) and motions (m, rad) that drove the step; empty for a step read from a file.
+        Prescribed loads (N, N m) and motions (m, rad); empty for a step read from a file.
     load_fraction : float
-        How much of the load history is done after the step, from 0 to 1; NaN for a step read from a file.
+        Finished share of the load history, from 0 to 1; NaN for a step read from a file.
     ramp_done : float
-        How much of the ramp of its segment is applied, usually from 0 to 1; NaN for a step read from a file.
+        Applied share of the ramp of its segment, usually from 0 to 1; NaN for a step read from a file.
+    bodies : sequence of Body
+        The two bodies; none for a step read from a file.
+    friction : float
+        Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient.
+    sharp : bool
+        Whether the bodies touch without a compliant layer, so that the contact has a sharp edge.
     """
 
     index: int
@@ -63,6 +68,9 @@ class Step:
     prescribed: Mapping[str, float] = field(default_factory=dict)
     load_fraction: float = math.nan
     ramp_done: float = math.nan
+    bodies: Sequence[Any] = ()
+    friction: float = 0.0
+    sharp: bool = True
 
     def __post_init__(self) -> None:
         safe = {name: _read_only(values) for name, values in self.fields.items()}
@@ -74,7 +82,7 @@ class Step:
 
     def __getattr__(self, name: str) -> Any:
         """Return a quantity."""
-        if name.startswith("_") or name in ("fields", "history"):  # while it is being made
+        if name.startswith("_") or name in ("fields", "history"):  # before they are set
             raise AttributeError(name)
         try:
             return self[name]
@@ -90,31 +98,31 @@ class Step:
         raise KeyError(f"a load step of this run has no {name}{hint}")
 
     def __dir__(self) -> list[str]:
-        """Name the quantities too."""
+        """List the quantities, too."""
         return [*super().__dir__(), *self.fields, *self.history]
 
     @property
     def number(self) -> int:
-        """Number of the step as users count, from 1."""
+        """Number of the step, from 1."""
         return self.index + 1
 
     @property
-    def x(self) -> NDArray[np.float64]:
+    def x(self) -> Array:
         """Coordinate of each node along x, m."""
         return self.lattice.x
 
     @property
-    def y(self) -> NDArray[np.float64]:
+    def y(self) -> Array:
         """Coordinate of each node along y, m."""
         return self.lattice.y
 
     @property
-    def in_contact(self) -> NDArray[np.bool_]:
+    def in_contact(self) -> Mask:
         """Nodes in contact."""
         return np.asarray(self.fields["zone"] > 0)
 
     @property
-    def sticking(self) -> NDArray[np.bool_]:
+    def sticking(self) -> Mask:
         """Nodes that stick."""
         return np.asarray(self.fields["zone"] == 1)
 
@@ -127,17 +135,17 @@ class Step:
 
     @property
     def head(self) -> Step:
-        """The same step without the values of its fields: small enough to keep."""
+        """The same step without the values of its fields."""
         return dataclasses.replace(self, fields=dict.fromkeys(self.fields, np.empty(0)), companion={})
 
     @property
     def done(self) -> float:
-        """Share of the load history that is done, if adaptive load steps make it unknown by number."""
+        """Finished share of the load history with adaptive load steps; 0 without."""
         return float(self.control.get("done", 0.0))
 
     # --- between the nodes ----------------------------------------------------------------------------------
 
-    def at(self, name: str, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+    def at(self, name: str, x: ArrayLike, y: ArrayLike) -> Array:
         """Return a field at points of the plane; see `hexcontact.Result.at`."""
         [values] = chosen_fields([name], self.fields, self.number).values()
         return interpolate(self.lattice, name, values, x, y)
@@ -155,10 +163,22 @@ class Step:
         line = section_line(self.lattice, self.fields["pressure"], angle, through)
         return profile(self.lattice, fields, line, points, step=self.number)
 
-    # --- what is shown --------------------------------------------------------------------------------------
+    def stress_at(
+        self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None
+    ) -> xarray.Dataset:
+        """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
+        from ..interior.stress import EDGES, below
+
+        loaded: dict[str, Any] = {**self.history, **self.fields}
+        if not self.sharp:
+            loaded = {name: values for name, values in loaded.items() if name not in EDGES}
+        given = self.bodies, body, {"points": points}, components
+        return below(self.lattice, [loaded], *given, friction=self.friction, source=source)
+
+    # --- display --------------------------------------------------------------------------------------------
 
     def __repr__(self) -> str:
-        """Say in a line where the step stands."""
+        """Describe the step in a line."""
         from .history import describe
 
         try:

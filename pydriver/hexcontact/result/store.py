@@ -2,9 +2,8 @@
 
 While a run goes on, each finished step is a small file of its own in the journal beside the output
 (``out.nc.d/000012.npz``), with all its fields, written under a temporary name, flushed to disk and renamed.
-``out.nc`` is assembled from the records, one step in memory at a time, and only ever replaced as a
-whole. So a run that is killed at any moment loses at most the step it was working on, and what stood
-in ``out.nc`` before stays readable.
+``out.nc`` is assembled from the records, one step in memory at a time, and only replaced as a whole. So a
+run that is killed at any moment loses at most its present step, and the earlier ``out.nc`` is readable.
 """
 
 from __future__ import annotations
@@ -23,12 +22,11 @@ from typing import Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import flush, make_anew, reading, replacing, require_utf8
+from ..interior.tables import files_of
 from ..lock import Lock, names_a_run
-from .journal import STOPPED, SUFFIX, write_record
-from .journal import Journal as Journal
-from .journal import journal_of as journal_of
+from .journal import STOPPED, SUFFIX, Journal, journal_of, read_record, write_record
 from .layout import Layout, Metadata
-from .netcdf import is_ours, read_output, write
+from .netcdf import is_ours, read_output, require_free, write
 from .result import Result
 from .step import Step
 from .trials import TrialFolder, foreign_file, linked_folder, remove_all
@@ -43,13 +41,13 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     Parameters
     ----------
     path : path
-        The output file. The journal of an unfinished run beside it is read too; the output may
-        even be missing. The folder of a journal can also be given itself.
+        The output file, which may be missing if the journal of an unfinished run is beside it; or the folder
+        of a journal.
 
     Returns
     -------
     Result
-        Fields of a finished run are read from the file when they are first used.
+        Fields of a finished run are read from the file at their first use.
 
     Raises
     ------
@@ -57,7 +55,7 @@ def open_result(path: str | os.PathLike[str]) -> Result:
         If there is no such file, or it is damaged, of another kind or of another version.
     """
     target = Path(path)
-    for _ in range(2):  # again if a run that just finished took its journal away while we read it
+    for _ in range(2):  # again if a run that just finished deleted its journal meanwhile
         with contextlib.suppress(FileNotFoundError):
             if target.is_dir():
                 if journal := Journal(target):
@@ -79,34 +77,33 @@ def open_result(path: str | os.PathLike[str]) -> Result:
 
 
 def _continues(journal: Journal, output: Result) -> bool:
-    """Whether the steps of `output` are the first ones of `journal`."""
+    """Test whether the steps of `output` are the first ones of `journal`."""
     return len(journal) >= len(output) and same_run(journal, output)
 
 
 def same_run(journal: Journal, output: Result) -> bool:
-    """Whether `output` and the steps of `journal` come from one run."""
+    """Test whether `output` and the steps of `journal` are of one run."""
     return journal.metadata.run == output.dataset.attrs.get("run")
 
 
 class Store:
-    """Writes a run: each step to the journal as it is finished, all of them to the output.
+    """Writes a run: each finished step to the journal, all of them to the output.
 
-    Use it as a context manager, or call `close`. A run that does not come to `finish` leaves its
-    journal behind.
+    Use it as a context manager, or call `close`. Without `finish` the journal remains.
 
     Parameters
     ----------
     path : path
         Output file.
     metadata : Metadata
-        Where the steps come from, and what the output keeps of them.
+        Metadata of the run, with the fields of the output.
     overwrite : bool
-        Replace an output, or an unfinished run, that is there already. It stays until `finish`.
+        Replace an existing output or unfinished run, at `finish`.
 
     Raises
     ------
     DeckError
-        If the output is there already, is being written by another run or cannot be written.
+        If the output exists, is being written by another run or cannot be written.
     """
 
     def __init__(self, path: str | os.PathLike[str], metadata: Metadata, overwrite: bool = False) -> None:
@@ -123,9 +120,9 @@ class Store:
 
     @classmethod
     def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
-        """Open the journal of a run that ended before its time, to go on with it.
+        """Open the journal of an unfinished run to resume it.
 
-        Nothing is changed before `go_on`. The store may also turn out to be `finished`.
+        Its files do not change before `go_on`.
 
         Parameters
         ----------
@@ -135,14 +132,14 @@ class Store:
         Returns
         -------
         store : Store
-            Holds the lock.
+            The store, with the lock.
         last : Step or None
             The last finished step with all its fields; None if the run is finished, or refines its lattice.
 
         Raises
         ------
         DeckError
-            If there are no finished steps, one is missing or damaged, or another run is writing them.
+            If there are no finished steps, one is missing or damaged, or another run writes them.
         FileNotFoundError
             If there is no journal.
         """
@@ -159,19 +156,19 @@ class Store:
             raise
 
     def _at(self, path: str | os.PathLike[str]) -> None:
-        """Take up a place where an output can be written."""
+        """Set the paths of an output that can be written."""
         require_utf8(path, "a netCDF file")
         self.path = Path(os.path.realpath(path))
         self.folder = journal_of(self.path)
         self.heads: list[Step] = []
         self._mutex = threading.RLock()  # close() may come from another thread than append()
         self._closed = False
-        self.finished = False  # whether the output is complete and in its place
+        self.finished = False  # whether the output is complete
         self._published = (0, time.monotonic())
-        self.interim = True  # whether a long run also writes outputs on the way
+        self.interim = True  # whether a long run also writes interim outputs
         if self.path.is_dir():
             raise DeckError(f"{self.path} is a folder; a file name is expected")
-        if self.path.exists() and not self.path.is_file():  # to replace it would take a device away
+        if self.path.exists() and not self.path.is_file():  # replacing would delete a device
             raise DeckError(f"{self.path} is not a regular file; choose another output")
         if not self.path.parent.is_dir():
             raise DeckError(f"cannot write {self.path}: the folder {self.path.parent} does not exist")
@@ -180,11 +177,11 @@ class Store:
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     def _read_again(self) -> Step | None:
-        """Read all records, so that damage shows now and not after the last step; return the last one."""
-        journal, trials = Journal(self.folder), TrialFolder(self.folder)
+        """Read all records, so that damage shows before the next step; return the last one."""
+        journal, trials = Journal(self.folder, companions=True), TrialFolder(self.folder)
         left = trials.read()[0] if trials else None
         output = None
-        with contextlib.suppress(DeckError):  # what is no result may not be replaced
+        with contextlib.suppress(DeckError):  # another file is not replaced
             output = read_output(self.path) if self.path.exists() else None
         if left is not None:
             ours = output is not None and output.dataset.attrs.get("run") == left.run
@@ -193,7 +190,7 @@ class Store:
         steps, complete = (len(output), output.complete) if output is not None else (0, False)
         if output is not None:
             output.close()
-        if ours and complete:  # killed while it cleared the journal away
+        if ours and complete:  # killed while it deleted the journal
             remove_all(self.folder)
             return None
         if left is not None:
@@ -212,7 +209,7 @@ class Store:
                 self.heads.append(last.head)
         except DeckError as error:
             error.add_note(
-                f"without it and those after it, hexcontact resume goes on after step {len(self.heads)}"
+                f"without it and those after it, hexcontact resume continues after step {len(self.heads)}"
             )
             raise
         self.metadata = journal.metadata
@@ -224,7 +221,7 @@ class Store:
         return last
 
     def _refuse_newer(self, foreign: bool, left: Path) -> None:
-        """Refuse an output of another run that is newer than what this one left."""
+        """Refuse an output of another run that is newer than the records of this one."""
         self._in_the_way = self.path.exists() and foreign
         if self._in_the_way and self.path.stat().st_mtime > left.stat().st_mtime:
             raise DeckError(
@@ -232,7 +229,7 @@ class Store:
             )
 
     def go_on(self, metadata: Metadata) -> None:
-        """Begin to add steps to those of a journal that was opened again."""
+        """Prepare a reopened journal for further steps."""
         self.metadata = metadata
         with self.writing("the journal"):
             Journal(self.folder).tidy()
@@ -247,18 +244,18 @@ class Store:
                     f"{foreign} may not be of hexcontact, and a run would write its load steps there; move "
                     f"{self.folder} away or choose another output"
                 )
-            with contextlib.suppress(FileNotFoundError):  # a run that just ended took the folder away
+            with contextlib.suppress(FileNotFoundError):  # a run that just ended deleted the folder
                 return Lock(self.folder / "lock", self.path)
 
     def _take_over(self, overwrite: bool) -> None:
-        """Deal with what is there: an output, or what an unfinished run left."""
+        """Refuse or delete an existing output or unfinished run."""
         left, trials = Journal(self.folder), TrialFolder(self.folder)
         if (left or trials) and not overwrite:
             count, what = (len(trials.read()[1]), "lattice") if trials else (len(left), "step")
             raise DeckError(
                 f"{self.folder} holds {count} finished {what}{'s' * (count != 1)} of an unfinished run; "
-                f"hexcontact resume {shlex.quote(str(self.path))} goes on, --overwrite (overwrite=True in "
-                "Python) starts anew"
+                f"hexcontact resume {shlex.quote(str(self.path))} continues it, --overwrite (overwrite=True "
+                "in Python) starts anew"
             )
         if self.path.exists() and not overwrite:
             raise DeckError(f"{self.path} exists already; --overwrite (overwrite=True in Python) replaces it")
@@ -267,8 +264,9 @@ class Store:
                 f"{self.path} is not a result of hexcontact that can be read, so it is not overwritten; "
                 "delete it or choose another output"
             )
+        require_free(files_of(self.metadata.deck, self.path).values(), overwrite)
         with self.writing("the journal"):
-            if left:  # they become the old output, which is only replaced by a complete new one
+            if left:  # they become the old output, which a complete new one replaces
                 with contextlib.suppress(DeckError):
                     old = read_output(self.path) if self.path.exists() else None
                     if old is None or (not old.complete and _continues(left, old)):
@@ -283,7 +281,7 @@ class Store:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        """Close it; the reason of an error is kept, and the error names the finished steps."""
+        """Close the store; the journal has the reason of an error, the error names the finished steps."""
         known = isinstance(error, HexcontactError | KeyboardInterrupt)
         self.close((str(error) or "interrupted") if known else "")
         if isinstance(error, HexcontactError) and self.kept:
@@ -291,14 +289,14 @@ class Store:
 
     @property
     def has_all_steps(self) -> bool:
-        """Whether only the output is to be made of the steps."""
+        """Whether all planned steps are finished."""
         return bool(self.heads) and (
             len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
         )
 
     @property
     def kept(self) -> str:
-        """Sentence about what is finished: how much, where, how to go on; empty if nothing is."""
+        """Sentence about the finished steps: number, place, how to resume; empty without any."""
         where = self.folder if self.folder.exists() else self.path
         planned, count = self.metadata.planned_steps, len(self.heads)
         finished = TrialFolder(self.folder).kept
@@ -308,11 +306,13 @@ class Store:
             finished = f"{count} load step{'s are' if count != 1 else ' is'} finished"
         if not finished:
             return ""
-        return f"{finished} and kept in {where}; to go on: hexcontact resume {shlex.quote(str(self.path))}"
+        return (
+            f"{finished} and recorded in {where}; to resume: hexcontact resume {shlex.quote(str(self.path))}"
+        )
 
     @contextlib.contextmanager
     def writing(self, what: str, missing: bool = False) -> Iterator[None]:
-        """Turn a failure to write into one sentence that names the file and the step."""
+        """Raise one sentence for a failure to write, with the file and the step."""
         try:
             yield
         except OSError as error:
@@ -326,21 +326,21 @@ class Store:
             raise kind(f"cannot write {what} of {self.path}: {reason}") from error
 
     def _replacing(self, target: Path) -> contextlib.AbstractContextManager[Path]:
-        """Give the name in the journal under which a file is written that then replaces `target`."""
+        """Yield a name in the journal for a file that then replaces `target`."""
         return replacing(target, self.folder / (target.name + ".tmp"))
 
     def _put_together(self, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
-        """Make the output of finished steps."""
+        """Write the output of finished steps."""
         with self._replacing(self.path) as path:
             write(path, layout, steps, complete)
 
     def append(self, step: Step) -> None:
-        """Commit a finished step: when this returns it is on the disk.
+        """Record a finished step on the disk.
 
         Raises
         ------
         DeckError, ResourceError
-            If it cannot be written; the steps before it are kept.
+            If it cannot be written; the steps before it remain.
         """
         with self._mutex:
             self._require_open()
@@ -349,9 +349,11 @@ class Store:
             record = self.folder / f"{step.number:06d}{SUFFIX}"
             with self.writing(f"step {step.number}"), self._replacing(record) as path:
                 write_record(path, self.metadata, step)
+            if step.companion and "until" in step.control:
+                self._lighten(self.folder / f"{len(self.heads):06d}{SUFFIX}")
             self.heads.append(step.head)
             steps, moment = self._published
-            # doubling keeps the cost of all interim versions linear
+            # by doubling, the cost of all interim versions is linear
             due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
             if due and self.interim and not self._in_the_way:
                 with self.writing("the output"):
@@ -359,8 +361,15 @@ class Store:
                     self._put_together(layout, Journal(self.folder), complete=False)
                 self._published = (len(self.heads), time.monotonic())
 
+    def _lighten(self, record: Path) -> None:
+        """Take from the record before the last what only the next step starts from."""
+        with self.writing("the journal"):
+            metadata, before = read_record(record, companion=False)
+            with self._replacing(record) as path:
+                write_record(path, metadata, before)
+
     def finish(self) -> None:
-        """Put the output in its place and clear the journal away.
+        """Write the output and delete the journal.
 
         Raises
         ------
@@ -368,23 +377,23 @@ class Store:
             If it cannot be written; the journal is kept.
         """
         with self._mutex:
-            self._require_open()  # a signal may have closed it while the last step was on its way
+            self._require_open()  # a signal may have closed it during the last step
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
             self._finish(Layout(self.metadata, self.heads), Journal(self.folder))
 
     def finish_with(
         self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]
     ) -> None:
-        """Put an output of steps that are kept elsewhere in its place and clear the journal away.
+        """Write the output of steps that are recorded elsewhere, and delete the journal.
 
         Parameters
         ----------
         metadata : Metadata
-            What the output says about the run.
+            Metadata of the run.
         steps : iterable of Step
-            The steps; gone through twice, so not a generator.
+            The steps, which are read twice: no generator.
         trials : mapping of str to sequence
-            What was solved on other lattices, as for `hexcontact.result.layout.Layout`.
+            Solutions on other lattices, as for `hexcontact.result.layout.Layout`.
 
         Raises
         ------
@@ -407,12 +416,12 @@ class Store:
             raise ValueError("the store is closed")
 
     def close(self, reason: str = "") -> None:
-        """Let go of the files; the journal of an unfinished run stays.
+        """Close the files; the journal of an unfinished run remains.
 
         Parameters
         ----------
         reason : str
-            Why the run ends before its time, kept beside its finished steps.
+            Reason of an early end, which is written to the journal.
         """
         with self._mutex:
             if self._closed:

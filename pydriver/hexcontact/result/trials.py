@@ -1,8 +1,7 @@
-"""The lattices of an unfinished run that refines, in the journal of its output.
+"""The lattices of an unfinished refinement, in the journal of its output.
 
-``out.nc.d/lattices/trials.json`` holds the histories of the lattices that are finished. The load steps of the
-lattice at work, and of the finest finished one, are in journals of their own beside it: ``2_0.nc.d`` is level
-2, not shifted.
+``out.nc.d/lattices/trials.json`` has the histories of the finished lattices. The load steps of the present
+lattice, and of the finest finished one, are in journals beside it: ``2_0.nc.d`` is level 2, not shifted.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ FOLDER = "lattices"  # in the journal
 
 @dataclass(frozen=True)
 class Solution:
-    """What the solution on one lattice came to.
+    """The solution on one lattice.
 
     Parameters
     ----------
@@ -47,7 +46,7 @@ class Solution:
     origin : tuple of float
         Position of a node, m.
     nodes : int
-        Nodes of the largest window that it was solved on.
+        Nodes of its largest window.
     histories : sequence of mapping
         History of each load step.
     """
@@ -61,7 +60,7 @@ class Solution:
 
 
 class TrialFolder:
-    """The lattices of an unfinished run.
+    """The lattices of an unfinished refinement.
 
     Parameters
     ----------
@@ -74,15 +73,15 @@ class TrialFolder:
         self.ledger = self.folder / "trials.json"
 
     def __bool__(self) -> bool:
-        """Tell whether there are any."""
+        """Test whether there are any."""
         return self.ledger.exists()
 
     def path(self, level: int, copy: int = 0) -> Path:
-        """Return what the output of a lattice would be called; its journal is beside it."""
+        """Return the path of the output of a lattice, to which its journal belongs."""
         return self.folder / f"{level}_{copy}.nc"
 
     def read(self) -> tuple[Metadata, list[Solution]]:
-        """Return where the run comes from, and the finished lattices.
+        """Return the metadata of the run, and the finished lattices.
 
         Raises
         ------
@@ -106,14 +105,14 @@ class TrialFolder:
             return Metadata.from_plain(about["metadata"]), found
 
     def write(self, metadata: Metadata, solutions: Sequence[Solution]) -> None:
-        """Put the finished lattices on the disk, in one go."""
+        """Write the finished lattices to the disk as a whole."""
         self.folder.mkdir(exist_ok=True)
         about = {
             "trials_version": VERSION,
             "metadata": dataclasses.asdict(metadata),
             "solutions": [dataclasses.asdict(solution) for solution in solutions],
         }
-        about = json.loads(json.dumps(about, default=np.generic.item))  # as it will be read
+        about = json.loads(json.dumps(about, default=np.generic.item))  # as after reading
         with replacing(self.ledger, self._temporary) as path:
             path.write_text(json.dumps({"sha256": _digest(about), **about}), encoding="utf-8")
 
@@ -131,13 +130,13 @@ class TrialFolder:
         return level, journal
 
     def check(self, metadata: Metadata, of_lattice: Metadata) -> None:
-        """See to it that the load steps of a lattice are of the run of the folder; else DeckError."""
+        """Refuse load steps of a lattice of another run than that of the folder."""
         if metadata.run != of_lattice.run:
             raise DeckError(f"{self.folder} holds load steps of another run than {self.ledger}")
 
     @property
     def kept(self) -> str:
-        """Say what is finished; empty if nothing is."""
+        """Describe the finished lattices; empty without any."""
         if not self:
             return ""
         if count := len(self.read()[1]):
@@ -145,12 +144,12 @@ class TrialFolder:
         return "load steps on the first lattice are finished" if self._latest()[1] else ""
 
     def result(self, path: Path) -> Result:
-        """Return what there is of the finest finished lattice, else of the first; `path` names it.
+        """Return the steps on the finest finished lattice, else on the first; `path` names the result.
 
         Raises
         ------
         DeckError
-            If there is nothing.
+            If no step is finished.
         """
         level, journal = self._latest()
         if not journal:
@@ -168,7 +167,7 @@ class TrialFolder:
         return b'"trials_version": ' in beginning(self.ledger, 200)
 
     def foreign(self) -> Iterator[Path]:
-        """Go through the files with names of a run's, in a folder with no list of finished lattices."""
+        """Yield files named like those of a run, in a folder without a list of finished lattices."""
         yield from (path for path in (self.ledger, self._temporary) if path.exists())
         yield from (journal.files[0] for journal in self._journals() if journal.files and not journal.is_ours)
 
@@ -182,12 +181,12 @@ class TrialFolder:
         return [Journal(self.folder / name) for name in names if _JOURNAL.fullmatch(name)]
 
     def remove(self) -> None:
-        """Delete what runs have written, and nothing else."""
+        """Delete the files of runs, and no others."""
         for journal in self._journals():
             _clear(journal)
         for path in (self.ledger, self._temporary):
             path.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # there is none, or there are other files in it
+        with contextlib.suppress(OSError):  # it is missing, or has other files
             self.folder.rmdir()
 
 
@@ -201,15 +200,15 @@ def _clear(journal: Journal) -> None:
 
 
 def remove_all(folder: Path) -> None:
-    """Delete what a run has left in the folder of its journal, load steps and lattices; the lock stays."""
+    """Delete load steps and lattices in the folder of a journal, but not the lock."""
     Journal(folder).remove()
     TrialFolder(folder).remove()
 
 
 def foreign_file(folder: Path) -> Path | None:
-    """Return a file with a name of a journal's in a folder that no run has written to; None if there is none.
+    """Return a file named like one of a journal in a folder that no run has written to, or None.
 
-    A run is known by one of its records or its list of finished lattices.
+    A record or a list of finished lattices is the sign of a run.
     """
     journal, trials = Journal(folder), TrialFolder(folder)
     if journal.is_ours or trials.is_ours:
@@ -218,7 +217,7 @@ def foreign_file(folder: Path) -> Path | None:
 
 
 def linked_folder(folder: Path) -> Path | None:
-    """Return a folder of lattices that is a link to somewhere else; None if there is none."""
+    """Return a folder of lattices that is a link, or None."""
     trials = TrialFolder(folder)
     folders = [trials.folder, *(journal.folder for journal in trials._journals())]
     return next((path for path in folders if path.is_symlink()), None)

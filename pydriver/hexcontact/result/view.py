@@ -1,33 +1,32 @@
-"""One load step of a result, ready to be drawn, cut or compared."""
+"""One load step of a result, for pictures and comparisons."""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Protocol, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..analytic.hertz_gap import QuadraticGap, friction_of, pressure_is_frictionless
+from ..arrays import Array, Mask
+from ..core.edges import ContactEdges, ZoneMesh
 from ..core.interpolation import linear
-from ..text import scaled as scaled
 from ..text import visible, worded
 from ..variables import LARGEST, VARIABLES, spelled
-from .interpolate import PressureField, first_node, is_kept
+from .interpolate import PressureField, is_kept
 from .layout import lattice_of, step_of
 
 if TYPE_CHECKING:
     import xarray
 
-Array = NDArray[np.float64]
 
 STICK = 1  # value of zone at a sticking node
 
 
 class HasDataset(Protocol):
-    """A result: what has a data set."""
+    """An object with a data set, such as a result."""
 
     @property
     def dataset(self) -> xarray.Dataset:
@@ -35,18 +34,17 @@ class HasDataset(Protocol):
         ...
 
 
-if TYPE_CHECKING:
-    AnyResult = HasDataset | xarray.Dataset
-    Results = AnyResult | Sequence[AnyResult]
+AnyResult: TypeAlias = "HasDataset | xarray.Dataset"
+Results: TypeAlias = "AnyResult | Sequence[AnyResult]"
 
 
 def title_of(dataset: xarray.Dataset) -> str:
-    """Return the title of a result for pictures, in which no dollar begins a formula."""
+    """Return the title of a result for pictures, with escaped dollars."""
     return visible(str(dataset.attrs.get("title", ""))).replace("$", r"\$")
 
 
 class StepView:
-    """One load step of a result, as pictures need it; lengths in m, pressure in Pa.
+    """One load step of a result for pictures; lengths in m, pressure in Pa.
 
     Attributes
     ----------
@@ -82,7 +80,7 @@ class StepView:
         self.x, self.y = dataset["x"].values, dataset["y"].values
         self.lattice = lattice_of(dataset)
         self.spacing, self.basis = self.lattice.spacing, self.lattice.basis
-        self.start = first_node(self.lattice)
+        self.start = self.lattice.start
         gap, load = QuadraticGap.of(dataset), float(self.data["normal_load"])
         if gap is None:
             weight = max(float(self.pressure.sum()), np.finfo(float).tiny)
@@ -95,20 +93,20 @@ class StepView:
 
     @classmethod
     def of(cls, result: AnyResult, step: int) -> StepView:
-        """Look at step number ``step`` (from 1; -1 is the last one) of a result.
+        """Return the view of step number ``step`` (from 1; -1 is the last one) of a result.
 
         Raises
         ------
         IndexError
             If there is no such step.
         ValueError
-            If the pressure of that step was not kept.
+            If the output lacks the pressure of that step.
         """
         return cls(dataset_of(result), step)
 
     @property
     def friction(self) -> float:
-        """Coefficient of friction; 0 for a contact that was solved without friction."""
+        """Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient."""
         return friction_of(self.data.attrs)
 
     @property
@@ -128,50 +126,85 @@ class StepView:
         Raises
         ------
         ValueError
-            If the result, or this step of it, does not hold the field.
+            If the output lacks the field, or lacks it in this step.
         """
         words = spelled(name)
         if name not in self.data:
-            if self.friction == 0.0 and name.startswith(("traction", "slip", "accumulated")):
+            if self.friction == 0.0 and name in VARIABLES and VARIABLES[name].frictional:
                 raise ValueError(f"a contact without friction has no {words}")
             raise ValueError(f"the {words} was not kept (output.fields)")
         values = self.data[name].values
         if not is_kept(values):
             raise ValueError(f"the {words} of step {self.number} was not kept (output.every)")
-        if (abs(values) > LARGEST).any():  # of a file that was changed: what is computed with it overflows
+        if (abs(values) > LARGEST).any():  # of a changed file, whose sums would overflow
             raise ValueError(f"the {words} holds numbers that no contact has")
         return np.asarray(values, dtype=float)
 
     @property
-    def stick(self) -> NDArray[np.bool_]:
+    def stick(self) -> Mask:
         """Nodes that stick.
 
         Raises
         ------
         ValueError
-            If the contact has no friction, or its zones were not kept.
+            If the contact has no friction, or the output lacks its zones.
         """
         if self.friction == 0.0:
             raise ValueError("a contact without friction has no stick and slip zones")
         return np.asarray(self.field("zone") == STICK)
 
+    def edges(self, stride: int = 1) -> ContactEdges:
+        """Return the edges of contact and stick area, of every node or of every second, third, ... one.
+
+        Without the gap in the output they are about half-way between the nodes.
+        """
+        gap = self.field("gap") if self.has("gap") else np.zeros_like(self.pressure)
+        every = (slice(None, None, stride),) * 2
+        pressure, gap, contact = self.pressure[every], gap[every], self.contact[every]
+        return ContactEdges(pressure, gap, contact, np.isfinite(gap), self.basis * stride, self.start)
+
+    def has(self, *names: str) -> bool:
+        """Test whether the output has fields of this step."""
+        return all(name in self.data and is_kept(self.data[name].values) for name in names)
+
+    @property
+    def reserve(self) -> Array:
+        """Reserve of friction mu p - |q| (Pa); 0 where nothing can slip."""
+        if not (math.isfinite(self.friction) and self.has("traction_x", "traction_y")):
+            return np.zeros_like(self.pressure)
+        size = np.hypot(self.field("traction_x"), self.field("traction_y"))
+        return np.asarray(self.friction * self.pressure - size)
+
+    def stick_mesh(self) -> ZoneMesh:
+        """Return the mesh of the stick area up to its edge."""
+        return self.edges().stick_mesh(self.stick & self.contact, self.reserve)
+
     def at(self, x: Array, y: Array, values: Array | None = None) -> Array:
-        """Pressure, or the field with these values at the nodes, at points of the plane (m).
+        """Return the pressure, or the field with some nodal values, at points of the plane (m).
 
         It is linear on the triangles of the lattice as in the solution, and 0 outside the window.
         """
         return linear(self.pressure if values is None else values, self.basis, self.start, x, y)
 
+    def touches(self, x: Array, y: Array) -> Mask:
+        """Test which points of the plane (m) are in contact, to the edge between the nodes."""
+        return np.asarray(self.at(x, y, self.edges().contact_distances()) > 0.0)
+
+    def sticks(self, x: Array, y: Array) -> Mask:
+        """Test which points of the plane (m) stick, to the edge between the nodes."""
+        distances = self.edges().stick_distances(self.stick & self.contact, self.reserve)
+        return np.asarray(self.at(x, y, distances) > 0.0)
+
     @functools.cached_property
     def pressure_field(self) -> PressureField | None:
-        """Pressure at any point, to the edge between the nodes; None if the gap was not kept."""
+        """Pressure at any point, to the edge between the nodes; None without the gap in the output."""
         try:
             return PressureField(self.pressure, self.field("gap"), self.basis, self.start)
         except ValueError:
             return None
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
-        """Limits of a picture of the contact: x_min, x_max, y_min, y_max."""
+        """Return the limits of a picture of the contact: x_min, x_max, y_min, y_max."""
         zone = self.contact if self.contact.any() else np.ones_like(self.contact)
         x, y = self.x[zone], self.y[zone]
         middle_x, middle_y = 0.5 * (x.max() + x.min()), 0.5 * (y.max() + y.min())
@@ -181,9 +214,10 @@ class StepView:
 
 
 def _loads(one: xarray.Dataset) -> str:
-    """Name the loads of a step: the normal load, and those that friction has to work for."""
+    """Name the loads of a step: the normal load, and tangential ones that are more than noise."""
     normal = float(one["normal_load"])
-    carried = min(float(one.attrs.get("friction_coefficient", 1.0)), 1.0) * normal
+    mu = float(one.attrs.get("friction_coefficient", 1.0))
+    carried = (mu if mu < 1.0 else 1.0) * normal
     named = [f"$P$ = {worded(normal, 'N')}"]
     least = {
         "tangential_load_x": 1e-3 * carried,
@@ -198,7 +232,7 @@ def _loads(one: xarray.Dataset) -> str:
 
 
 def as_list(results: Results) -> list[AnyResult]:
-    """Return the results as a list, also if it is only one."""
+    """Return one or several results as a list."""
     return list(results) if isinstance(results, Sequence) else [results]
 
 

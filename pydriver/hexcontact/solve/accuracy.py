@@ -1,10 +1,10 @@
-"""How far a result is from the limit of vanishing spacing, told from solutions on several lattices.
+"""Estimates the distance of a result from the limit of vanishing spacing, by solutions on several lattices.
 
 The lattice is refined by the square root of two from solution to solution. The difference of a solution and
 the limit has two parts: a trend with the spacing, and a scatter, since the contact lies differently on every
-lattice. The scatter is often the larger part, so that a pair of lattices tells little; it is measured where
-it costs least, on shifted copies of a coarser lattice: of the same spacing, with the origin moved by
-fractions of it. The core fits both to the last solutions (fortran/path/discretization_error.f90), in the same
+lattice. The scatter is often the larger part, so that a pair of lattices shows little; it is measured at the
+least cost, on shifted copies of a coarser lattice: of the same spacing, with the origin moved by fractions of
+it. The core fits both to the last solutions (fortran/path/discretization_error.f90), in the same
 way for every scalar of the history and every load step.
 """
 
@@ -12,32 +12,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..core.estimators import limits_of_error
+from ..core.estimators import limits_of_error, unresolved_slip_zones
+from ..problem.loads import LoadStep
 from ..result.trials import Solution
-from ..variables import ESTIMATED, LOADS
-
-if TYPE_CHECKING:
-    from ..problem.loads import LoadStep
+from ..variables import ESTIMATED, LOADS, VARIABLES
 
 History = Mapping[str, Any]
 
 LEVELS_FITTED = 4  # the finest ones, with their shifted copies
 
 JUDGED = ("max_pressure", "contact_area_fit", "stick_area_fit", "approach")
-"""Quantities that are to reach the target."""
+"""Quantities that have the target."""
+
+_ZONES = ("contact_area_fit", "stick_area_fit", "max_traction", "max_pressure")
+"""Quantities of a load step that show the width of its slip zone."""
 
 
 def finest(solutions: Sequence[Solution]) -> Solution:
-    """Return the solution on the finest lattice, which becomes the result."""
+    """Return the solution on the finest lattice, which is the result."""
     return max(solutions, key=lambda solution: (solution.level, -solution.copy))
 
 
 def driven(target: LoadStep) -> set[str]:
-    """Return the loads and motions that a load step prescribes; they have no error."""
+    """Return the prescribed loads and motions of a load step, which have no error."""
     motions = zip(LOADS.values(), target.targets, strict=True)
     return {pair[motion.control == "displacement"] for pair, motion in motions}
 
@@ -48,15 +50,15 @@ def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep])
     Parameters
     ----------
     solutions : sequence of Solution
-        Three levels at least, and shifted copies.
+        At least three levels, and shifted copies.
     targets : sequence of LoadStep
         The load steps.
 
     Returns
     -------
     list of dict of str to float
-        For each load step the error (>= 0, in the unit of the quantity) by the name of the quantity: 0 if the
-        step prescribes it, NaN if it has no value on one of the lattices.
+        For each load step the error (>= 0, in the unit of the quantity) by the name of the quantity: 0 if it
+        is prescribed, NaN without a value on one of the lattices.
 
     Raises
     ------
@@ -69,7 +71,14 @@ def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep])
     names = [name for name in ESTIMATED if name in best.histories[0]]
     values = np.array([[[h[name] for name in names] for h in s.histories] for s in used], dtype=float)
     spacings = np.array([s.spacing for s in used]) / best.spacing
-    errors = limits_of_error(spacings, values.reshape(len(used), -1)).reshape(values.shape[1:])
+    rough = np.tile([VARIABLES[name].rough for name in names], len(targets))
+    narrow: NDArray[np.bool_] = np.zeros(values.shape[1:], dtype=bool)
+    if set(_ZONES) <= set(names):
+        columns = (values[0][:, names.index(name)] for name in _ZONES)
+        zones = unresolved_slip_zones(best.spacing, *columns)
+        narrow = np.outer(zones, [VARIABLES[name].slip_zone for name in names])
+    flat = values.reshape(len(used), -1)
+    errors = limits_of_error(spacings, flat, rough, narrow.ravel()).reshape(values.shape[1:])
     found = []
     for target, row in zip(targets, errors, strict=True):
         prescribed = driven(target)
@@ -80,7 +89,7 @@ def estimated_errors(solutions: Sequence[Solution], targets: Sequence[LoadStep])
 
 
 def relative_errors(histories: Sequence[History], errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the errors of the quantities that are to reach the target, in their largest value.
+    """Return the largest errors of the quantities that have the target, over their largest value.
 
     Parameters
     ----------
@@ -93,13 +102,13 @@ def relative_errors(histories: Sequence[History], errors: Sequence[Mapping[str, 
     for name in JUDGED:
         if name in errors[0]:
             largest = max(abs(float(history[name])) for history in histories)
-            error = float(np.max([step[name] for step in errors]))  # which hands NaN on
+            error = float(np.max([step[name] for step in errors]))  # NaN if one is
             found[name] = error / largest if largest else math.inf if error else 0.0
     return found
 
 
 def changes(coarse: Solution, fine: Solution, targets: Sequence[LoadStep]) -> dict[str, float]:
-    """Return by how much two solutions differ, as `relative_errors`; no error is estimated to be less."""
+    """Return the relative differences of two solutions, lower bounds of `relative_errors`."""
     names = [name for name in JUDGED if name in fine.histories[0]]
     differences = [
         {name: 0.0 if name in driven(target) else abs(float(one[name]) - float(two[name])) for name in names}
@@ -109,6 +118,6 @@ def changes(coarse: Solution, fine: Solution, targets: Sequence[LoadStep]) -> di
 
 
 def worst(relative: Mapping[str, float]) -> tuple[str, float]:
-    """Return the quantity that is furthest from its limit, and how far."""
+    """Return the quantity with the largest error, and the error."""
     name = max(relative, key=lambda name: relative[name] if relative[name] == relative[name] else math.inf)
     return name, relative[name]

@@ -1,8 +1,8 @@
-"""Paths through load steps that are given, or chosen on the way, ``steps = "auto"``.
+"""Paths through load steps that are given, or chosen during the solution, ``steps = "auto"``.
 
-What a chosen load step may change is bounded, and measured: it is solved as a whole and in two halves, on two
-paths that never meet. The halves are recorded. What they change decides whether the step is taken, and how
-large the next one is; see `hexcontact.core.steps`.
+A chosen load step is solved as a whole and in two halves, on two independent paths; the halves are recorded.
+The change by halving, which has a bound, decides on the step and on the size of the next one; see
+`hexcontact.core.steps`.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import dataclasses
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..core.friction import ContactState
 from ..core.steps import (
     FAILED,
     LIMITED,
@@ -26,17 +27,14 @@ from ..core.steps import (
     is_shear_free,
 )
 from ..problem.loads import LoadStep
+from ..problem.problem import Problem
+from ..result.step import Step
 from . import nonconvergence
-
-if TYPE_CHECKING:
-    from ..core.friction import ContactState
-    from ..problem.problem import Problem
-    from ..result.step import Step
-    from .frictional import FrictionWindow
+from .frictional import FrictionWindow
 
 
 class _Rim(Exception):
-    """The contact reached the rim of the window."""
+    """Raised if the contact reaches the rim of the window."""
 
     def __init__(self, solution: ContactState) -> None:
         super().__init__()
@@ -62,14 +60,14 @@ class GivenPath:
     window : Window
         Window to start with.
     before : sequence of Step
-        The steps that are solved already.
+        The solved steps.
 
     Attributes
     ----------
     window : Window
         The present window.
     position : int
-        Load step of the case that is at hand.
+        Index of the present load step of the case.
     """
 
     def __init__(self, case: Problem, window: Any, before: Sequence[Step]) -> None:
@@ -77,7 +75,7 @@ class GivenPath:
         self.position = len(before)
 
     def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
-        """Solve a load step; one that reached the rim again on a larger window, from where it began.
+        """Solve a load step; one that reaches the rim is solved again on a larger window.
 
         Parameters
         ----------
@@ -86,7 +84,7 @@ class GivenPath:
         target : LoadStep
             The load step.
         begun : mapping of str to float
-            Loads and motions when its segment began.
+            Loads and motions at the beginning of its segment.
 
         Yields
         ------
@@ -95,17 +93,29 @@ class GivenPath:
         state : state of the solver
             Its end.
         """
-        started, values = time.perf_counter(), target.values(begun)
-        while self.window.outgrown(reached := self.window.advance(state, target, values)):
+        started = time.perf_counter()
+        state, reached = self._reached(state, target, target.values(begun))
+        yield self.window.step(target, reached, state, started), reached
+
+    def _reached(
+        self, state: Any, target: LoadStep, values: tuple[float, ...], **how: Any
+    ) -> tuple[Any, Any]:
+        """Return the states at the beginning and at the end of a load step, on the window at its end."""
+        while self.window.outgrown(reached := self.window.advance(state, target, values, **how)):
             smaller, self.window = self.window.lattice, self.window.grown(reached, target)
             state = self.window.carried(state, smaller)
+            how.pop("guess", None)  # of the smaller window
         if not reached.converged:
             raise nonconvergence.error(self.case, self.window.lattice, reached, target, values)
-        yield self.window.step(target, reached, state, started), reached
+        return state, reached
+
+    def after(self, state: Any) -> Iterator[Step]:
+        """Solve further steps after the load history; here none."""
+        yield from ()
 
 
 class AdaptivePath(GivenPath):
-    """The two paths through a load history, and what chooses their load steps.
+    """The two paths through a load history, with the choice of their load steps.
 
     Parameters
     ----------
@@ -114,43 +124,44 @@ class AdaptivePath(GivenPath):
     window : FrictionWindow
         Window to start with.
     before : sequence of Step
-        The steps that are solved already: heads, the last one with all its fields.
+        The solved steps: heads, the last one with all its fields.
 
     Attributes
     ----------
     window : FrictionWindow
         The present window.
     position : int
-        Load step of the case that is at hand.
+        Index of the present load step of the case.
     fraction : float
-        How much of it is done.
+        Its finished fraction.
     """
 
     def __init__(self, case: Problem, window: FrictionWindow, before: Sequence[Step]) -> None:
         super().__init__(case, window, ())
         self.fraction = 0.0
         self._number = len(before)
-        self._before: ContactState | None = None  # the path in halves, where a load step begins
+        self._before: ContactState | None = None  # the path in halves, at the beginning of a load step
         self._work: dict[str, Any] = {}
         self._failed: Any = None  # solution, part and loads that did not converge
         self._size = StepControl()
-        self._whole: ContactState | None = None  # the path in whole steps; None where both are one
+        self._whole: ContactState | None = None  # the path in whole steps; None: the same as in halves
         if before:
             control = before[-1].control
             self.position, self.fraction = int(control["position"]), float(control["fraction"])
             self._area = float(control["area"])
             self._size = StepControl.from_record(control["chooser"])
             if before[-1].companion:
-                self._whole = _companion_state(before[-1])
+                state: dict[str, Any] = {**before[-1].companion, **control["companion"]}
+                self._whole = ContactState(**state)
         else:
             self._area = window.largest_contact_area()
 
     def _numbered(self, target: LoadStep) -> LoadStep:
-        """Return a load step under the number that it has among those that are recorded."""
+        """Return a load step with its number among the recorded ones."""
         return dataclasses.replace(target, index=self._number)
 
     def _given(self, step: Step) -> Step:
-        """Return a load step whose size was given, with its place in the history."""
+        """Return a load step of given size, with its place in the history."""
         self._size.forget()
         self._whole = None
         return self._placed(step, 1.0)
@@ -158,7 +169,7 @@ class AdaptivePath(GivenPath):
     def steps(
         self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float]
     ) -> Iterator[tuple[Step, ContactState]]:
-        """Solve the rest of an adaptive segment, or a load step whose size is given.
+        """Solve the rest of an adaptive segment, or a load step of given size.
 
         Parameters
         ----------
@@ -167,7 +178,7 @@ class AdaptivePath(GivenPath):
         target : LoadStep
             The segment.
         begun : mapping of str to float
-            Loads and motions when it began.
+            Loads and motions at its beginning.
 
         Yields
         ------
@@ -185,7 +196,7 @@ class AdaptivePath(GivenPath):
             started = time.perf_counter()
             attempt, taken, verdict = self._taken(state, target, begun)
             found = taken.change
-            bound = self._size.accept(attempt, found, tolerance, verdict)
+            bound, traction_bound = self._size.accept(attempt, found, tolerance, verdict)
             reached = dataclasses.replace(taken.halves, **self._work)
             part = dataclasses.replace(self._numbered(target.until(attempt.end)), ramp=target.ramp)
             step = self.window.step(part, reached, self._before, started)
@@ -195,6 +206,7 @@ class AdaptivePath(GivenPath):
                 **step.history,
                 "stick_area_step_error": min(bound * self._area, contact),
                 "stick_area_step_change": found.stick * self._area,
+                "traction_step_error": traction_bound,
                 "traction_step_change": found.traction,
                 "rejected_steps": attempt.rejected,
                 "step_limited": int(verdict == LIMITED),
@@ -205,13 +217,12 @@ class AdaptivePath(GivenPath):
             yield self._placed(dataclasses.replace(step, history=history), attempt.end), state
 
     def _placed(self, step: Step, fraction: float) -> Step:
-        """Return a load step with all that the next one needs to be chosen and solved."""
+        """Return a load step with the data that the choice and solution of the next one need."""
         self._number += 1
         count = len(self.case.load_steps)
         done = (self.position + fraction) / count
-        self.position, self.fraction = (
-            (self.position, fraction) if fraction < 1.0 else (self.position + 1, 0.0)
-        )
+        whole = int(fraction >= 1.0)
+        self.position, self.fraction = self.position + whole, 0.0 if whole else fraction
         control: dict[str, Any] = {
             "position": self.position,
             "fraction": self.fraction,
@@ -220,9 +231,11 @@ class AdaptivePath(GivenPath):
             "area": self._area,
             "chooser": self._size.record,
         }
-        companion = _companion_fields(self._whole) if self._whole is not None else {}
+        companion: dict[str, Any] = {}
         if self._whole is not None:
-            control["companion"] = _numbers(self._whole)
+            state = vars(self._whole)
+            companion = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
+            control["companion"] = {name: state[name] for name in state if name not in companion}
         return dataclasses.replace(step, companion=companion, control=control, load_fraction=control["done"])
 
     # --- attempts -----------------------------------------------------------------------------------------
@@ -230,12 +243,12 @@ class AdaptivePath(GivenPath):
     def _taken(
         self, state: ContactState | None, target: LoadStep, begun: Mapping[str, float]
     ) -> tuple[Attempt, _Solved, int]:
-        """Try load steps until one is accepted, or smaller ones are of no more use.
+        """Attempt load steps until one is accepted, or smaller ones do not help.
 
         Returns
         -------
         attempt : Attempt
-            The step that is taken.
+            The accepted step.
         solved : _Solved
             Its solution.
         verdict : int
@@ -254,7 +267,7 @@ class AdaptivePath(GivenPath):
                 return attempt, solved, verdict
 
     def _tried(self, target: LoadStep, begun: Mapping[str, float], end: float) -> _Solved | None:
-        """Solve a load step as a whole and in halves, on a larger window if need be; None: not converged."""
+        """Solve a load step as a whole and in halves, the window growing as needed; None: not converged."""
         while True:
             try:
                 return self._solved(target, begun, end)
@@ -276,16 +289,10 @@ class AdaptivePath(GivenPath):
         halves = None if half is None else self._advanced(half, target, begun, end)
         if half is None or halves is None:
             return None
-        touching = halves.zone > 0
-        halves = dataclasses.replace(
-            halves,
-            slip_increment_x=np.where(touching, half.slip_increment_x + halves.slip_increment_x, 0.0),
-            slip_increment_y=np.where(touching, half.slip_increment_y + halves.slip_increment_y, 0.0),
-            cuts=half.cuts + halves.cuts,
-        )
-        window, mu = self.window, self.case.friction_coefficient
+        halves = self.window.joined(half, halves)
+        window = self.window
         found = change_by_halving(
-            window.lattice, window.candidate, mu, (whole, half, halves, apart, start), self._area
+            window.lattice, window.candidate, window.friction, (whole, half, halves, apart, start), self._area
         )
         return _Solved(whole, halves, found)
 
@@ -302,23 +309,3 @@ class AdaptivePath(GivenPath):
         if not solution.converged:
             self._failed = solution, part, values
         return solution if solution.converged else None
-
-
-# --- the path in whole steps, in records --------------------------------------------------------------
-
-
-def _companion_fields(state: ContactState) -> dict[str, np.ndarray]:
-    values = {entry.name: getattr(state, entry.name) for entry in dataclasses.fields(state)}
-    return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
-
-
-def _numbers(state: ContactState) -> dict[str, float | int | bool]:
-    values = {entry.name: getattr(state, entry.name) for entry in dataclasses.fields(state)}
-    return {name: value for name, value in values.items() if not isinstance(value, np.ndarray)}
-
-
-def _companion_state(step: Step) -> ContactState:
-    from ..core.friction import ContactState
-
-    state: dict[str, Any] = {**step.companion, **step.control["companion"]}
-    return ContactState(**state)

@@ -5,36 +5,34 @@ from __future__ import annotations
 import contextlib
 import logging
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
+from ..core.lattice import Lattice
 from ..errors import StopRun
-
-if TYPE_CHECKING:
-    from ..core.lattice import Lattice
-    from ..result.step import Step
+from ..result.step import Step
 
 
 class Listener:
-    """Follows a run; this one does nothing."""
+    """Follows a run; a listener overrides the events that it needs."""
 
     def begun(self, title: str, steps: int) -> None:
-        """Take note that a run begins.
+        """Note that a run begins.
 
         Parameters
         ----------
         title : str
             Title of the case.
         steps : int
-            Number of load steps; 0 if it shows on the way.
+            Number of load steps; 0 if it is open.
         """
 
     def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
-        """Take note that the load history begins again on another lattice.
+        """Note that the load history begins again on another lattice.
 
         Parameters
         ----------
         name : str
-            Which one: "lattice 3".
+            Its name: "lattice 3".
         lattice : Lattice
             Its first window.
         shifted : bool
@@ -42,25 +40,25 @@ class Listener:
         """
 
     def step(self, step: Step) -> None:
-        """Take note of a finished load step, which is safe by then."""
+        """Note a finished load step, which is recorded by then."""
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
-        """Take note of anything else.
+        """Note any other event.
 
         Parameters
         ----------
         event : str
-            What happened, in a word.
+            Its name.
         text : str
-            A sentence for people; empty if it is for the log alone.
+            A sentence for the terminal; empty if it is for the log alone.
         level : int
-            How serious it is, as in `logging`.
+            Severity, as in `logging`.
         **values
-            What is known about it, in SI.
+            Values of the event, SI.
         """
 
     def ended(self, error: BaseException | None) -> None:
-        """Take note that the run is over, be it by an error."""
+        """Note the end of the run, by an error or without."""
 
     @contextlib.contextmanager
     def following(self, title: str, steps: int) -> Iterator[None]:
@@ -74,51 +72,36 @@ class Listener:
         self.ended(None)
 
 
+def _passed(name: str) -> Callable[..., None]:
+    def to_all(self: Listeners, *values: Any, **named: Any) -> None:
+        for listener in self._all:
+            getattr(listener, name)(*values, **named)
+
+    return to_all
+
+
 class Listeners(Listener):
-    """Hands every event on to several listeners, in their order."""
+    """Passes every event to several listeners, in their order."""
 
     def __init__(self, *listeners: Listener) -> None:
         self._all = listeners
 
-    def begun(self, title: str, steps: int) -> None:
-        """Say that a run begins."""
-        for listener in self._all:
-            listener.begun(title, steps)
-
-    def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
-        """Say that the load history begins again."""
-        for listener in self._all:
-            listener.lattice(name, lattice, shifted)
-
-    def step(self, step: Step) -> None:
-        """Say that a load step is finished."""
-        for listener in self._all:
-            listener.step(step)
-
-    def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
-        """Say anything else."""
-        for listener in self._all:
-            listener.said(event, text, level, **values)
-
-    def ended(self, error: BaseException | None) -> None:
-        """Say that the run is over."""
-        for listener in self._all:
-            listener.ended(error)
+    begun, lattice, step, said, ended = map(_passed, ("begun", "lattice", "step", "said", "ended"))
 
 
 class Stopped(Exception):
-    """A callback ends the run after a load step; the message says which, and why."""
+    """Ends a run after a load step for a callback; the message is the reason."""
 
 
 class Callback(Listener):
-    """Calls a function of a script with each finished load step, which may end the run.
+    """Calls a function of a script with each finished load step; the function may end the run.
 
     Parameters
     ----------
     on_step : callable
         The function. If it returns something true, or raises `StopRun`, the run ends.
     refines : bool
-        Whether more lattices may follow the last load step, which otherwise ends the run by itself.
+        Whether other lattices may follow the last load step.
     """
 
     def __init__(self, on_step: Callable[[Step], object], refines: bool = False) -> None:

@@ -1,128 +1,111 @@
-"""Contact with friction on one window of the lattice, and the state of a run as its records keep it."""
+"""Contact with friction on one window of the lattice, and its state from the records of a run."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import numpy as np
 
-from ..core import contact
-from ..core.edges import ContactEdges, Edge
-from ..core.estimators import area_radius
+from ..arrays import Array
 from ..core.friction import ContactState, FrictionalContact
-from ..core.measures import elastic_energy, zone_extent
+from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..problem.loads import LoadStep
 from ..result.step import Step
-from ..variables import CORE, STATE
-from .frictionless import Array, Window
-
-if TYPE_CHECKING:
-    from ..core.lattice import Lattice
+from ..variables import BULK_STRAIN, CORE, STATE
+from .frictionless import Window
 
 # numbers of a state that have the names of the history
 _NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
-_ROUGHLY = 1e-4  # residual of a solution that only tells how large the contact becomes
+_ROUGHLY = 1e-4  # residual of a solution that serves for the size of the contact
 
 
 class FrictionWindow(Window[ContactState]):
     """Contact with friction; a step starts from the state at the end of the step before."""
 
     state = STATE[True]
+    _contact: FrictionalContact
 
     def _solver(self, gap: Array) -> FrictionalContact:
         return FrictionalContact(
             self.lattice,
-            self.case.pair,
+            self.case.solved_pair,
             gap,
             self.candidate,
-            friction_coefficient=self.case.friction_coefficient,
+            friction_coefficient=self.friction,
             coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
             method=self.case.method_for(self.lattice),
+            interface=self.case.interface,
+            rim_warning=False,
         )
 
     def advance(
-        self, state: ContactState | None, target: LoadStep, values: tuple[float, ...]
+        self,
+        state: ContactState | None,
+        target: LoadStep,
+        values: tuple[float, ...],
+        **how: Any,
     ) -> ContactState:
-        """Go on from a state to new loads and motions."""
-        solution: ContactState = self._contact.advance(
+        """Advance a state to new loads and motions; `how` goes to the solver."""
+        return self._contact.advance(
             self._contact.virgin() if state is None else state,
             [motion.control for motion in target.targets],
             values,
+            bulk_strain=self.case.bulk(target.bulk)[1],
             static=self.case.solver.algorithm == "static",
             entry="interpolated" if self.case.solver.entry == "interpolated" else "implicit",
-            tolerance=self.case.solver.tolerance,
+            **{"tolerance": self.case.solver.tolerance} | how,
         )
-        return solution
+
+    def wear(self, depth: Array) -> None:
+        """Set the worn depth (m), which adds to the gap before loading."""
+        self.worn = depth
+        del self._contact  # frees the memory of the solver before that of the next
+        self._contact = self._solver(np.where(self.candidate, self.initial_gap + depth, np.inf))
+
+    def grown(self, solution: ContactState, target: LoadStep) -> Self:
+        """Return the problem on a larger window, with its worn depth."""
+        larger = super().grown(solution, target)
+        if self.worn is not None:
+            larger.wear(np.asarray(self.lattice.embed(self.worn, larger.lattice, 0.0), dtype=float))
+        return larger
+
+    def joined(self, first: ContactState, last: ContactState) -> ContactState:
+        """Record two steps as one, with the slip of both and its residual."""
+        return self._contact.joined(first, last)
 
     def carried(self, state: ContactState | None, lattice: Lattice) -> ContactState | None:
-        """Return a state on this window; what the new nodes have been through follows from it."""
+        """Return a state on this window; the history of the new nodes follows from it."""
         return None if state is None else self._contact.extended(state, lattice)
 
     def restored(self, step: Step) -> ContactState | None:
-        """Return the whole state."""
+        """Return the whole state, and set the worn depth of the step."""
+        if (worn := step.fields.get("worn_depth")) is not None:
+            self.wear(np.array(worn))
         return state_of(step)
 
-    # --- what a step leaves -------------------------------------------------------------------------------
+    # --- history ------------------------------------------------------------------------------------------
 
-    def _more_history(
-        self, solution: ContactState, before: ContactState | None, edges: ContactEdges
-    ) -> dict[str, float]:
+    def _history(self, solution: ContactState, before: ContactState | None) -> dict[str, float]:
         static = self.case.solver.algorithm == "static"  # nothing has gone before
         spent_before = 0.0 if before is None or static else before.dissipated_energy
+        spent = solution.dissipated_energy - spent_before
+        history = {**super()._history(solution, before), "dissipated_energy_step": spent}
         return {
-            **{name: getattr(solution, name) for name in _NUMBERS},
-            **self._stick_measures(solution, edges),
-            "max_traction": float(np.hypot(solution.traction_x, solution.traction_y).max()),
-            "dissipated_energy_step": solution.dissipated_energy - spent_before,
-            "elastic_energy": elastic_energy(self.lattice, self.initial_gap, solution),
-            "sweeps": solution.sweeps,
-            "cuts": solution.cuts,
+            name: value for name, value in history.items() if self.case.deck.bulk or name not in BULK_STRAIN
         }
-
-    def stick_edge(self, solution: ContactState, edges: ContactEdges) -> Edge:
-        """Return the edge of the stick zone."""
-        stick, mu = solution.zone == 1, self.case.friction_coefficient
-        reserve = np.zeros(stick.shape)  # not looked at where nothing slips
-        if math.isfinite(mu):
-            reserve = mu * solution.pressure - np.hypot(solution.traction_x, solution.traction_y)
-        return edges.stick(stick, reserve)
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
-        method = self.case.method_for(self.lattice)
-        solver = contact.NormalContact(self.lattice, self.case.pair, self.initial_gap, self.candidate, method)
-        areas = []
-        for control, name in (("force", "normal_load"), ("displacement", "approach")):
-            values = [step.z.value for step in self.case.load_steps if step.z.control == control]
-            if (value := max(values, default=0.0)) > 0:
-                driven: dict[str, Any] = {name: value}
-                solution = solver.solve(**driven, tolerance=_ROUGHLY)
-                areas.append(self.lattice.cell_area * int((solution.zone > 0).sum()))
-        return max([self.lattice.cell_area, *areas])
-
-    def _stick_measures(self, solution: ContactState, edges: ContactEdges) -> dict[str, float]:
-        """Return size and place of the stick zone; NaN for its place where there is none."""
-        stick = solution.zone == 1
-        edge = self.stick_edge(solution, edges)
-        center, lower, upper = zone_extent(self.lattice, stick)
-        return {
-            "stick_area": self.lattice.cell_area * int(stick.sum()),
-            "stick_radius": area_radius(stick, self.lattice.cell_area),
-            "stick_area_fit": edge.area,
-            "stick_radius_fit": edge.radius,
-            "stick_center_x": float(center[0]),
-            "stick_center_y": float(center[1]),
-            "stick_min_x": float(lower[0]),
-            "stick_max_x": float(upper[0]),
-            "stick_min_y": float(lower[1]),
-            "stick_max_y": float(upper[1]),
-        }
+        solver, nodes = self._without_friction(self.initial_gap), 1
+        for drive in self.case.largest_drives:
+            known: dict[str, Any] = {**drive}
+            nodes = max(nodes, int((solver.solve(**known, tolerance=_ROUGHLY).zone > 0).sum()))
+        return self.lattice.cell_area * nodes
 
 
 def state_of(step: Step) -> ContactState:
-    """Return the state of a contact with friction at the end of a step, as the run had it.
+    """Return the state of a contact with friction at the end of a step.
 
     Parameters
     ----------
@@ -134,13 +117,13 @@ def state_of(step: Step) -> ContactState:
     DeckError
         If a field or a value is missing, as in a frictionless run.
     """
-    needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"}
+    needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(
             f"step {step.number} holds no state of a contact with friction: it lacks "
             f"{', '.join(sorted(missing))}"
         )
     state: dict[str, Any] = {name: np.array(step.fields[name]) for name in FrictionWindow.state}
-    state |= {name: float(step.history[name]) for name in _NUMBERS}
+    state |= {name: float(step.history.get(name, 0.0)) for name in _NUMBERS}
     state |= {name: int(step.history[name]) for name in ("sweeps", "cuts")}
     return ContactState(**state)  # a finished step has converged, and away from the rim

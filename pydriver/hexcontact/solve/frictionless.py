@@ -10,69 +10,80 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..core import contact, kernel_cache, memory
 from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
-from ..core.edges import ContactEdges
-from ..core.estimators import area_radius, pressure_center
-from ..core.measures import elastic_energy
+from ..core.friction import ContactState
+from ..core.lattice import Lattice
+from ..core.measures import measures
+from ..deck.interface import coulomb
+from ..deck.units import readable
 from ..errors import DeckError
-from ..problem.loads import MOTIONS
+from ..interior import stress
+from ..interior.region import region
+from ..problem.loads import MOTIONS, LoadStep
+from ..problem.problem import Problem
+from ..problem.window import grown, rim_sides
 from ..result.step import Step
 from ..text import listed
-from ..variables import DISPLACEMENTS, LOADS, STATE
+from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, STATE, WORN, names_where
 from .events import Listener
 
-if TYPE_CHECKING:
-    from ..core.friction import ContactState
-    from ..core.lattice import Lattice
-    from ..problem.loads import LoadStep
-    from ..problem.problem import Problem
-
-Array = NDArray[np.float64]
-
-# Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap,
-# zones, on their way through the core. With friction: the state before, itself and on its way through the
-# core both ways, gaps, coordinates.
-ARRAYS = {False: 8, True: 34}
-S = TypeVar("S", NormalSolution, "ContactState")  # how a load step ends
+# Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap
+# and zones, with the copies of f2py. With friction: the state before, the state, the copies of both, gaps,
+# coordinates.
+ARRAYS = {False: 8, True: 37}
+S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 
 _ITEM = 8  # bytes of a float
+_STEPPED = names_where(lambda v: v.dims == ("step",))
 # Measured by tests/bench/memory.py.
-_WRITING = 18 * 2**20  # bytes that netCDF and HDF5 take, which are loaded when the output is written
-_LOADED = 3 * 2**20  # bytes of modules that a run imports on its way
-_LEFT = 0.5  # share of what solving takes that operators and states have when the output is written
-_PART = {
-    False: 60,
-    True: 500,
-}  # bytes of a node in contact for parts of the window; with friction
-_COMPANION_ARRAYS = 40  # fields of the path that load steps of half the size are compared with, and edges
-_ENTRY_ARRAYS = 45  # fields that the core needs to find where nodes stood when their gap closed
+_WRITING = 18 * 2**20  # bytes of netCDF and HDF5, which are loaded to write the output
+_LOADED = 3 * 2**20  # bytes of modules that a run imports
+_LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
+_LEFT = 0.5  # share of operators and states, which remain for the output, in the memory of solving
+_PART = {False: 110, True: 500}  # bytes of a node in contact, for parts of the window, by friction
+_COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
+_LAW_ARRAYS = 6  # coefficients by node, here, in the core, on its lattices and parts
+_INTERFACE_ARRAYS = {False: 4, True: 6}  # springs of a compliant interface, and the symbol of bodies on them
+_WEAR_ARRAYS = 78  # fields of the cycles before and after a jump, and of their record
+_END_ARRAYS = 3  # fields that remember the end of a load step of the cycle
+_ENTRY_ARRAYS = 45  # fields of the core for the places of nodes when their gap closed
 
 
 # --- memory ---------------------------------------------------------------------------------------
 
 
 def peak_memory(case: Problem, lattice: Lattice) -> int:
-    """Return the memory (bytes) that a run on a window takes at most, with interpreter and libraries."""
-    return memory.resident() + memory_needed(case, lattice, _parts(case, lattice))
+    """Return the largest memory (bytes) of a run on a window, with interpreter and libraries."""
+    solved = memory_needed(case, lattice, _parts(case, lattice))
+    return memory.resident() + max(solved, _stress_memory(case, lattice, kept=True))
+
+
+def _stress_memory(case: Problem, lattice: Lattice, kept: bool = False) -> int:
+    """Return the memory (bytes) of the tables [[stress]] and [[fatigue]] after the run."""
+    needed = 0
+    for table in case.deck.stress:
+        all_steps = math.ceil(len(case.load_steps) / case.output.every)
+        steps = all_steps if table.steps == "all" else len(table.steps or (1,))
+        needed = max(needed, stress.memory_needed(lattice, region(lattice, **table.where), steps, kept))
+    return needed + _LOADED_AFTER * bool(case.deck.stress or case.deck.fatigue)
 
 
 def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
-    """Return the memory (bytes) that solving and writing load steps on a window takes.
+    """Return the memory (bytes) to solve and write load steps on a window.
 
-    The contact is taken as large as estimated at the largest load; as the window where there is no estimate.
-    `kept` are further bytes, which could be done without.
+    The size of the contact is the estimate at the largest load, else that of the window. `kept` are further,
+    dispensable bytes.
     """
-    from ..core import contact as native
-
     bodies = {name[:-2] for name in case.output.fields if name in DISPLACEMENTS}
     operator, set_up = (
-        native.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
+        contact.memory_needed("fft", *lattice.shape, part=part, threads=memory.threads())
         for part in ("operator", "set-up of the operator")
     )
     arrays = ARRAYS[case.frictional]
@@ -80,15 +91,21 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
         arrays += _ENTRY_ARRAYS
     if case.adaptive:
         arrays += _COMPANION_ARRAYS
+    if math.isnan(case.friction_coefficient):
+        arrays += _LAW_ARRAYS
+    if case.deck.wear:
+        arrays += _WEAR_ARRAYS + _END_ARRAYS * (1 + len(case.cycle))
+    if case.deck.interface:
+        arrays += _INTERFACE_ARRAYS[case.frictional]
     needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size + kept
     if bodies:
-        # beside a solver with friction, whose vectors are gone by then, the set-up needs nothing more
+        # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
     return _LOADED + max(needed, int(_LEFT * needed) + _WRITING)
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:
-    """Return the bytes of operators on parts of the window around a growing contact, and of kept spectra.
+    """Return the bytes of operators on parts of the window around a growing contact, and of cached spectra.
 
     Of n steps in which it grows, about log2(n) need a part that is larger by much.
     """
@@ -113,28 +130,35 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
     lattice : Lattice
         The window.
     steps_held : int
-        Load steps whose fields the result will keep in memory.
+        Load steps whose fields the result holds in memory.
 
     Raises
     ------
     ResourceError
         If less memory is available.
     """
-    advice = ["a smaller window" if case.window_fixed else "a larger grid.spacing"]
+    kept = steps_held * len(fields_of(case)) * _ITEM * lattice.size
+    needed = max(memory_needed(case, lattice), _stress_memory(case, lattice)) + kept
+    there = memory.available()
+    fitting = lattice.spacing * math.sqrt(1.1 * needed / max(there, 1))
+    fits = f', such as "{readable(fitting)}"' if lattice.spacing < fitting < math.inf else ""
+    advice = ["a smaller window" if case.window_fixed else f"a larger grid.spacing{fits}"]
     if (method := case.method_for(lattice)) == "direct":
         advice.append('solver.method = "fft"')
     if steps_held:
         advice.append("an output file")
     memory.require(
-        memory_needed(case, lattice) + steps_held * len(fields_of(case)) * _ITEM * lattice.size,
+        needed,
         f"a window of {lattice.n_row} x {lattice.n_col} nodes (method {method})",
         f"choose {listed(advice, 'or')}",
+        there,
     )
 
 
 def fields_of(case: Problem) -> tuple[str, ...]:
-    """Return the fields that each step of a case has: its whole state, and displacements if asked for."""
-    return (*STATE[case.frictional], *(name for name in DISPLACEMENTS if name in case.output.fields))
+    """Return the fields of each step of a case: its whole state, and displacements that the deck names."""
+    worn = WORN if case.deck.wear else ()
+    return (*STATE[case.frictional], *worn, *(name for name in DISPLACEMENTS if name in case.output.fields))
 
 
 # --- windows --------------------------------------------------------------------------------------
@@ -150,16 +174,18 @@ class Window(ABC, Generic[S]):
     lattice : Lattice
         The window.
     steps_held : int
-        Load steps whose fields the result will keep in memory.
+        Load steps whose fields the result holds in memory.
     listener : Listener, optional
         Follows the run.
 
     Attributes
     ----------
     initial_gap : ndarray, (n_row, n_col)
-        Gap before loading (m), NaN where the bodies can never touch.
+        Gap before loading (m), NaN where the bodies cannot touch.
     candidate : ndarray of bool, (n_row, n_col)
         Nodes that can touch.
+    friction : FrictionLaw
+        Friction at the nodes.
 
     Raises
     ------
@@ -168,6 +194,7 @@ class Window(ABC, Generic[S]):
     """
 
     state: ClassVar[tuple[str, ...]]  # fields of every step
+    worn: Array | None = None  # depth by which the surfaces are worn, m
 
     def __init__(
         self, case: Problem, lattice: Lattice, steps_held: int = 0, listener: Listener | None = None
@@ -177,12 +204,19 @@ class Window(ABC, Generic[S]):
         self.listener = listener or Listener()
         gap, self.candidate = case.initial_gap(lattice)
         self.initial_gap: Array = np.where(self.candidate, gap, np.nan)
+        self.friction = case.friction_law(lattice)
         self._bodies: dict[int, FlexibilityOperator] = {}
         self._contact: Any = self._solver(gap)
 
     @abstractmethod
     def _solver(self, gap: Array) -> Any:
-        """Make the solver, given the initial gap (inf where nothing can touch)."""
+        """Return the solver for an initial gap (inf where nothing can touch)."""
+
+    def _without_friction(self, gap: Array) -> contact.NormalContact:
+        """Return the solver of the contact without friction."""
+        method = self.case.method_for(self.lattice)
+        given = self.lattice, self.case.solved_pair, gap, self.candidate
+        return contact.NormalContact(*given, method, interface=self.case.interface, rim_warning=False)
 
     @abstractmethod
     def advance(self, state: S | None, target: LoadStep, values: tuple[float, ...]) -> S:
@@ -193,29 +227,25 @@ class Window(ABC, Generic[S]):
         state : solution or None
             End of the step before, None before the first load.
         target : LoadStep
-            How z, x, y and the twist are driven.
+            Control of z, x, y and the twist.
         values : tuple of float
-            The load or motion prescribed for each of them.
+            The prescribed load or motion of each.
         """
 
     def carried(self, state: S | None, lattice: Lattice) -> S | None:
-        """Return a state that was solved on a smaller window on this one."""
+        """Return a state of a smaller window on this one."""
         return state
 
     def restored(self, step: Step) -> S | None:
-        """Return the state at the end of a step that was solved on this window, if the next one needs it."""
+        """Return the state at the end of a step on this window, if the next one needs it."""
         return None
 
-    @abstractmethod
-    def _more_history(self, solution: S, before: S | None, edges: ContactEdges) -> dict[str, float]:
-        """Return what has one value by step beyond load, approach and contact area."""
-
     def outgrown(self, solution: S) -> bool:
-        """Tell whether the contact reached the rim of the window, be it in a part of the step only."""
-        return solution.touches_rim
+        """Test whether the contact reached the rim of the window, also in a part of the step only."""
+        return solution.touches_rim and not self.case.full_contact
 
     def grown(self, solution: S, target: LoadStep) -> Self:
-        """Return a larger window for a contact that reached the rim; this one is of no use any more.
+        """Return a larger window for a contact that reached the rim, in place of this one.
 
         Raises
         ------
@@ -230,12 +260,12 @@ class Window(ABC, Generic[S]):
             )
         del self._contact  # its memory goes before that of the next comes
         self._bodies.clear()
-        larger = self.case.grown(self.lattice, solution.zone > 0)
+        larger = grown(self.lattice, rim_sides(solution.zone > 0))
         self.listener.said("window", step=target.index + 1, before=self.lattice.shape, after=larger.shape)
         return type(self)(self.case, larger, self.steps_held, self.listener)
 
     def step(self, target: LoadStep, solution: S, before: S | None, started: float) -> Step:
-        """Return what a load step leaves.
+        """Return a finished load step.
 
         Parameters
         ----------
@@ -244,20 +274,25 @@ class Window(ABC, Generic[S]):
         solution, before : solution
             Its end, and that of the step before (None: none).
         started : float
-            When work on it began (s, `time.perf_counter`).
+            Time at which its solution began (s, `time.perf_counter`).
         """
         fields = {"initial_gap": self.initial_gap}
         fields |= {name: getattr(solution, name) for name in self.state}
         fields["gap"] = np.where(self.candidate, solution.gap, np.nan)
+        if self.worn is not None:
+            fields["worn_depth"] = self.worn
         for body in (1, 2):
             wanted = [name for name in fields_of(self.case) if name.startswith(f"displacement_{body}")]
             if wanted:
                 moved = self._displacement(body, fields)
                 fields |= {name: moved[name[-1]] for name in wanted}
-        edges = self.edges_of(solution)
+        bulk: dict[str, float] = {}
+        if self.case.deck.bulk:
+            bulk = dict(zip(BULK_STRESS, self.case.bulk(target.bulk)[0].tolist(), strict=True))
+            bulk["bulk_body"] = self.case.deck.bulk.body
         history: dict[str, float | int | str] = {
-            **self._contact_measures(solution, edges),
-            **self._more_history(solution, before, edges),
+            **self._history(solution, before),
+            **bulk,
             "segment": target.segment + 1,
             "label": target.label,
             "seconds": time.perf_counter() - started,
@@ -270,42 +305,34 @@ class Window(ABC, Generic[S]):
             prescribed=self._prescribed(target, history),
             load_fraction=(target.index + 1) / len(self.case.load_steps),
             ramp_done=target.fraction,
+            bodies=(self.case.body_1, self.case.body_2),
+            friction=coulomb(self.case.deck.friction, self.case.deck.interface) or 0.0,
+            sharp=self.case.deck.interface is None,
         )
 
     def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
-        """Return what drives a load step, by the keys of the deck."""
+        """Return the prescribed loads and motions of a load step, by the keys of the deck."""
         driven = {}
         for motion, drive in zip(MOTIONS, target.targets, strict=True):
             if motion == "z" or self.case.frictional:
                 name = LOADS[motion][drive.control == "displacement"]
-                # a ramp that takes over from the other control begins where that one ended
+                # a ramp after the other control begins at the value that control led to
                 driven[name] = float(history[name] if drive.from_start else drive.value)
-        return driven
+        known = self.case.deck.bulk.components if self.case.deck.bulk else ()
+        stresses = zip(BULK_STRESS, target.bulk, strict=True)
+        return driven | {name: value for name, value in stresses if name in known}
 
-    def edges_of(self, solution: S) -> ContactEdges:
-        """Return the edges of the contact, and of what is inside."""
-        return ContactEdges(
-            solution.pressure, solution.gap, solution.zone > 0, self.candidate, self.lattice.basis
+    def _history(self, solution: S, before: S | None) -> dict[str, float]:
+        """Return the numbers of a state: those of the solver, and its measures."""
+        known = solution.__dict__
+        given = {name: known[name] for name in _STEPPED if name in known}
+        worn = 0.0 if (depth := self.worn) is None else depth
+        return given | measures(
+            self.lattice, self.friction, self.initial_gap + worn, self.candidate, solution
         )
 
-    def _contact_measures(self, solution: S, edges: ContactEdges) -> dict[str, float]:
-        """Return load, approach and the size of the contact."""
-        inside, edge = solution.zone > 0, edges.contact()
-        center = pressure_center(self.lattice.x, self.lattice.y, solution.pressure)
-        return {
-            "normal_load": solution.normal_load,
-            "approach": solution.approach,
-            "contact_area": self.lattice.cell_area * int(inside.sum()),
-            "contact_radius": area_radius(inside, self.lattice.cell_area),
-            "contact_area_fit": edge.area,
-            "contact_radius_fit": edge.radius,
-            "pressure_center_x": center[0],
-            "pressure_center_y": center[1],
-            "max_pressure": float(solution.pressure.max()),
-        }
-
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
-        """Surface displacement of one body, z into the body itself.
+        """Return the surface displacement of one body, z into the body itself.
 
         Against a rigid partner u1 - u2 is the displacement of the body alone, and so is u1z + u2z.
         """
@@ -325,13 +352,11 @@ class Window(ABC, Generic[S]):
 
 
 class NormalWindow(Window[NormalSolution]):
-    """Contact without friction; every step stands for itself."""
+    """Contact without friction, whose steps have no history."""
 
     state = STATE[False]
 
-    def _solver(self, gap: Array) -> contact.NormalContact:
-        method = self.case.method_for(self.lattice)
-        return contact.NormalContact(self.lattice, self.case.pair, gap, self.candidate, method)
+    _solver = Window._without_friction
 
     def advance(
         self, state: NormalSolution | None, target: LoadStep, values: tuple[float, ...]
@@ -340,14 +365,3 @@ class NormalWindow(Window[NormalSolution]):
         driven = {"normal_load" if target.z.control == "force" else "approach": values[0]}
         solution: NormalSolution = self._contact.solve(**driven, tolerance=self.case.solver.tolerance)
         return solution
-
-    def _more_history(
-        self, solution: NormalSolution, before: NormalSolution | None, edges: ContactEdges
-    ) -> dict[str, float]:
-        return {
-            "elastic_energy": elastic_energy(self.lattice, self.initial_gap, solution),
-            "sweeps": solution.sweeps,
-            "operator_applications": solution.operator_applications,
-            "residual_normal": solution.residual_normal,
-            "residual_force": solution.residual_force,
-        }

@@ -1,4 +1,4 @@
-"""Signals that end a run: work is done in a second thread while the first one waits, for it and for them."""
+"""Signals that end a run: a second thread works while the first waits for it and for signals."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterator
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)  # the last comes from Slurm, before a time limit
 
-ends_process = False  # whether it ends with the command: then no signal changes its exit code any more
+ends_process = False  # whether the process ends with the command, and ignores signals from then on
 
 
 class Interrupted(BaseException):
-    """A signal has come that ends the run."""
+    """Raised by a signal that ends the run."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -24,9 +24,9 @@ class Interrupted(BaseException):
 
 @contextlib.contextmanager
 def signal_pipe() -> Iterator[tuple[int, int]]:
-    """Open a pipe into which the signals that end a run put their numbers, in the order they come.
+    """Open a pipe that takes the numbers of signals that end a run, in their order.
 
-    They raise nothing, wherever they come, so that leaving is not interrupted by those that follow.
+    The signals raise nothing, so that a later one does not interrupt the end of the run.
     """
     old = {number: signal.getsignal(number) for number in _SIGNALS}
     handled = {number: handler for number, handler in old.items() if handler not in (signal.SIG_IGN, None)}
@@ -48,27 +48,27 @@ def signal_pipe() -> Iterator[tuple[int, int]]:
 def in_background(
     work: Callable[[], object], pipe: tuple[int, int], ends: Callable[[Interrupted], bool] = lambda _: True
 ) -> None:
-    """Do `work` in a second thread while this one waits for it, and for signals.
+    """Call `work` in a second thread while this one waits for it and for signals.
 
-    The compiled core cannot be interrupted; a thread that waits can.
+    A signal cannot interrupt the compiled core, but it can interrupt a thread that waits.
 
     Parameters
     ----------
     work : callable
-        What to do.
+        The function.
     pipe : tuple of int
         The pipe of `signal_pipe`.
     ends : callable
-        Tells whether a signal ends the work; if not, it goes on.
+        Tests whether a signal ends the work.
 
     Raises
     ------
     Interrupted
-        If a signal ends the work; the thread may still be at it.
+        If a signal ends the work; the thread may go on for a while.
     """
     reader, writer = pipe
     raised: list[BaseException] = []
-    own = os.dup(writer)  # the pipe may be closed by the time, and its number be that of another file
+    own = os.dup(writer)  # once the pipe is closed, its number may be that of another file
 
     def worker() -> None:
         try:

@@ -1,10 +1,10 @@
-"""Refines the lattice of a case until its result is as accurate as asked for.
+"""Refines the lattice of a case until its result reaches the target accuracy.
 
 Lattices that get finer by the square root of two are solved one after the other, each with the whole load
 history, until the last two agree to the target. Then four shifted copies of the lattice two levels below,
 which together have as many nodes as the finest, show the scatter, and errors are estimated. If they miss the
-target the next level follows. The solvers start every load step from coarser lattices of their own, so that
-nothing is handed from one lattice to the next.
+target, the next level follows. The solutions are independent, since the solvers start every load step on
+coarser lattices of their own.
 """
 
 from __future__ import annotations
@@ -14,46 +14,43 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import DeckError, ResourceError
+from ..problem.problem import Problem
 from ..problem.refinement import LEAST_LEVELS, RATIO, SHIFTS, Trial
-from ..result.history import spelled
 from ..result.journal import Journal, journal_of
 from ..result.layout import Metadata
 from ..result.step import Step
 from ..result.store import Store
 from ..result.trials import Solution, TrialFolder
-from ..variables import ESTIMATED
+from ..variables import ESTIMATED, spelled
 from . import accuracy
 from .events import Listener
 from .frictionless import require_memory
 from .steps import check_step, steps
 
-if TYPE_CHECKING:
-    from ..problem.problem import Problem
-
-_SAME = 1e-12  # relative difference of spacings that are the same
+_SAME = 1e-12  # relative difference of equal spacings
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """A case on all its lattices, with the errors that follow.
+    """A case on all its lattices, with the estimated errors.
 
     Parameters
     ----------
     solutions : sequence of Solution
-        On all lattices, in the order they were solved.
+        On all lattices, in the order of solution.
     errors : sequence of mapping
         Estimated error of each scalar by load step.
     relative : mapping of str to float
-        Largest error of those quantities that are to reach the target, in their largest value.
+        Largest error of the quantities that have the target, over their largest value.
     target : float
         The target.
     limit : str
-        What kept the lattice from being refined further; empty if the target was reached.
+        Reason why the lattice was not refined further; empty if the target was reached.
     """
 
     solutions: Sequence[Solution]
@@ -71,7 +68,7 @@ class Refinement:
 
     @property
     def shortfall(self) -> str:
-        """Say which quantity missed the target, and why it ended there."""
+        """Sentence on the quantity that missed the target, and the reason."""
         name, error = accuracy.worst(self.relative)
         return (
             f"accuracy.target = {self.target:g} is not reached: the estimated error of {name} is {error:.2g} "
@@ -82,12 +79,11 @@ class Refinement:
     def trials(self) -> dict[str, list[Any]]:
         """The table of the lattices."""
         columns: dict[str, list[Any]] = {
-            "trial_level": [s.level for s in self.solutions],
-            "trial_copy": [s.copy for s in self.solutions],
-            "trial_spacing": [s.spacing for s in self.solutions],
-            "trial_origin_x": [s.origin[0] for s in self.solutions],
-            "trial_origin_y": [s.origin[1] for s in self.solutions],
-            "trial_nodes": [s.nodes for s in self.solutions],
+            f"trial_{name}": [getattr(s, name) for s in self.solutions]
+            for name in ("level", "copy", "spacing", "nodes")
+        }
+        columns |= {
+            f"trial_origin_{axis}": [s.origin["xy".index(axis)] for s in self.solutions] for axis in "xy"
         }
         for name in ESTIMATED:
             if name in self.solutions[0].histories[0]:
@@ -95,24 +91,24 @@ class Refinement:
         return columns
 
     def metadata(self, metadata: Metadata) -> Metadata:
-        """Return what the result says about where it comes from."""
+        """Return the metadata of a result with the reached accuracy."""
         return dataclasses.replace(metadata, parameters={**metadata.parameters, **self.parameters})
 
     def with_errors(self, step: Step) -> Step:
-        """Return a load step of the finest lattice with its errors."""
+        """Return a load step of the finest lattice with its errors in the history."""
         errors = {f"{name}_error": error for name, error in self.errors[step.index].items()}
         return dataclasses.replace(step, history={**step.history, **errors})
 
 
 def refine(case: Problem, solver: InMemory | OnDisk) -> Refinement:
-    """Solve a case on finer and finer lattices, until its accuracy is reached or a limit is.
+    """Solve a case on finer and finer lattices up to its accuracy or a limit.
 
     Parameters
     ----------
     case : Problem
-        The case, with an accuracy to reach.
+        The case, with a target accuracy.
     solver : InMemory or OnDisk
-        Solves it on one lattice after the other, and keeps the load steps.
+        Solves it on a lattice, and records the load steps.
 
     Raises
     ------
@@ -156,13 +152,12 @@ def _meets(relative: Mapping[str, float], target: float) -> bool:
 
 
 def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
-    """Return what keeps the lattice from being refined after a solution; empty if nothing does."""
+    """Return the reason why the lattice cannot be refined after a solution; empty if it can."""
     assert case.accuracy is not None
     try:
         finer = Trial(last.level + 1).case(case)
-        nodes = max(
-            finer.lattice.size, math.ceil(RATIO**2 * last.nodes)
-        )  # a window that grew will grow again
+        # a window that grew grows again
+        nodes = max(finer.lattice.size, math.ceil(RATIO**2 * last.nodes))
         if nodes > case.accuracy.max_nodes:
             return (
                 f"the next lattice has about {nodes:,} nodes, more than "
@@ -174,7 +169,7 @@ def limit_of(case: Problem, last: Solution, in_memory: bool) -> str:
     return ""
 
 
-# --- where load steps go ------------------------------------------------------------------------------------
+# --- records of load steps ----------------------------------------------------------------------------------
 
 
 def _solved(
@@ -185,7 +180,7 @@ def _solved(
     before: Sequence[Step] = (),
     in_memory: bool = False,
 ) -> Solution:
-    """Solve the load history on a lattice; `keep` makes each load step safe."""
+    """Solve the load history on a lattice; `keep` records each load step."""
     heads = [step.head for step in before]
     for step in steps(case, in_memory, before, listener=listener):
         keep(step)
@@ -203,7 +198,7 @@ class InMemory:
     Parameters
     ----------
     steps : list of Step
-        Where they go.
+        The list for them.
     listener : Listener
         Follows the run, and may end it.
     """
@@ -214,7 +209,7 @@ class InMemory:
         self.steps, self.listener = steps, listener
 
     def solve(self, trial: Trial, case: Problem) -> Solution:
-        """Solve the load history on a lattice; the steps on shifted copies are not kept."""
+        """Solve the load history on a lattice, without a record for a shifted copy."""
         if trial.copy:
             return _solved(trial, case, self.listener, keep=lambda step: None)
         self.steps.clear()
@@ -242,7 +237,7 @@ class OnDisk:
             self._trials.write(store.metadata, self._solutions)
 
     def solve(self, trial: Trial, case: Problem) -> Solution:
-        """Solve the load history on a lattice, or what is missing of it."""
+        """Solve the load history on a lattice, or its missing steps."""
         for solution in self._solutions:
             if (solution.level, solution.copy) == (trial.level, trial.copy):
                 if abs(solution.spacing - case.lattice.spacing) > _SAME * solution.spacing:
@@ -267,7 +262,7 @@ class OnDisk:
 
     @contextlib.contextmanager
     def _opened(self, trial: Trial) -> Iterator[tuple[Store, Step | None]]:
-        """Open the journal of a lattice; yield its last finished step, too."""
+        """Open the journal of a lattice; yield its store and its last finished step."""
         path, last = self._trials.path(trial.level, trial.copy), None
         if Journal(journal_of(path)):
             store, last = Store.reopened(path)
@@ -281,7 +276,7 @@ class OnDisk:
             store.close()
 
     def finish(self, refinement: Refinement) -> None:
-        """Put the output in its place and clear the journal away."""
+        """Write the output and delete the journal."""
         best = accuracy.finest(refinement.solutions)
         journal = Journal(journal_of(self._trials.path(best.level)))
         self._store.finish_with(

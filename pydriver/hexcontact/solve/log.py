@@ -1,7 +1,7 @@
 """The log of runs: a line for the beginning, each load step, the end, through the logger ``hexcontact``.
 
-It goes nowhere by itself: ``logging.getLogger("hexcontact")`` in Python, ``--log-file`` and
-``--log-level`` on the command line. A line is words ``name=value``; values are in SI, text stands in quotes.
+It has no destination by default: ``logging.getLogger("hexcontact")`` sets one in Python, ``--log-file`` and
+``--log-level`` on the command line. A line is words ``name=value``; values are in SI, text is in quotes.
 """
 
 from __future__ import annotations
@@ -9,31 +9,30 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import os
 import re
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
+from ..core.lattice import Lattice
 from ..errors import DeckError, HexcontactError
 from ..result.history import worth_showing
+from ..result.step import Step
 from ..text import visible
 from ..variables import RESIDUALS, label_of
 from .events import Listener
 
-if TYPE_CHECKING:
-    from ..core.lattice import Lattice
-    from ..result.step import Step
-
 logger = logging.getLogger("hexcontact")
-logger.addHandler(logging.NullHandler())  # else warnings went to standard error by default
+logger.addHandler(logging.NullHandler())  # without it warnings go to standard error
 
 LEVELS = ("debug", "info", "warning", "error")
 
 
 def words(event: str, **values: Any) -> str:
-    """Write what happened and its values on one line: ``words("step", P=2.0)`` is ``"step P=2"``."""
+    """Write an event and its values on one line: ``words("step", P=2.0)`` is ``"step P=2"``."""
     return " ".join([event, *(f"{name}={_word(value)}" for name, value in values.items())])
 
 
@@ -48,16 +47,16 @@ def _word(value: Any) -> str:
 
 
 class Log(Listener):
-    """Writes what happens into the log."""
+    """Writes the events of a run to the log."""
 
     _planned = 0
 
     def begun(self, title: str, steps: int) -> None:
-        """Keep the number of load steps for the lines to come."""
+        """Store the number of load steps."""
         self._planned = steps
 
     def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
-        """Write which lattice is next."""
+        """Write the next lattice."""
         self.said("lattice", name=name, spacing=lattice.spacing, nodes=lattice.size)
 
     def step(self, step: Step) -> None:
@@ -79,11 +78,11 @@ class Log(Listener):
         self.said(f"step={step.number}" + (f"/{self._planned}" if self._planned else ""), **values)
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
-        """Write what happened and its values."""
+        """Write an event and its values."""
         logger.log(level, words(event, **values))
 
     def ended(self, error: BaseException | None) -> None:
-        """Write why the run ends before its time, once."""
+        """Write the error that ends the run, once."""
         if isinstance(error, HexcontactError) and not error.logged:
             self.said("stopped", level=logging.ERROR, reason=str(error))
             error.logged = True
@@ -102,11 +101,11 @@ def _zones(step: Step) -> dict[str, int]:
     return {"contact": contact, "stick": stick, "slip": contact - stick}
 
 
-# --- where it goes ----------------------------------------------------------------------------------------
+# --- destinations -----------------------------------------------------------------------------------------
 
 
 class _Lines(logging.Formatter):
-    """Time (UTC), level and message, on one line whatever the message holds."""
+    """Formats time (UTC), level and message on one line."""
 
     def __init__(self) -> None:
         super().__init__("%(asctime)s.%(msecs)03dZ %(levelname)-7s %(message)s", "%Y-%m-%dT%H:%M:%S")
@@ -117,7 +116,7 @@ class _Lines(logging.Formatter):
 
 
 class _File(logging.FileHandler):
-    """Appends to a file; says once that it can no longer be written, and lets the run go on."""
+    """Appends to a file; a failure is reported once and does not end the run."""
 
     failed = False
 
@@ -129,12 +128,12 @@ class _File(logging.FileHandler):
                 print(f"hexcontact: warning: cannot write {self.baseFilename}: {reason}", file=sys.stderr)
 
     def close(self) -> None:
-        with contextlib.suppress(OSError):  # what could not be written before
+        with contextlib.suppress(OSError):  # of an earlier failure
             super().close()
 
 
 class _Stream(logging.StreamHandler[IO[str]]):
-    """Writes to standard error as long as somebody reads it."""
+    """Writes to standard error, also if its reader is gone."""
 
     def handleError(self, record: logging.LogRecord) -> None:
         pass
@@ -142,21 +141,21 @@ class _Stream(logging.StreamHandler[IO[str]]):
 
 @contextlib.contextmanager
 def kept(file: Path | None, level: str | None, spare: Sequence[Path] = ()) -> Iterator[None]:
-    """Write the log to a file, else, if a level is given, to standard error; errors on the way out, too.
+    """Write the log to a file, or if only a level is given to standard error; also an error that is raised.
 
     Parameters
     ----------
     file : Path or None
-        The file; what it holds stays.
+        The file, to which the log is appended.
     level : str or None
         One of `LEVELS`; "info" if a file but no level is given.
     spare : sequence of Path
-        Files that the log must not go into: decks, results.
+        Files that the log must not change: decks, results.
 
     Raises
     ------
     DeckError
-        If the file cannot be written, or must not be.
+        If the file cannot be written, or is one of `spare`.
     """
     if file is None and level is None:
         yield
@@ -178,7 +177,7 @@ def kept(file: Path | None, level: str | None, spare: Sequence[Path] = ()) -> It
 
 
 def refuse_same(file: Path | None, spare: Sequence[Path]) -> None:
-    """Refuse a log in one of the files of a command."""
+    """Refuse one of the files of a command as log."""
     if file is None:
         return
     for other in spare:
@@ -187,7 +186,7 @@ def refuse_same(file: Path | None, spare: Sequence[Path]) -> None:
 
 
 def _may_be_a_log(file: Path) -> bool:
-    """Tell whether a file is empty or begins with a time."""
+    """Test whether a file is empty or begins with a time."""
     with file.open("rb") as there:
         return re.match(rb"\d{4}-\d\d-\d\dT|$", there.read(20)) is not None
 
@@ -198,6 +197,8 @@ def _opened(file: Path, spare: Sequence[Path]) -> _File:
         if file.is_file() and not _may_be_a_log(file):
             expected = "expected a new file, or a log to append to"
             raise DeckError(f"--log-file {file}: is there and no log; {expected}")
+        if file.is_fifo():  # OSError without a reader, for which open would wait
+            os.close(os.open(file, os.O_WRONLY | os.O_NONBLOCK))
         return _File(file, encoding="utf-8", errors="backslashreplace")
     except DeckError:
         raise

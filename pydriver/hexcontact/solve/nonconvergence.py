@@ -1,4 +1,4 @@
-"""Says of a load step that did not converge which condition failed most, where, by how much, what to try.
+"""The error of a load step that did not converge: the worst condition, its node and size, and advice.
 
 The residuals are those of docs/theory/residuals.md, node by node.
 """
@@ -6,33 +6,31 @@ The residuals are those of docs/theory/residuals.md, node by node.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.contact import NormalSolution
+from ..core.friction import FrictionLaw
+from ..core.lattice import Lattice
 from ..core.measures import nodal_residuals
+from ..core.steps import LEAST
 from ..errors import ConvergenceError
-from ..problem.loads import LEAST
-from ..result.history import RESIDUALS
+from ..problem.loads import LoadStep
+from ..problem.problem import Problem
 from ..text import listed, quantity
+from ..variables import RESIDUALS
 
-if TYPE_CHECKING:
-    from ..core.contact import NormalSolution
-    from ..core.friction import ContactState
-    from ..core.lattice import Lattice
-    from ..problem.loads import LoadStep
-    from ..problem.problem import Problem
-
-_NEAR_SLIDING = 0.99  # share of mu P from which full slip may carry a tangential load
-_SLIDING = 1.0 - 1e-6  # ... from which it has to
+_NEAR_SLIDING = 0.99  # share of mu P from which a tangential load may need full slip
+_SLIDING = 1.0 - 1e-6  # ... from which it does
 _ROUNDING = 1e-11  # tolerance below which rounding errors may decide
-_SAME = 1e-3  # relative difference of a residual from that of the solver that still means the same state
+_SAME = 1e-3  # relative difference of residuals of one state
 _LOST = "the last attempt lost all contact"
-_INFINITE = 1e100  # the core says so for an error relative to nothing
+_INFINITE = 1e100  # value of the core for an error relative to zero
 
 
 class Worst(NamedTuple):
-    """The residual that is largest, the node that it comes from if any (rows and columns of the lattice)."""
+    """The largest residual and its node, if it has one (row and column of the lattice)."""
 
     residual: str
     value: float
@@ -44,13 +42,9 @@ class Worst(NamedTuple):
 
 
 def error(
-    case: Problem,
-    lattice: Lattice,
-    solution: NormalSolution | ContactState,
-    target: LoadStep,
-    values: tuple[float, ...],
+    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
 ) -> ConvergenceError:
-    """Make the error of a step that did not converge; gross sliding is called so.
+    """Return the error of a step that did not converge, or of gross sliding.
 
     Parameters
     ----------
@@ -59,11 +53,11 @@ def error(
     lattice : Lattice
         The window.
     solution : NormalSolution or ContactState
-        The attempt that failed.
+        The failed attempt.
     target : LoadStep
         The step.
     values : tuple of float
-        What was prescribed for z, x, y and the twist.
+        Prescribed values for z, x, y and the twist.
     """
     residuals = _residuals(case, solution, target)
     worst = _worst(case, lattice, solution, residuals, values)
@@ -100,8 +94,8 @@ def error(
     return ConvergenceError("\n".join(lines), details)
 
 
-def _residuals(case: Problem, solution: NormalSolution | ContactState, target: LoadStep) -> dict[str, float]:
-    """Return the residuals that have to be small, by the symbol of the theory."""
+def _residuals(case: Problem, solution: NormalSolution, target: LoadStep) -> dict[str, float]:
+    """Return the residuals with a bound, by the symbol of the theory."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     wanted = {"R_n": True, "R_t": True, "R_P": z, "R_Q": x or y, "R_M": twist}
     if not case.frictional:
@@ -113,31 +107,31 @@ def _number(value: float) -> str:
     return f"{value:.2e}" if value < _INFINITE else "inf"
 
 
-def _tried(solution: NormalSolution | ContactState) -> list[str]:
+def _tried(solution: NormalSolution) -> list[str]:
     cuts = getattr(solution, "cuts", 0)
     halved = [f"halving the step {cuts} time{'s' * (cuts > 1)}"] if cuts else []
     return [f"{solution.sweeps} iterations", *halved]
 
 
 def _sliding(
-    case: Problem, solution: NormalSolution | ContactState, target: LoadStep, values: tuple[float, ...]
+    case: Problem, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
 ) -> tuple[bool, str]:
-    """Return whether the load may be more than friction can carry; if it is, a sentence about that."""
+    """Return whether friction may not carry the load, and a sentence if it cannot."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
     bound = case.friction_coefficient * values[0] if z else math.nan
     seen = bool(getattr(solution, "sliding", False))
-    doubtful = bool(torque or shear > _NEAR_SLIDING * bound or (shear and not z))
+    doubtful = bool(torque or (shear and not shear <= _NEAR_SLIDING * bound))
     if not case.frictional or not (seen or (shear and shear >= _SLIDING * bound)):
-        return doubtful and math.isfinite(case.friction_coefficient), ""
+        return doubtful and not math.isinf(case.friction_coefficient), ""
     wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
-    known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})" if z else ""
+    known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})" if math.isfinite(bound) else ""
     return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}"
 
 
 def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:
-    """Return what may help, the likeliest first."""
+    """Return advice, the likeliest first."""
     mu, advice = case.friction_coefficient, []
     if case.frictional and math.isinf(mu) and worst.residual in ("R_n", "R_t"):
         advice.append(
@@ -157,37 +151,39 @@ def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list
     return advice
 
 
-# --- where ------------------------------------------------------------------------------------------------
+# --- the node ---------------------------------------------------------------------------------------------
 
 
 def _worst(
     case: Problem,
     lattice: Lattice,
-    solution: NormalSolution | ContactState,
+    solution: NormalSolution,
     residuals: dict[str, float],
     values: tuple[float, ...],
 ) -> Worst:
-    """Find the residual that is largest, and the node that it comes from."""
+    """Return the largest residual and its node."""
     sign = max(residuals, key=lambda name: residuals[name])
     value = residuals[sign]
     if not (solution.pressure > 0).any():
         return Worst(sign, value, what=_LOST)
     if sign not in ("R_n", "R_t"):
         return Worst(sign, value, what=_missed(sign, solution, values))
-    mu = case.friction_coefficient if case.frictional else 0.0
-    field = nodal_residuals(lattice, case.pair, mu, solution, tangential=sign == "R_t")
+    law = case.friction_law(lattice)
+    field = nodal_residuals(
+        lattice, case.solved_pair, law, case.interface, solution, tangential=sign == "R_t"
+    )
     row, col = (int(k) for k in np.unravel_index(int(np.argmax(field)), field.shape))
-    if not math.isclose(field[row, col], value, rel_tol=_SAME):  # of another state than the one at hand
+    if not math.isclose(field[row, col], value, rel_tol=_SAME):  # of another state
         return Worst(sign, value)
     x, y = float(lattice.x[row, col]), float(lattice.y[row, col])
-    fault = (_normal_fault if sign == "R_n" else _tangential_fault)(case, solution, row, col)
+    fault = (_normal_fault if sign == "R_n" else _tangential_fault)(law, solution, row, col)
     number = int(lattice.rows[row]), int(lattice.cols[col])
     place = f"row {number[0]}, column {number[1]}, x = {quantity(x, 'm')}, y = {quantity(y, 'm')}"
     return Worst(sign, value, *number, x, y, f"at the node in {place} {fault}")
 
 
-def _missed(sign: str, solution: NormalSolution | ContactState, values: tuple[float, ...]) -> str:
-    """Say which load is not met."""
+def _missed(sign: str, solution: NormalSolution, values: tuple[float, ...]) -> str:
+    """Return a sentence on the load that is not met."""
     if sign == "R_P":
         return _instead("normal load", solution.normal_load, values[0], "N")
     if sign == "R_M":
@@ -205,7 +201,7 @@ def _instead(name: str, carried: float, wanted: float, unit: str) -> str:
     )
 
 
-def _normal_fault(case: Problem, solution: NormalSolution | ContactState, row: int, col: int) -> str:
+def _normal_fault(law: FrictionLaw, solution: NormalSolution, row: int, col: int) -> str:
     pressure, gap = float(solution.pressure[row, col]), float(solution.gap[row, col])
     if pressure < 0:
         return f"there is a tension of {quantity(-pressure, 'Pa')}"
@@ -214,11 +210,12 @@ def _normal_fault(case: Problem, solution: NormalSolution | ContactState, row: i
     return f"there is a pressure of {quantity(pressure, 'Pa')} across a gap of {quantity(gap, 'm')}"
 
 
-def _tangential_fault(case: Problem, solution: Any, row: int, col: int) -> str:
-    traction = math.hypot(solution.traction_x[row, col], solution.traction_y[row, col])
+def _tangential_fault(law: FrictionLaw, solution: Any, row: int, col: int) -> str:
+    along = float(solution.traction_x[row, col]), float(solution.traction_y[row, col])
+    traction = math.hypot(*along)
     slip = math.hypot(solution.slip_increment_x[row, col], solution.slip_increment_y[row, col])
-    if math.isinf(case.friction_coefficient):
+    bound = law.bound_at(row, col, float(solution.pressure[row, col]), along)
+    if math.isinf(bound):
         return f"the surfaces slip by {quantity(slip, 'm')}, which friction.coefficient = inf forbids"
-    bound = case.friction_coefficient * float(solution.pressure[row, col])
     held = f"a shear traction of {quantity(traction, 'Pa')} where friction holds {quantity(bound, 'Pa')}"
     return f"there is {held}, with a slip of {quantity(slip, 'm')}"

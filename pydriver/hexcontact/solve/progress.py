@@ -1,32 +1,26 @@
-"""What a user sees while a case runs: a bar on a terminal, plain lines in a log, or nothing."""
+"""Display of the progress of a run: a bar on a terminal, plain lines in a pipe, or nothing."""
 
 from __future__ import annotations
 
 import contextlib
 import logging
 import sys
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
+from ..core.lattice import Lattice
 from ..result.history import describe
-from ..text import quantity, visible
+from ..result.step import Step
+from ..text import cut, quantity, visible
 from .events import Listener
-
-if TYPE_CHECKING:
-    from ..core.lattice import Lattice
-    from ..result.step import Step
-
-
-def _on_lattice(name: str, lattice: Lattice) -> str:
-    return f"{name}: spacing {quantity(lattice.spacing, 'm')}, {lattice.size:,} nodes"
 
 
 class Lines(Listener):
-    """One line by step, for logs and pipes.
+    """One line for each step, for files and pipes.
 
     Parameters
     ----------
     stream : text file
-        Where the lines go.
+        Destination of the lines.
     """
 
     def __init__(self, stream: IO[str]) -> None:
@@ -35,23 +29,23 @@ class Lines(Listener):
         self._shifted = False
 
     def begun(self, title: str, steps: int) -> None:
-        """Print the title first."""
+        """Print the title and the number of steps."""
         self.steps = steps
         count = f"{steps} load step{'s' * (steps != 1)}" if steps else "adaptive load steps"
         self._print(f"{title or 'case'}: {count}")
 
     def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
-        """Print which lattice is next."""
-        self._print(_on_lattice(name, lattice))
+        """Print the name of the next lattice."""
+        self._print(f"{name}: spacing {quantity(lattice.spacing, 'm')}, {lattice.size:,} nodes")
         self._shifted = shifted
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
-        """Print the sentence, if there is one."""
+        """Print the sentence of the event."""
         if text:
             self._print(text)
 
     def step(self, step: Step) -> None:
-        """Print the line of a step; those of shifted copies say nothing new."""
+        """Print the line of a step, but not on shifted copies."""
         if self._shifted:
             return
         width = len(str(self.steps))
@@ -61,12 +55,12 @@ class Lines(Listener):
         self._print(f"step {number}  {describe(step.history)}")
 
     def _print(self, line: str) -> None:
-        with contextlib.suppress(OSError):  # nobody reads any more; the run goes on
+        with contextlib.suppress(OSError):  # the reader is gone; the run goes on
             print(visible(line), file=self.stream, flush=True)
 
 
 class Bar(Listener):
-    """A progress bar with the latest step below it."""
+    """The title, a progress bar with the remaining time, and the latest step below it."""
 
     def begun(self, title: str, steps: int) -> None:
         """Show the bar."""
@@ -75,12 +69,13 @@ class Bar(Listener):
         from rich.progress import Progress
         from rich.text import Text
 
-        self._counted = steps > 0  # else by the share of the load history
+        self._counted = steps > 0  # else progress is the share of the load history
         self._bar = Progress(*self._columns())
         self._title = visible(title)
-        self._task = self._bar.add_task(self._title, total=steps or 1.0)
-        self._latest = Text(style="dim", no_wrap=True, overflow="ellipsis")
-        self._live = Live(Group(self._bar, self._latest), console=Console(stderr=True), transient=True)
+        self._head, self._latest = Text(self._title), Text(style="dim", no_wrap=True)
+        self._task = self._bar.add_task("", total=steps or 1.0)
+        shown = Group(self._head, self._bar, self._latest)
+        self._live = Live(shown, console=Console(stderr=True), transient=True)
         self._live.start(refresh=True)
 
     def _columns(self) -> list[Any]:
@@ -88,35 +83,42 @@ class Bar(Listener):
 
         return [
             progress.SpinnerColumn(),
-            progress.TextColumn("{task.description}", markup=False),
             progress.BarColumn(),
             progress.MofNCompleteColumn()
             if self._counted
             else progress.TextColumn("{task.percentage:.0f} %"),
             progress.TimeElapsedColumn(),
+            progress.TextColumn("left:"),
+            progress.TimeRemainingColumn(),
         ]
 
     def lattice(self, name: str, lattice: Lattice, shifted: bool) -> None:
         """Start the bar again, with the name of the lattice."""
-        self._bar.update(self._task, completed=0, description=f"{self._title}, {name}")
+        self._head.plain = f"{self._title}, {name}"
+        self._bar.reset(self._task)
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
-        """Show the sentence, if there is one, until the next step."""
-        if text:
-            self._latest.plain = f"  {visible(text)}"
+        """Show the sentence of the event until the next step; a warning stays above the bar."""
+        if level >= logging.WARNING and text:
+            self._live.console.print(visible(text), markup=False, highlight=False)
+        elif text:
+            self._show(text)
 
     def step(self, step: Step) -> None:
         """Move the bar on by one step."""
-        self._latest.plain = "  " + visible(describe(step.history, short=True))
+        self._show(describe(step.history, short=True))
         self._bar.update(self._task, completed=step.number if self._counted else step.done)
 
+    def _show(self, text: str) -> None:
+        self._latest.plain = "  " + cut(visible(text), self._live.console.width - 3)
+
     def ended(self, error: BaseException | None) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         self._live.stop()
 
 
 def reporter(quiet: bool = False, stream: IO[str] | None = None) -> Listener:
-    """Return what suits `stream` (default: standard error): bar, lines, or silence if `quiet`."""
+    """Return the display for `stream` (default: standard error): bar or lines, none if `quiet`."""
     stream = stream or sys.stderr
     if quiet:
         return Listener()

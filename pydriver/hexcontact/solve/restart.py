@@ -1,4 +1,4 @@
-"""Goes on with a run that ended before its time, from the journal that it left."""
+"""Resumes an unfinished run from its journal."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from typing import Any
 from .._version import __version__
 from ..errors import DeckError, HexcontactError
 from ..problem.problem import Problem
-from ..result.journal import PHYSICS, physics
+from ..result.journal import PHYSICS, journal_of, physics
 from ..result.layout import Metadata, now
 from ..result.netcdf import read_output
 from ..result.result import Result
 from ..result.step import Step
-from ..result.store import Store, journal_of, open_result
+from ..result.store import Store, open_result
 from ..result.trials import TrialFolder
 from .events import Listener
-from .run import checked, listeners, metadata_of, run_into
+from .run import checked, listeners, metadata_of, run_into, write_stresses
 from .steps import check_step
 
 
 @dataclass
 class Restart:
-    """An unfinished run, opened again.
+    """An unfinished run that was reopened.
 
     Attributes
     ----------
     case : Problem
-        What is solved.
+        The problem.
     store : Store
-        Where its steps are, and go.
+        The store of its steps.
     before : list of Step
-        The steps that are finished: heads, the last one with all its fields.
+        The finished steps: heads, the last one with all its fields.
     warning : str
-        Why the result may not be to the bit that of an uninterrupted run; may be empty.
+        Reason why the result may differ in its last bits from that of an uninterrupted run; may be empty.
     """
 
     case: Problem
@@ -57,18 +57,18 @@ def resume(
     on_step: Callable[[Step], object] | None = None,
     progress: Listener | bool | None = None,
 ) -> Result:
-    """Go on with a run that was interrupted, was killed, met a full disk or did not converge.
+    """Resume a run that was interrupted, was killed, met a full disk or did not converge.
 
-    The result is to the bit that of a run in one go, on the same machine with as many threads.
+    The result is bit-identical to that of a run in one go, on the same machine with as many threads.
 
     Parameters
     ----------
     path : path
-        The output of the run; the steps that are finished are in the journal beside it.
+        The output of the run; its finished steps are in the journal beside it.
     case : Problem, optional
-        The problem. Only needed if the deck does not say all of it, as with a gap given in Python.
+        The problem, if the deck does not contain all of it, such as a gap given in Python.
     overrides : mapping, optional
-        New values for keys of the solver, as ``{"solver.tolerance": 1e-7}``, for the steps to come.
+        New values for keys of the solver, as ``{"solver.tolerance": 1e-7}``, for the remaining steps.
     on_step : callable, optional
         Called with each further `Step`.
     progress : Listener or bool, optional
@@ -77,12 +77,12 @@ def resume(
     Returns
     -------
     Result
-        Also if the run is finished already.
+        Also of a finished run.
 
     Raises
     ------
     DeckError
-        If there is nothing to go on with, another run is writing it, or the case is not the one of the run.
+        If there is no unfinished run, another run is writing it, or the case is not that of the run.
     ConvergenceError, ResourceError
         As `hexcontact.Case.run`.
 
@@ -92,6 +92,7 @@ def resume(
     """
     with reopened(path, case, overrides) as restart:
         if restart is None:
+            complete(path)
             return checked(open_result(path))
         if restart.warning:
             warnings.warn(restart.warning, stacklevel=2)
@@ -101,16 +102,23 @@ def resume(
     return checked(open_result(restart.store.path))
 
 
+def complete(path: str | os.PathLike[str]) -> None:
+    """Write the missing stresses of a finished run, which was killed before it wrote them."""
+    output = _output_of(Path(path))
+    if output.is_file():
+        list(write_stresses(output, only_missing=True))
+
+
 @contextlib.contextmanager
 def reopened(
     path: str | os.PathLike[str], case: Problem | None = None, overrides: Mapping[str, Any] | None = None
 ) -> Iterator[Restart | None]:
-    """Open a run to go on with it, and close it in the end; arguments and errors as `resume`.
+    """Open a run to resume it, and close it at the end; arguments and errors as `resume`.
 
     Yields
     ------
     Restart or None
-        None if the run is finished already.
+        None if the run is finished.
     """
     store, last = _found(_output_of(Path(path)))
     refines = store is not None and bool(TrialFolder(store.folder))
@@ -125,19 +133,19 @@ def reopened(
         about = _continued(store, case)
         store.go_on(about)
     except BaseException:
-        store.close()  # and leave the reason why the run stopped as it is
+        store.close()  # the recorded reason of the end does not change
         raise
     with store:
         before = [] if last is None else [*store.heads[:-1], last]
         warning = (
-            f"the run was started by hexcontact {store.metadata.version} and goes on with {__version__}; the "
-            "result may differ from what either of them gives alone"
+            f"the run was started by hexcontact {store.metadata.version} and is resumed by {__version__}; "
+            "the result may differ from what either of them gives alone"
         )
         yield Restart(case, store, before, warning if store.metadata.version != __version__ else "")
 
 
 def _output_of(path: Path) -> Path:
-    """Return the output, be it that its journal was named."""
+    """Return the output of a run, by its own path or that of its journal."""
     if path.is_dir() and path.name.endswith(".d"):
         output = path.with_name(path.name.removesuffix(".d"))
         return output if journal_of(output) == path else path
@@ -145,8 +153,8 @@ def _output_of(path: Path) -> Path:
 
 
 def _found(path: Path) -> tuple[Store | None, Step | None]:
-    """Open the journal of an output; no store if there is none since the run is finished."""
-    for _ in range(2):  # again if a run that just finished took its journal away
+    """Open the journal of an output; no store if the run is finished."""
+    for _ in range(2):  # again if a run that just finished deleted its journal
         with contextlib.suppress(FileNotFoundError):
             return Store.reopened(path)
         with contextlib.suppress(FileNotFoundError):
@@ -163,12 +171,12 @@ def _found(path: Path) -> tuple[Store | None, Step | None]:
 
 
 def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any], path: Path) -> Problem:
-    """Make the case again that the run solves."""
+    """Return the case of the run."""
     for key in overrides:
         table, _, name = key.partition(".")
         if table != "solver" or name.partition(".")[0] in ("", *PHYSICS):
             raise DeckError(
-                f"{key}: a run that goes on may only change how it is solved, such as solver.tolerance"
+                f"{key}: a resumed run may only change how it is solved, such as solver.tolerance"
             )
     if case is not None:
         if overrides:
@@ -181,7 +189,8 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
     surface = tomllib.loads(metadata.deck).get("body", {}).get("1", {}).get("surface", {})
     if surface.get("shape") == "python":
         raise DeckError(
-            f"the gap of {path} was given in Python; go on there: hexcontact.resume({str(path)!r}, case=case)"
+            f"the gap of {path} was given in Python; resume there: "
+            f"hexcontact.resume({str(path)!r}, case=case)"
         )
     try:
         again = Problem.from_text(metadata.deck, metadata.deck_file or f"deck of {path}", overrides)
@@ -194,7 +203,7 @@ def _case(metadata: Metadata, case: Problem | None, overrides: Mapping[str, Any]
 
 
 def _check(case: Problem, store: Store, last: Step | None) -> None:
-    """Refuse a case that is not the one of the steps, as when files that its deck names have changed."""
+    """Refuse another case than that of the steps, as after changes in files that its deck names."""
     found = f"{len(store.heads)} finished steps of {store.path}" if last else f"steps of {store.path}"
     planned = store.metadata.planned_steps
     if last is not None:
@@ -206,7 +215,7 @@ def _check(case: Problem, store: Store, last: Step | None) -> None:
 
 
 def _continued(store: Store, case: Problem) -> Metadata:
-    """Return what the result says from now on: as before, and that it went on."""
+    """Return the metadata of a resumed run, with a line about it."""
     old, new = store.metadata, metadata_of(case)
     changed = [
         f"{name} = {value:g} instead of {old.parameters[name]:g}"
@@ -218,8 +227,5 @@ def _continued(store: Store, case: Problem) -> Metadata:
         done = f"{len(trials.read()[1])} lattices"
     line = f"{now()} resumed after {done} by hexcontact {__version__}"
     return dataclasses.replace(
-        old,
-        deck=new.deck,
-        parameters=new.parameters,
-        resumed=(*old.resumed, ", ".join([line, *changed])),
+        old, deck=new.deck, parameters=new.parameters, resumed=(*old.resumed, ", ".join([line, *changed]))
     )

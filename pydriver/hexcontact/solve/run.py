@@ -5,13 +5,16 @@ from __future__ import annotations
 import dataclasses
 import logging
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..errors import AccuracyWarning, HexcontactError
+from ..interior.tables import computed, files_of, write_netcdf
 from ..problem.overview import parameters_of
+from ..problem.problem import Problem
+from ..result.export import kept_steps
 from ..result.layout import Metadata, assemble
+from ..result.netcdf import require_free
 from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
@@ -22,12 +25,9 @@ from .log import Log
 from .progress import reporter
 from .steps import steps
 
-if TYPE_CHECKING:
-    from ..problem.problem import Problem
-
 
 def metadata_of(case: Problem) -> Metadata:
-    """Return what the result of `case` says about where it comes from."""
+    """Return the metadata of the result of `case`."""
     return Metadata(
         title=case.title,
         deck=case.deck_text,
@@ -40,11 +40,9 @@ def metadata_of(case: Problem) -> Metadata:
 
 
 def listeners(
-    case: Problem,
-    progress: Listener | bool | None = None,
-    on_step: Callable[[Step], object] | None = None,
+    case: Problem, progress: Listener | bool | None = None, on_step: Callable[[Step], object] | None = None
 ) -> Listener:
-    """Return who follows a run: the log, what shows its progress, and a callback; arguments as `run`."""
+    """Return the listeners of a run: log, display of progress, callback; arguments as `run`."""
     shown = progress if isinstance(progress, Listener) else reporter(quiet=not progress)
     callbacks = [Callback(on_step, refines=case.accuracy is not None)] if on_step else []
     return Listeners(Log(), shown, *callbacks)
@@ -69,31 +67,31 @@ def run(
     overwrite : bool
         Replace an output that is there already.
     on_step : callable, optional
-        Called with each finished `Step`, after it was written; of every lattice, if the case has an accuracy
-        to reach. If it returns something true, or raises `hexcontact.StopRun`, the run ends there; any other
-        exception ends it, too, and is passed on.
+        Called with each finished `Step`, after it was written; of every lattice, if the case has a target
+        accuracy. If it returns something true, or raises `hexcontact.StopRun`, the run ends there; any other
+        exception ends it, too, and is raised.
     progress : Listener or bool, optional
         Follows the run; True: a bar on a terminal, lines otherwise.
 
     Returns
     -------
     Result
-        What is finished: all load steps, or those up to where `on_step` ended the run. With an output, the
-        finished steps are kept as after a signal then, and `hexcontact.resume` goes on.
+        All load steps, or those up to where `on_step` ended the run. With an output, the run can be resumed
+        from there (`hexcontact.resume`).
 
     Warns
     -----
     AccuracyWarning
-        If the lattice could not be refined until the accuracy of the case was reached.
+        If the lattice could not be refined to the accuracy of the case.
     PathWarning
-        If a static load step, or one that begins without contact, had to be solved in parts.
+        If a static load step, or one that begins without contact, was solved in parts.
 
     Raises
     ------
     DeckError
         If the output cannot be written, or the contact outgrows a fixed window.
     ConvergenceError
-        If a load step misses its tolerance; with an output, the steps before it are kept.
+        If a load step misses its tolerance; with an output, the steps before it are recorded.
     ResourceError
         If there is not enough memory or disk.
     """
@@ -117,7 +115,7 @@ def checked(result: Result) -> Result:
 
 
 def _in_memory(case: Problem, listener: Listener) -> Result:
-    """Solve a case; if a callback ends the run, the result is what there is of the present lattice."""
+    """Solve a case; if a callback ends the run, the result has the finished steps of the present lattice."""
     about, trials, stopped = metadata_of(case), None, ""
     finished: list[Step] = []
     try:
@@ -143,11 +141,11 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     case : Problem
         The checked problem.
     store : Store
-        Where the steps go; what it has already of lattices that are refined is not solved again.
+        Takes the steps; finished lattices of a refinement in it are not solved again.
     listener : Listener
         Follows the run, and may end it.
     before : sequence of Step
-        The steps that the store has already, as for `steps`.
+        The steps in the store, as for `steps`.
 
     Raises
     ------
@@ -168,10 +166,26 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
         store.close(str(reason))
     else:
         listener.said("written", file=store.path)
+        if case.deck.stress or case.deck.fatigue:
+            for path in write_stresses(store.path):
+                listener.said("written", file=path)
+
+
+def write_stresses(output: Path, only_missing: bool = False) -> Iterator[Path]:
+    """Write the tables [[stress]] and [[fatigue]] of the deck of a result beside it, and yield the files."""
+    result = open_result(output)
+    try:
+        files = files_of(result.deck, output)
+        wanted = [name for name, path in files.items() if not (only_missing and path.exists())]
+        for name, found in computed(result, kept_steps(result), wanted) if wanted else ():
+            require_free([files[name]], overwrite=True)
+            yield write_netcdf(found, files[name])
+    finally:
+        result.close()
 
 
 def _announce_finished(step: Step, store: Store, listener: Listener) -> None:
-    """Say that a step is safe; an exception of a callback ends the run, and the store says so."""
+    """Pass a recorded step to the listener; the store records an exception of a callback."""
     try:
         listener.step(step)
     except Stopped:

@@ -1,4 +1,4 @@
-"""A case driven by a script, one load step at a time: the next load may depend on the last answer."""
+"""A case driven by a script, one load step at a time: the next load may depend on the last result."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..deck.faults import NOWHERE, deck_error
 from ..deck.tables import Load
 from ..deck.write import plain
 from ..errors import DeckError
-from ..problem.arguments import middle_of, with_radians
+from ..problem.arguments import known_keywords, middle_of, with_radians
 from ..problem.loads import History, LoadStep
 from ..problem.problem import Problem
-from ..result.layout import assemble
+from ..result.layout import Metadata, assemble
 from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
@@ -30,29 +30,29 @@ from .run import metadata_of
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
 
-_AT_REST = ("tangential_load_x", "tangential_load_y", "twist")  # what is zero where nothing is said
+_AT_REST = ("tangential_load_x", "tangential_load_y", "twist")  # zero unless they are given
 _FINENESS = ("spacing", "nodes_across", "nodes_in_radius", "origin")
 
 
 class Session:
     """A run that waits between its load steps; made by `hexcontact.Case.start`.
 
-    Iterating over it solves the loads of the case one by one. `advance` applies other loads instead; the
-    loads of the case that are left by then are not solved any more.
+    Iterating over it solves the loads of the case one by one. `advance` applies other loads instead of the
+    remaining ones of the case.
 
-    A step that does not converge, or slides, raises an exception and leaves the session where it was: another
-    load may be tried.
+    A step that does not converge, or slides, raises an exception and leaves the session at the step before,
+    from which other loads can be applied.
 
     With an output each step is on the disk before the next begins; `close`, or the end of a ``with`` block,
-    completes the file. Its deck has the loads that were applied. If loads of the case are left and none was
-    applied by hand, the run stays unfinished, and `hexcontact.resume` goes on with it.
+    completes the file. Its deck has the applied loads. If loads of the case remain and none was applied by
+    `advance`, the run is unfinished and `hexcontact.resume` continues it.
 
     Parameters
     ----------
     case : Problem
-        The problem; its loads choose the size of the first window, which grows with the contact.
+        The problem; the size of the first window follows from its loads, and grows with the contact.
     output : path, optional
-        netCDF file to write. Without it all steps stay in memory.
+        netCDF file to write. Without it all steps are in memory.
     overwrite : bool
         Replace an output that is there already.
 
@@ -89,23 +89,23 @@ class Session:
     def __init__(self, case: Problem, output: str | Path | None = None, overwrite: bool = False) -> None:
         self.case = case
         self._about = metadata_of(case)
-        self._steps: list[Step] = []  # with an output all but the last without their fields
-        self._solving: Iterator[Step] | None = None  # the load steps to come; begins anew after a failure
-        self._queue: deque[LoadStep] = deque()  # that `advance` asks for
+        self._steps: list[Step] = []  # with an output only the last has its fields
+        self._solving: Iterator[Step] | None = None  # yields the next load steps; None after a failure
+        self._queue: deque[LoadStep] = deque()  # of `advance`
         self._by_hand = False
         self._log = Log()
         self._log.begun(case.title, case.planned_steps)
-        self._loads: list[dict[str, Any]] = []  # entries of [[load]], once they are those of the script
-        self._history: History | None = None  # of these loads, where it is known
+        self._loads: list[dict[str, Any]] = []  # entries of [[load]] that `advance` applied
+        self._history: History | None = None  # of these loads; None: not unrolled
         self._driven = copy.copy(case)
         self._closed = False
         self._store: Store | None = None
         if output is not None:
             self._store = Store(output, self._about, overwrite)
-            # a session that is dropped, as when the cell of a notebook is run again, holds no file
+            # a deleted session, as after another run of the cell of a notebook, releases its file
             weakref.finalize(self, self._store.close, "the session was dropped")
 
-    # --- what is known --------------------------------------------------------------------------------------
+    # --- results --------------------------------------------------------------------------------------------
 
     @property
     def step(self) -> Step:
@@ -137,7 +137,8 @@ class Session:
         """
         _ = self.step
         if self._store is None:
-            return Result(assemble(self._about, self._steps, self._whole))
+            about = self._described(self._loads, len(self._steps)) if self._by_hand else self._about
+            return Result(assemble(about, self._steps, self._whole))
         return open_result(self._store.path)
 
     @property
@@ -148,7 +149,7 @@ class Session:
     # --- steps ----------------------------------------------------------------------------------------------
 
     def __iter__(self) -> Self:
-        """Return the session: each step is solved when it is asked for."""
+        """Return the session, an iterator that solves a step at a time."""
         return self
 
     def __next__(self) -> Step:
@@ -157,7 +158,7 @@ class Session:
         Raises
         ------
         StopIteration
-            If all loads of the case are done, or other loads were applied.
+            If all loads of the case are done, or `advance` applied others.
         DeckError, ConvergenceError, ResourceError
             As `hexcontact.Case.run`.
         """
@@ -169,6 +170,7 @@ class Session:
             self._solving = solving.steps(self.case, in_memory, self._steps, listener=self._log)
         return self._next_step()
 
+    @known_keywords
     def advance(
         self,
         *,
@@ -180,10 +182,13 @@ class Session:
         shift_y: float | None = None,
         torque: float | None = None,
         twist: float | None = None,
+        bulk_stress_xx: float | None = None,
+        bulk_stress_yy: float | None = None,
+        bulk_stress_xy: float | None = None,
         steps: int = 1,
         label: str = "",
     ) -> Step:
-        """Go on to other loads or motions, at most one of each pair; the others stay as they are.
+        """Advance to other loads or motions, at most one of each pair; the others do not change.
 
         Parameters
         ----------
@@ -193,6 +198,8 @@ class Session:
             Tangential loads (N), or shifts (m).
         torque, twist : float, optional
             Torque (N m), or twist (rad).
+        bulk_stress_xx, bulk_stress_yy, bulk_stress_xy : float, optional
+            Bulk stress (Pa) of the body that [bulk] names.
         steps : int
             Number of equal increments.
         label : str
@@ -212,21 +219,12 @@ class Session:
             If a step does not converge, or the bodies slide; the steps before it are done.
         ResourceError
             If there is not enough memory or disk.
+        TypeError
+            If there is no such load; it names the nearest.
         """
+        given = {name: value for name, value in locals().items() if name != "self"}
         self._check_open()
-        given = {
-            "normal_load": normal_load,
-            "approach": approach,
-            "tangential_load_x": tangential_load_x,
-            "shift_x": shift_x,
-            "tangential_load_y": tangential_load_y,
-            "shift_y": shift_y,
-            "torque": torque,
-            "twist": twist,
-            "steps": steps,
-            "label": label or None,
-        }
-        entry = with_radians(plain(given))
+        entry = with_radians(plain(given | {"label": label or None}))
         before = self._loads if self._by_hand else self._loads_so_far()
         history = self._unrolled(before, entry)
         if not self._by_hand:
@@ -245,23 +243,24 @@ class Session:
                 self._next_step(done, [entry] if last else None)
             except BaseException:
                 self._queue.clear()
-                self._loads = [*self._loads, *self._resolved(self._steps[done:])]
+                self._loads += self._resolved(self._steps[done:])
                 raise
-        self._loads, self._history = [*self._loads, entry], history
+        self._loads.append(entry)
+        self._history = history
         return self.step
 
     def back(self, steps: int = 1) -> None:
-        """Take the last steps back; the session stands where it stood before them.
+        """Undo the last steps.
 
         Parameters
         ----------
         steps : int
-            How many.
+            Number of steps.
 
         Raises
         ------
         DeckError
-            If there are not so many, or the session writes a file.
+            If there are fewer, or the session writes a file.
         """
         self._check_open()
         if self._store is not None:
@@ -272,44 +271,45 @@ class Session:
         self._solving = None
         if self._by_hand:
             self._loads, self._history = self._resolved(self._steps), None
-            self._change(self._loads, len(self._steps))
 
     def _next_step(self, done: int = 0, loads: list[dict[str, Any]] | None = None) -> Step:
-        """Solve the next load step, and keep it; after a failure it begins again after the last finished one.
+        """Solve the next load step and record it; after a failure the last finished step is the start again.
 
         Parameters
         ----------
         done : int
             Number of steps before `advance` was called.
         loads : list of dict, optional
-            Entries of [[load]] that led to the step from there; default: one for each step.
+            Entries of [[load]] from there to the step; default: one for each step.
         """
         assert self._solving is not None
         try:
             step = next(self._solving)
-            if self._by_hand:
-                loads = loads or self._resolved([*self._steps[done:], step])
-                self._change([*self._loads, *loads], step.number)
             if self._store is not None:
+                if self._by_hand:
+                    loads = loads or self._resolved([*self._steps[done:], step])
+                    self._store.metadata = self._described([*self._loads, *loads], step.number)
                 self._store.append(step)
                 self._steps[-1:] = [before.head for before in self._steps[-1:]]
         except BaseException:
             self._solving = None
             raise
+        if self.case.deck.wear:  # a cycle only starts from the one before
+            self._steps[-1:] = [dataclasses.replace(before, companion={}) for before in self._steps[-1:]]
         self._steps.append(step)
         self._log.step(step)
         return step
 
-    # --- loads as a deck has them ---------------------------------------------------------------------------
+    # --- loads as entries of a deck -------------------------------------------------------------------------
 
     def _loads_so_far(self) -> list[dict[str, Any]]:
-        """Return the loads that were applied by iterating: those of the case, or as many as were solved."""
+        """Return the loads that iteration applied: those of the case, or one for each solved step."""
         if self._whole and not self.case.adaptive:
             return list(tomllib.loads(self.case.deck_text)["load"])
         return self._resolved(self._steps)
 
     def _resolved(self, steps: Sequence[Step]) -> list[dict[str, Any]]:
-        """Return an entry of [[load]] for each of some steps."""
+        """Return an entry of [[load]] for each step."""
         resting = {
             name
             for name in _AT_REST
@@ -324,11 +324,12 @@ class Session:
         ]
 
     def _unrolled(self, before: Sequence[dict[str, Any]], entry: dict[str, Any]) -> History:
-        """Return the history with a new entry; DeckError if that is wrong."""
+        """Return the history with a new entry; DeckError for a wrong one."""
         new = Load.parse(entry, NOWHERE)
         history, self._history = self._history, None  # until all steps of the entry are solved
         if history is None:
-            history = History(self.case.friction_coefficient if self.case.frictional else None)
+            mu = self.case.friction_coefficient if self.case.frictional else None
+            history = History(mu, self.case.deck.bulk)
             for load in before:
                 history.append(Load.model_validate(load))
         history.append(new)
@@ -336,25 +337,23 @@ class Session:
             raise deck_error([p._replace(key=p.key[2:] or p.key) for p in problems], NOWHERE)
         return history
 
-    def _change(self, loads: Sequence[dict[str, Any]], count: int) -> None:
-        """Write these loads into the deck of the result, and the number of their steps."""
+    def _described(self, loads: Sequence[dict[str, Any]], count: int) -> Metadata:
+        """Return the metadata of the result with a deck of these loads, and the number of their steps."""
         import tomli_w
 
         tables = tomllib.loads(self.case.deck_text)
         lattice = self._steps[-1].lattice if self._steps else self.case.lattice
-        # the same nodes, whatever the largest load is in the end
+        # the same nodes, whatever the largest load is
         grid = {key: value for key, value in tables["grid"].items() if key not in _FINENESS}
         grid |= {"spacing": lattice.spacing, "origin": list(lattice.origin)}
         if self.case.window_fixed:
             grid = {key: value for key, value in grid.items() if key != "extent"}
             grid |= {"window": list(lattice.shape), "center": middle_of(lattice)}
-        tables.pop("accuracy", None)  # this lattice and no other
+        tables.pop("accuracy", None)  # on this lattice only
         deck = tomli_w.dumps({**tables, "grid": grid, "load": list(loads)})
-        self._about = dataclasses.replace(self._about, deck=deck, planned_steps=count)
-        if self._store is not None:
-            self._store.metadata = self._about
+        return dataclasses.replace(self._about, deck=deck, planned_steps=count)
 
-    # --- the end --------------------------------------------------------------------------------------------
+    # --- end ------------------------------------------------------------------------------------------------
 
     def close(self) -> None:
         """End the session; with an output, complete the file, or leave a run that can be resumed."""
@@ -378,14 +377,14 @@ class Session:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the session; after an exception the finished steps stay as an unfinished run."""
+        """Close the session; after an exception the run is unfinished."""
         if error is not None and self._store is not None:
             self._closed, self._solving = True, None
             self._store.__exit__(kind, error, trace)
         self.close()
 
     def __repr__(self) -> str:
-        """Say where the session stands."""
+        """Name the case and its last step."""
         if not self._steps:
             return f"Session of {self.case!r}, nothing solved yet"
         return f"Session of {self.case!r}, after {self.step!r}"

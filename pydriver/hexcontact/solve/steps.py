@@ -1,4 +1,4 @@
-"""Load steps of a problem, solved one after the other on windows that grow with the contact."""
+"""Load steps of a problem, solved in turn on windows that grow with the contact."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import logging
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .._version import __version__
+from ..core.lattice import Lattice
 from ..errors import DeckError, PathWarning
+from ..problem.loads import LoadStep
 from ..problem.overview import parameters_of
+from ..problem.problem import Problem
 from ..result.history import unasked_path
 from ..result.step import Step
 from ..variables import LOADS
@@ -21,13 +24,9 @@ from .events import Listener
 from .frictional import FrictionWindow
 from .frictionless import NormalWindow, Window
 from .log import Log
+from .wear import WearPath
 
-if TYPE_CHECKING:
-    from ..core.lattice import Lattice
-    from ..problem.loads import LoadStep
-    from ..problem.problem import Problem
-
-_SAME = 1e-9  # relative difference of initial gaps that are the same
+_SAME = 1e-9  # relative difference of equal initial gaps
 
 
 def window_type(case: Problem) -> type[Window[Any]]:
@@ -36,7 +35,7 @@ def window_type(case: Problem) -> type[Window[Any]]:
 
 
 def check_step(case: Problem, last: Step, found: str) -> None:
-    """Refuse a finished step whose lattice or surfaces are not those of a case; `found` names it."""
+    """Refuse a finished step with another lattice or other surfaces than a case; `found` names it."""
     if (case.lattice.spacing, case.lattice.origin) != (last.lattice.spacing, last.lattice.origin):
         raise DeckError(f"the deck now leads to another lattice than that of the {found}")
     gap, touching = case.initial_gap(last.lattice)
@@ -61,15 +60,14 @@ def steps(
     case : Problem
         The checked problem.
     in_memory : bool
-        The caller keeps the fields of all steps, so that there has to be memory for them.
+        Whether the fields of all steps stay in memory, which is checked for them.
     before : sequence of Step
-        The first steps if they are solved already: the heads of them, the last one with all its fields. What
-        follows is to the bit what it would have been in one go.
+        The first steps, if they are solved: heads, the last one with all its fields. The further steps are
+        bit-identical to those of an uninterrupted run.
     targets : iterable of LoadStep, optional
-        What comes after them instead of the rest of the case; each is asked for when the one before is
-        solved.
+        Further load steps in place of the rest of the case; each is taken after the one before is solved.
     listener : Listener, optional
-        Follows it; default: the log. Finished steps are the caller's to announce.
+        Follows the run, but for its finished steps; default: the log.
 
     Yields
     ------
@@ -81,7 +79,7 @@ def steps(
     DeckError
         If the contact outgrows a fixed window.
     ConvergenceError
-        If a load step misses its tolerance, or the bodies slide on each other without end.
+        If a load step misses its tolerance, or the bodies slide.
     ResourceError
         If there is not enough memory.
     """
@@ -90,7 +88,9 @@ def steps(
     started, done = time.perf_counter(), len(before)
     _announce(case, lattice, done, listener)
     held = len(case.load_steps) if in_memory else 0
-    kind: type[GivenPath] = AdaptivePath if case.adaptive and targets is None else GivenPath
+    kind: type[GivenPath] = GivenPath
+    if targets is None and (case.adaptive or case.deck.wear):
+        kind = WearPath if case.deck.wear else AdaptivePath
     path = kind(case, window_type(case)(case, lattice, held, listener), before)
     targets = case.load_steps[path.position :] if targets is None else targets
     for step in _solved(path, before, targets):
@@ -101,16 +101,22 @@ def steps(
 
 
 def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) -> None:
-    """Say that the load history begins, or goes on after so many steps."""
+    """Report the beginning of the load history, or that it goes on after `done` steps."""
     known = parameters_of(case)
-    values: dict[str, Any] = {"title": case.title, "version": __version__, "machine": known["machine"]}
-    values["steps"] = case.planned_steps or "auto"
-    if done:
-        values["done"] = done
-    values |= {"window": lattice.shape, "spacing": lattice.spacing, "method": case.method_for(lattice)}
     named = ("algorithm", "friction_coefficient", "coupling", "entry", "tolerance")
+    values: dict[str, Any] = {"title": case.title, "version": __version__, "machine": known["machine"]}
+    values |= {"steps": case.planned_steps or "auto"} | ({"done": done} if done else {})
+    values |= {"window": lattice.shape, "spacing": lattice.spacing, "method": case.method_for(lattice)}
     values |= {name: known[name] for name in named}
     listener.said("resumed" if done else "begun", **values)
+    if case.full_contact:
+        sentence = (
+            f"full contact: flat on flat has one unknown, the mean pressure, at all {lattice.size} nodes; "
+            "the half-spaces move as a whole, and what is solved is the layer"
+        )
+        listener.said("full contact", sentence, area=lattice.size * lattice.cell_area)
+    for sentence in [] if case.trial else known.get("warnings", "").splitlines():
+        listener.said("doubtful", f"warning: {sentence}", logging.WARNING, warning=sentence)
 
 
 def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]) -> Iterator[Step]:
@@ -128,6 +134,7 @@ def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]
             _warn_of_path(path.case, step, state, path.window.listener)
             yield step
             state, reached_by_now = reached, _standing(step.history)
+    yield from path.after(state)
 
 
 def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) -> None:
@@ -141,5 +148,5 @@ def _warn_of_path(case: Problem, step: Step, before: Any, listener: Listener) ->
 
 
 def _standing(history: Mapping[str, Any]) -> dict[str, float]:
-    """Return the loads and motions at the end of a step by the keys of the deck; none are zero."""
+    """Return the loads and motions at the end of a step by the keys of the deck; 0 without an entry."""
     return {name: float(history.get(name, 0.0)) for pair in LOADS.values() for name in pair}

@@ -1,1 +1,1 @@
-"""Many cases that differ in a few keys of one deck, and one data set of what came of them."""
+"""Studies: cases that differ in some keys of one deck, and their results in one dataset."""

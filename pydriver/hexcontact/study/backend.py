@@ -1,6 +1,6 @@
-"""Where the cases of a study are run: what all such places have in common, and their words in study files.
+"""Backends, which run the cases of a study: their interface, their registration, their keys in study files.
 
-A module in `backends` registers its own; nothing else names it.
+Each module in `backends` registers one; no other module names them.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from .job import Job, Outcome
 T = TypeVar("T", bound=type)
 
 BACKENDS: dict[str, Any] = {}
-"""All of them, by their words."""
+"""The backends by their words."""
 
 KEYS: dict[str, Any] = {}
-"""The keys that they have in study files: each with its annotation and its `meaning`."""
+"""Keys of study files that belong to backends, each with annotation and `meaning`."""
 
-_POLL = 0.2  # s between looks at whether to stop
+_POLL = 0.2  # s between checks for cancellation
 
 
 @dataclass(frozen=True)
-class Settings(Kind):
+class OptionTable(Kind):
     """A table whose keys belong to another program."""
 
     example: str
@@ -42,26 +42,26 @@ class Settings(Kind):
 
 
 def backend(word: str, annotation: Any = None, default: Any = None) -> Callable[[T], T]:
-    """Register a backend; with an annotation a study file may have its word as a key."""
+    """Register a backend under a word, which is a key of study files if there is an annotation."""
 
-    def known(kind: T) -> T:
+    def register(kind: T) -> T:
         BACKENDS[word] = kind
         if annotation is not None:
             KEYS[word] = (annotation, default)
         return kind
 
-    return known
+    return register
 
 
 class Backend:
-    """Runs cases, several at a time.
+    """A backend: it runs cases, several at a time.
 
     Parameters
     ----------
     settings : object
-        What a study file has under the word of the backend.
+        Value of the key of the backend in a study file.
     cases : int
-        How many cases there are to run, one at least.
+        Number of cases to run, at least 1.
     """
 
     def __init__(self, settings: Any, cases: int) -> None:
@@ -69,21 +69,21 @@ class Backend:
 
     @staticmethod
     def load(settings: Any) -> None:
-        """Import what it needs; called in the main thread."""
+        """Import the packages that it needs; called in the main thread."""
 
     def outcomes(self, jobs: Sequence[Job], cancel: threading.Event) -> Iterator[Outcome]:
-        """Run the jobs; yield each outcome as it comes, until `cancel` is set."""
+        """Run the jobs and yield the outcome of each when it ends, until `cancel` is set."""
         raise NotImplementedError
 
     def stop(self) -> None:
-        """Take back what has not begun, and end what was started here."""
+        """Cancel jobs that have not begun, and end processes started here."""
         raise NotImplementedError
 
 
 def arrived(
     outcomes: queue.Queue[Outcome | BaseException], count: int, cancel: threading.Event
 ) -> Iterator[Outcome]:
-    """Yield `count` outcomes as they come, fewer if `cancel` is set."""
+    """Yield `count` outcomes from a queue, fewer if `cancel` is set; raise exceptions in it."""
     while count and not cancel.is_set():
         with contextlib.suppress(queue.Empty):
             outcome = outcomes.get(timeout=_POLL)

@@ -1,8 +1,8 @@
-"""The result of a study: one data set over its parameters, from the histories of its cases."""
+"""The result of a study: one dataset over its parameters, from the histories of its cases."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +12,20 @@ from ..errors import DeckError, ResourceError
 from ..files import reading, replacing, require_ordinary
 from ..result.netcdf import check_seal
 from ..variables import CONVENTIONS, VARIABLES
+from .axes import Axis
 from .folder import StudyFolder
-from .plan import Axis, Plan, PlannedCase
+from .plan import Plan, PlannedCase
 
 if TYPE_CHECKING:
     import xarray
 
-DONE, FAILED, MISSING = 0, 1, 2
-_STATUS = {DONE: "done", FAILED: "failed", MISSING: "missing"}
+DONE, FAILED, MISSING, INVALID = range(4)
+STATES = {DONE: "done", FAILED: "failed", MISSING: "missing", INVALID: "invalid"}
 STUDY_VERSION = 1
 
 
 def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
-    """Read the history of a finished case: numbers by step, by the name of the quantity."""
+    """Return the history of a finished case: the values of each quantity by load step, by its name."""
     import netCDF4
 
     with reading(path):
@@ -38,36 +39,30 @@ def histories(path: Path) -> dict[str, np.ndarray[Any, Any]]:
         }
 
 
-def collect(
-    plan: Plan, folder: StudyFolder, combine: str, steps: str, attributes: dict[str, Any]
-) -> xarray.Dataset:
-    """Put the finished cases together.
+def collect(plan: Plan, folder: StudyFolder, steps: str, attributes: dict[str, Any]) -> xarray.Dataset:
+    """Combine the finished cases in one dataset.
 
     Parameters
     ----------
     plan : Plan
         The study.
     folder : StudyFolder
-        Where its cases are.
-    combine : str
-        grid: a dimension by parameter; otherwise the dimension ``case``.
+        Folder of its cases.
     steps : str
-        last: what the last load step leaves; all: the whole history, with the dimension ``step``.
+        last: values of the last load step; all: the whole history, with the dimension ``step``.
     attributes : dict
-        Attributes of the data set.
+        Attributes of the dataset.
 
     Returns
     -------
     xarray.Dataset
-        NaN where a case is not done; ``status``, ``exit_code`` and ``message`` say why.
+        NaN where a case is not done, for the reason in ``status``, ``exit_code`` and ``message``.
     """
     import xarray
 
     total = len(plan.cases)
     found = [histories(folder.path(case)) if folder.done(case) else {} for case in plan.cases]
-    grid = combine == "grid"
-    shape = tuple(len(axis.values) for axis in plan.axes) if grid else (total,)
-    dims = tuple(axis.name for axis in plan.axes) if grid else ("case",)
+    dims, shape = tuple(plan.dims), tuple(plan.dims.values())
 
     longest = max((len(next(iter(history.values()))) for history in found if history), default=0)
     present = {name for history in found for name in history}
@@ -79,55 +74,61 @@ def collect(
             if name in history:
                 values[row, : len(history[name])] = history[name]
                 last[row] = history[name][-1]
-        kept = {key: value for key, value in VARIABLES[name].attributes.items() if not key.startswith("flag")}
+        about = {key: value for key, value in VARIABLES[name].attributes.items() if key[:4] != "flag"}
         if steps == "all":
-            columns[name] = ((*dims, "step"), values.reshape(*shape, longest), kept)
+            columns[name] = ((*dims, "step"), values.reshape(*shape, longest), about)
         else:
-            columns[name] = (dims, last.reshape(shape), kept)
+            columns[name] = (dims, last.reshape(shape), about)
 
     def by_case(values: Any, dtype: Any, long_name: str, **more: Any) -> Any:
         return dims, np.array(list(values), dtype=dtype).reshape(shape), {"long_name": long_name, **more}
 
-    outcomes = [_outcome(folder, case, bool(h)) for case, h in zip(plan.cases, found, strict=True)]
+    outcomes = [state_of(folder, case) for case in plan.cases]
     status, codes, messages = zip(*outcomes, strict=True)
-    flags = {"flag_values": np.array(list(_STATUS), "i1"), "flag_meanings": " ".join(_STATUS.values())}
+    flags = {"flag_values": np.array(list(STATES), "i1"), "flag_meanings": " ".join(STATES.values())}
     numbers = map(folder.number, plan.cases)
-    columns["status"] = by_case(status, "i1", "what became of the case", **flags)
+    columns["status"] = by_case(status, "i1", "state of the case", **flags)
     columns["exit_code"] = by_case(codes, "i2", "exit code of the case, 0 if it has not failed", units="1")
     columns["message"] = by_case(messages, str, "why the case failed")
-    columns["case_number"] = by_case(numbers, "i4", f"number of the file in {folder.folder.name}/", units="1")
+    columns["case_number"] = by_case(numbers, "i4", "number of the file of the case", units="1")
 
     coordinates: dict[str, Any] = {}
     for axis in plan.axes:
-        said = axis.values if grid else [case.settings[axis.key] for case in plan.cases]
-        coordinates[axis.name] = _coordinate(axis, axis.name if grid else "case", said)
-    if not grid:
-        about = {"long_name": "number of the case in the study, the first is 1", "units": "1"}
-        coordinates["case"] = ("case", np.arange(1, total + 1, dtype="i4"), about)
+        along = tuple(slice(None) if dim in axis.dims else 0 for dim in dims)
+        places = np.arange(total).reshape(shape)[along]
+        coordinates[axis.name] = _coordinate(axis, places, [case.settings for case in plan.cases])
+    for dim in set(dims) - set(coordinates):
+        of = "case in the study" if dim == "case" else "values in the group"
+        about = {"long_name": f"number of the {of}, the first is 1", "units": "1"}
+        coordinates[dim] = (dim, np.arange(1, plan.dims[dim] + 1, dtype="i4"), about)
     if steps == "all":
         step = VARIABLES["step"]
         coordinates["step"] = ("step", np.arange(1, longest + 1, dtype="i4"), step.attributes)
     return xarray.Dataset(columns, coordinates, {"Conventions": CONVENTIONS, **attributes})
 
 
-def _outcome(folder: StudyFolder, case: PlannedCase, done: bool) -> tuple[int, int, str]:
-    """Return what became of a case: its status, exit code and message."""
-    if done:
+def state_of(folder: StudyFolder, case: PlannedCase) -> tuple[int, int, str]:
+    """Return status, exit code and message of a case."""
+    if folder.done(case):
         return DONE, 0, ""
+    if case.fault:
+        return INVALID, DeckError.exit_code, case.fault
     failure = folder.failure(case)
     return (FAILED, failure.exit_code, failure.message) if failure else (MISSING, 0, "")
 
 
-def _coordinate(axis: Axis, dim: str, values: Sequence[Any]) -> Any:
-    entries = [axis.coordinate(value) for value in values]
-    attributes = {"long_name": axis.long_name or axis.key, "deck_key": axis.key}
+def _coordinate(axis: Axis, places: Any, settings: Sequence[Mapping[str, Any]]) -> Any:
+    """Return a parameter along its dimensions; NaN where a formula has no value."""
+    entries = [axis.coordinate(settings[place].get(axis.key, np.nan)) for place in places.flat]
+    attributes = {"long_name": axis.long_name or axis.key, "deck_key": ", ".join(axis.keys)}
     if all(isinstance(value, float) for value in entries):
-        return dim, np.array(entries, dtype=float), {**attributes, "units": axis.units or "1"}
-    return dim, np.array([str(value) for value in entries]), attributes
+        numbers = np.array(entries, dtype=float).reshape(places.shape)
+        return axis.dims, numbers, {**attributes, "units": axis.units or "1"}
+    return axis.dims, np.array([str(value) for value in entries]).reshape(places.shape), attributes
 
 
 def is_study(path: Path) -> bool:
-    """Tell whether a file is the result of a study."""
+    """Return whether a file is the result of a study."""
     import netCDF4
 
     require_ordinary(path, "the result of a study")
@@ -139,26 +140,32 @@ def is_study(path: Path) -> bool:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise a DeckError if something else than the result of a study is in the way of one."""
+    """Raise a DeckError if a file exists that is not the result of a study."""
     if path.exists() and not is_study(path):
         raise DeckError(f"{path} is there and not the result of a study; choose another output")
 
 
-def write(dataset: xarray.Dataset, path: Path) -> None:
+def write(dataset: xarray.Dataset, path: Path, about: dict[str, str]) -> None:
     """Write the result of a study; an older one is replaced as a whole.
+
+    The texts `about` are attributes of the group ``study``: xarray does not combine datasets whose own
+    attributes differ.
 
     Raises
     ------
     DeckError
-        If something else is in the way.
+        If the path holds another file.
     ResourceError
-        If it cannot be written.
+        If the file cannot be written.
     """
     refuse_foreign(path)
     # Characters, not netCDF strings: HDF5 crashes on those when a file is opened more than once.
     texts = [name for name, variable in dataset.variables.items() if variable.dtype.kind in "UO"]
+    import xarray
+
     try:
         with replacing(path) as temporary:
             dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"dtype": "S1"} for name in texts})
+            xarray.Dataset(attrs=about).to_netcdf(temporary, mode="a", engine="netcdf4", group="study")
     except (OSError, RuntimeError) as error:
         raise ResourceError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from error

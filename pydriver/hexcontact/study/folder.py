@@ -1,7 +1,7 @@
-"""The folder of a study: one netCDF file by finished case, one note by failed case, an index of both.
+"""The folder of a study: a netCDF file for each finished case, a note for each failed case, an index of both.
 
-A case is known by the hash of its merged deck and keeps its number for good, so that a study can be changed:
-cases that are still in it are found again, new ones get new numbers, files of others are left alone.
+The hash of its merged deck identifies a case, and its number never changes, so that a study can be edited:
+its cases are found again, new cases get new numbers, files of other cases are not touched.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _FINAL = (DeckError.exit_code, ConvergenceError.exit_code)  # the same deck fail
 
 
 class StudyFolder:
-    """What is on the disk of a study.
+    """The files of a study.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class StudyFolder:
     Raises
     ------
     DeckError
-        If the folder or the file cannot be what belongs to a study.
+        If the folder or the file cannot be those of a study.
     """
 
     def __init__(self, output: Path) -> None:
@@ -75,23 +75,28 @@ class StudyFolder:
             raise DeckError(f"{path} is damaged ({error}); move the folder {self.folder} away") from None
 
     def lock(self) -> Lock:
-        """Keep other runs of the study away; `Lock.release` it."""
+        """Lock the folder against other runs of the study, up to `Lock.release`."""
         self.folder.mkdir(exist_ok=True)
         return Lock(self.folder / "lock", self.folder)
 
     def enter(self, plan: Plan) -> None:
-        """Give every case its number and write the index, if there is anything new."""
-        new = dict.fromkeys(case.hash for case in plan.cases if case.hash not in self.numbers)
+        """Assign numbers to the cases and write the index, if any case is new."""
+        new = [case.hash for case in plan.cases if case.hash not in self._entries]
         if not new:
             return
         self.folder.mkdir(exist_ok=True)
-        start = max(self.numbers.values(), default=0) + 1
-        self.numbers |= {name: number for number, name in enumerate(new, start=start)}
+        self.assign(plan)
         for case in plan.cases:
             if case.hash in new:
-                settings = {"number": self.numbers[case.hash], "parameters": dict(case.settings)}
-                self._entries[case.hash] = settings
+                number = self.numbers[case.hash]
+                self._entries[case.hash] = {"number": number, "parameters": dict(case.settings)}
         self._write(_INDEX, {"index_version": 1, "cases": self._entries})
+
+    def assign(self, plan: Plan) -> None:
+        """Assign numbers to the cases without writing the index."""
+        new = dict.fromkeys(case.hash for case in plan.cases if case.hash not in self.numbers)
+        start = max(self.numbers.values(), default=0) + 1
+        self.numbers |= {name: number for number, name in enumerate(new, start=start)}
 
     def _write(self, name: str, content: Any) -> None:
         text = json.dumps(content, indent=1, ensure_ascii=False, default=str)
@@ -110,7 +115,7 @@ class StudyFolder:
         return self.folder / f"{self.number(case):04d}.nc"
 
     def done(self, case: PlannedCase) -> bool:
-        """Tell whether the file of a case is there, complete and its own."""
+        """Return whether the file of a case exists, is complete, and holds this case."""
         import netCDF4
 
         path = self.path(case)
@@ -123,7 +128,7 @@ class StudyFolder:
             return False
 
     def failure(self, case: PlannedCase) -> Outcome | None:
-        """Return the failure that is noted of a case."""
+        """Return the failure in the note of a case; None without one."""
         with contextlib.suppress(DeckError, ValueError, TypeError, AttributeError, RecursionError):
             note = json.loads(text_of(self.path(case).with_suffix(".json"), "a note"))
             outcome = Outcome(**{"hexcontact_version": "", **note})
@@ -133,21 +138,23 @@ class StudyFolder:
         return None
 
     def _is_final(self, case: PlannedCase) -> bool:
-        """Tell whether a case has failed for good: by itself, in this version of the program."""
+        """Return whether a case would fail again: for its own reasons, in this version of the program."""
         failure = self.failure(case)
         if failure is None or not failure.lasting:
             return False
         return failure.exit_code in _FINAL and failure.hexcontact_version == __version__
 
     def missing(self, cases: Iterable[PlannedCase], retry: bool = False) -> list[PlannedCase]:
-        """Return the cases that are to be run; those that failed for good only to `retry`."""
+        """Return the cases to run; with `retry` also those that would fail again."""
         wanted = {case.hash: case for case in cases}
         return [
-            case for case in wanted.values() if not self.done(case) and (retry or not self._is_final(case))
+            case
+            for case in wanted.values()
+            if not (case.fault or self.done(case)) and (retry or not self._is_final(case))
         ]
 
     def note(self, case: PlannedCase, outcome: Outcome) -> None:
-        """Write down how a case has ended, and clear away what attempts have left."""
+        """Record the outcome of a case, and remove files of its attempts."""
         path = self.path(case)
         if outcome.exit_code:
             self._write(f"{path.stem}.json", dataclasses.asdict(outcome))

@@ -1,4 +1,4 @@
-"""One case of a study: what is to be run, how it has ended, and running it into its file."""
+"""One case of a study: the job, its outcome, and the run that writes its file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST_CASES = 100_000  # of a study
 
 @dataclass(frozen=True)
 class Job:
-    """A case to be run: its hash, its deck, where its file goes."""
+    """A case to run: its hash, its deck, the path of its file."""
 
     hash: str
     deck: str
@@ -35,22 +35,22 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a case has ended.
+    """The outcome of a case.
 
     Attributes
     ----------
     hash : str
         Name of the case.
     exit_code : int
-        0 if it is done, else what ``hexcontact run`` would have exited with.
+        0 if it is done, else the exit code of ``hexcontact run``.
     message : str
         Why it failed.
     seconds : float
         Wall time of this attempt.
     lasting : bool
-        Whether a failure is of the case itself, not of the circumstances.
+        Whether the case itself caused the failure, not memory, disk or signals.
     hexcontact_version : str
-        The version of the program that has run it.
+        Version of the program that ran it.
     """
 
     hash: str
@@ -62,23 +62,24 @@ class Outcome:
 
 
 def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) -> Outcome:
-    """Run one case into its file.
+    """Run one case and write its file.
 
     Parameters
     ----------
     job : Job
         The case.
     apart : bool
-        Write under a name of this attempt's own first, for when another attempt may still be under way.
+        Write to a file of this attempt first, since another attempt may still run.
     listener : Listener, optional
-        Follows the run, besides the log.
+        Receives the progress, besides the log.
 
     Returns
     -------
     Outcome
-        Failures are returned, not raised.
+        Also of a failure, which is not raised.
     """
     from ..case import Case
+    from ..interior.tables import files_of
     from ..result.store import Store
     from ..solve.run import listeners, metadata_of, run_into
 
@@ -98,7 +99,7 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
         with contextlib.ExitStack() as stack:
             restart = _interrupted(job, case, stack)
             if restart is None:
-                if own.is_file():  # damaged, or of another case, under a name that the index gave to this one
+                if own.is_file():  # damaged, or of another case that had this number
                     own.unlink()
                 store = stack.enter_context(Store(own, metadata_of(case), overwrite=True))
                 began = True
@@ -111,8 +112,10 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
         apart = own != target
         if apart:
             os.replace(own, target)
+            for name, path in files_of(case.deck_text, own).items():
+                os.replace(path, files_of(case.deck_text, target)[name])
     except HexcontactError as error:
-        _keep(own, target)
+        _rename_journal(own, target)
         return ended(error, error.exit_code, str(error), began)
     except MemoryError as error:
         return ended(error, ResourceError.exit_code, "the machine has not enough memory for this", False)
@@ -124,8 +127,8 @@ def solve_case(job: Job, apart: bool = False, listener: Listener | None = None) 
 
 
 def _interrupted(job: Job, case: Case, stack: contextlib.ExitStack) -> Restart | None:
-    """Open what an interrupted attempt has left, to go on with it; None if there is no such thing."""
-    from ..result.store import journal_of
+    """Reopen the journal of an interrupted attempt to continue it; None if there is none."""
+    from ..result.journal import journal_of
     from ..solve.restart import reopened
 
     target = Path(job.path)
@@ -137,17 +140,17 @@ def _interrupted(job: Job, case: Case, stack: contextlib.ExitStack) -> Restart |
             try:
                 restart = attempt.enter_context(reopened(journal, case))
             except (HexcontactError, OSError):
-                continue  # damaged, of another deck, or another attempt is at it right now
-            if restart is None or restart.warning:  # finished, or of another version: then all of it anew
+                continue  # damaged, of another deck, or locked by another attempt
+            if restart is None or restart.warning:  # finished, or of another version: run from the start
                 continue
             stack.push(attempt.pop_all())
             return restart
     return None
 
 
-def _keep(own: Path, target: Path) -> None:
-    """Give the finished steps of a failed attempt the name of the case."""
-    from ..result.store import journal_of
+def _rename_journal(own: Path, target: Path) -> None:
+    """Give the journal of a failed attempt the name of the case."""
+    from ..result.journal import journal_of
 
     if own != target and journal_of(own).is_dir():
         with contextlib.suppress(OSError):

@@ -11,16 +11,16 @@ from ..solve.progress import Bar, Lines
 
 
 class StudyLines(Lines):
-    """One line by case, for logs and pipes."""
+    """One line for each case, for logs and pipes."""
 
     _count = 0
 
     def begun(self, title: str, steps: int) -> None:
-        """Keep the number of cases to run."""
+        """Record the number of cases to run."""
         self.steps = steps
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
-        """Print what there is to do, then each case with its place."""
+        """Print a line on the study, then one for each case with its number in the sequence."""
         if event != "study":
             self._count += 1
             text = f"{self._count:>{len(str(self.steps))}}/{self.steps}  {text}"
@@ -28,23 +28,17 @@ class StudyLines(Lines):
 
 
 class StudyBar(Bar):
-    """A progress bar over the cases, the latest one below it."""
+    """A progress bar over the cases, with the latest case below it."""
 
     def begun(self, title: str, steps: int) -> None:
-        """Show the bar, which counts cases even if none is missing."""
+        """Show the bar, also if no case is missing."""
         super().begun(title, max(steps, 1))
 
     def _columns(self) -> list[Any]:
-        from rich import progress
-
-        return [
-            *super()._columns()[1:],
-            progress.TextColumn("left:"),
-            progress.TimeRemainingColumn(),
-        ]
+        return super()._columns()[1:]
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: Any) -> None:
-        """Begin with the cases that are done, then move the bar on by a case."""
+        """Start the bar at the finished cases, then advance it case by case."""
         if event == "study":
             cases = values["cases"]
             self._bar.reset(self._task, total=cases, completed=cases - values["missing"])
@@ -54,7 +48,7 @@ class StudyBar(Bar):
 
 
 def study_reporter(quiet: bool = False) -> Listener:
-    """Return what suits standard error: bar, lines, or silence if `quiet`."""
+    """Return the listener for standard error: a bar, lines, or none if `quiet`."""
     if quiet:
         return Listener()
     return StudyBar() if sys.stderr.isatty() else StudyLines(sys.stderr)

@@ -1,4 +1,4 @@
-"""Studies: many cases that differ in a few keys of one deck, and one data set of what came of them.
+"""Studies: cases that differ in some keys of one deck, and their results in one dataset.
 
 Examples
 --------
@@ -28,10 +28,10 @@ from ..text import quantity
 from .backend import BACKENDS, Backend
 from .backends.dask import Dask, DaskPool
 from .backends.processes import LocalPool
-from .collect import STUDY_VERSION, collect, refuse_foreign, write
+from .collect import STATES, STUDY_VERSION, collect, refuse_foreign, state_of, write
 from .folder import StudyFolder
 from .job import Job, Outcome, solve_case
-from .plan import Plan, PlannedCase, plan
+from .plan import CheckLevel, Plan, PlannedCase, plan
 from .tables import StudyFile
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ __all__ = ["Outcome", "PlannedCase", "Study", "run_study"]
 
 
 class Study:
-    """Many cases of one deck; all of them are checked here.
+    """Cases of one deck with different values of some keys; the constructor checks all of them.
 
     Parameters
     ----------
@@ -49,26 +49,28 @@ class Study:
         The base deck, or its tables.
     parameters : mapping or sequence of mappings
         Values by dotted key of the deck: ``{"friction.coefficient": [0.1, 0.2]}``, or
-        ``{"load.1.normal_load": {"range": ["1 N", "9 N"], "count": 5, "scale": "log"}}``; or the entries of
-        [[parameter]].
+        ``{"load.1.normal_load": {"range": ["1 N", "9 N"], "count": 5, "scale": "log"}}``, with a tuple of
+        keys that share one value; or the entries of [[parameter]].
     output : path, optional
         netCDF file of the result; the files of the cases go to a folder beside it with its name.
     name : str
-        What messages call the study.
+        Name of the study in messages.
+    skip_invalid : bool
+        Leave out wrong cases, with the status ``invalid`` in the result.
     **keys
         Other keys of a study file: title, combine, samples, seed, steps, dask.
 
     Attributes
     ----------
     plan : Plan
-        Its cases and parameters.
+        Cases and parameters.
     output : Path
         File of the result.
 
     Raises
     ------
     DeckError
-        With a sentence for each thing that is wrong with the study or one of its cases.
+        With a sentence for each fault of the study or of a case.
     """
 
     def __init__(
@@ -78,6 +80,7 @@ class Study:
         *,
         output: str | Path | None = None,
         name: str = "study",
+        skip_invalid: bool = False,
         **keys: Any,
     ) -> None:
         from ..deck.write import plain
@@ -89,14 +92,19 @@ class Study:
             ]
         given = isinstance(deck, Mapping)
         data = {**keys, "parameter": list(parameters), "deck": "deck" if given else str(deck)}
-        file = StudyFile.parse(data, Source())
+        self.file, self.name = StudyFile.parse(data, Source()), name
+        self.output = Path(output or self.file.output or "study.nc")
         base, text = (dict(deck), "") if isinstance(deck, Mapping) else read_toml(deck)
-        self._set_up(
-            file, base, Source("" if given else str(deck), text), name, output or file.output or "study.nc"
-        )
+        self._build(base, Source("" if given else str(deck), text), "windows", skip_invalid)
 
     @classmethod
-    def from_toml(cls, path: str | Path, output: str | Path | None = None, check: bool = True) -> Self:
+    def from_toml(
+        cls,
+        path: str | Path,
+        output: str | Path | None = None,
+        check: bool | CheckLevel = True,
+        skip_invalid: bool = False,
+    ) -> Self:
         """Read a study file.
 
         Parameters
@@ -104,45 +112,42 @@ class Study:
         path : path
             The study file.
         output : path, optional
-            File of the result; default: what the study file says, else its name with .nc in this folder.
-        check : bool
-            Build every case, to see whether all are right.
+            File of the result; default: that of the study file, else its name with .nc in this folder.
+        check : bool or str
+            Check every case, its window by a coarse solution; ``"decks"``: without the windows.
+        skip_invalid : bool
+            Leave out wrong cases, with the status ``invalid`` in the result.
 
         Raises
         ------
         DeckError
-            With a sentence for each thing that is wrong with it, its deck or one of its cases.
+            With a sentence for each fault of the study, its deck or a case.
         """
-        data, text = read_toml(path)
-        file = StudyFile.parse(data, Source(str(path), text))
-        deck = Path(path).parent / file.deck
-        base, deck_text = read_toml(deck)
+        data, text = read_toml(path, "a study")
+        if "body" in data and "parameter" not in data:
+            raise DeckError(f"{path} is a deck and no study; hexcontact run {path} solves it")
         study = cls.__new__(cls)
-        target = output or file.output or f"{Path(path).stem}.nc"
-        study._set_up(file, base, Source(str(deck), deck_text), str(path), target, check)
+        study.file, study.name = StudyFile.parse(data, Source(str(path), text)), str(path)
+        study.output = Path(output or study.file.output or f"{Path(path).stem}.nc")
+        deck = Path(path).parent / study.file.deck
+        base, deck_text = read_toml(deck)
+        level: CheckLevel = check if isinstance(check, str) else "windows" if check else "nothing"
+        study._build(base, Source(str(deck), deck_text), level, skip_invalid)
         return study
 
-    def _set_up(
-        self,
-        file: StudyFile,
-        base: Mapping[str, Any],
-        source: Source,
-        name: str,
-        output: str | Path,
-        check: bool = True,
-    ) -> None:
-        self.file, self.name = file, name
-        # what the deck includes, and the rows of its series, are part of every case
+    def _build(self, base: Mapping[str, Any], source: Source, check: CheckLevel, skip_invalid: bool) -> None:
+        """Build and check the cases, and open the folder of the study."""
+        # Every case contains included decks and rows of series.
         whole = assemble(base, source.text, source, Path(source.name).parent)
         if whole.problems:
             raise deck_error(whole.problems, whole.source)
-        self.plan: Plan = plan(file, whole.data, whole.source, name, check)
-        self.output = Path(output)
+        self.plan: Plan = plan(self.file, whole.data, whole.source, self.name, check, skip_invalid)
         self.folder = StudyFolder(self.output)
+        self.folder.assign(self.plan)
 
     @property
     def title(self) -> str:
-        """A line about the study."""
+        """Title of the study."""
         return self.file.title or Path(self.name).stem
 
     @property
@@ -153,15 +158,24 @@ class Study:
     def __len__(self) -> int:
         return len(self.plan.cases)
 
+    def states(self) -> list[str]:
+        """Return the state of each case, done, failed, missing or invalid; nothing is written."""
+        return [STATES[state_of(self.folder, case)[0]] for case in self.cases]
+
     def missing(self, retry: bool = False) -> list[PlannedCase]:
-        """Return the cases that a run would run; those that failed by themselves only to `retry`."""
+        """Return the cases that `run` would solve; with `retry` also those that would fail again."""
         self.folder.enter(self.plan)
         return self.folder.missing(self.cases, retry)
 
+    @property
+    def invalid(self) -> list[PlannedCase]:
+        """The wrong cases, which are left out; their `fault` is the reason."""
+        return [case for case in self.cases if case.fault]
+
     def failures(self) -> list[tuple[PlannedCase, Outcome]]:
-        """Return the cases that have failed, each with its outcome."""
-        pairs = [(case, self.folder.failure(case)) for case in self.cases if not self.folder.done(case)]
-        return [(case, outcome) for case, outcome in pairs if outcome is not None]
+        """Return the failed cases, each with its outcome."""
+        unfinished = [case for case in self.cases if not (case.fault or self.folder.done(case))]
+        return [(case, found) for case in unfinished if (found := self.folder.failure(case)) is not None]
 
     def run(
         self,
@@ -171,22 +185,22 @@ class Study:
         listener: Listener | None = None,
         cancel: threading.Event | None = None,
     ) -> xarray.Dataset | None:
-        """Run the cases that are missing and put all together.
+        """Run the missing cases and combine the results.
 
-        In a script this belongs under ``if __name__ == "__main__":``, as all that starts processes.
+        In a script this belongs under ``if __name__ == "__main__":``, since it starts processes.
 
         Parameters
         ----------
         jobs : int, optional
-            Cases at a time in processes of this machine; default: one for each core.
+            Number of processes on this machine; default: one for each core.
         dask : str, optional
-            Address of a Dask scheduler to run them on instead.
+            Address of a Dask scheduler to run the cases on instead.
         retry : bool
-            Run cases again that did not converge, or outgrew their window.
+            Also run cases again that did not converge or outgrew their window.
         listener : Listener, optional
-            Follows the study, besides the log.
+            Receives the progress, besides the log.
         cancel : threading.Event, optional
-            Set by another thread, it ends the run; finished cases are kept.
+            Set by another thread, it ends the run; finished cases stay.
 
         Returns
         -------
@@ -196,7 +210,7 @@ class Study:
         Raises
         ------
         DeckError
-            If another run is at this study, the output is in the way, or there is no Dask.
+            If another run holds the study, the output is another file, or Dask is not installed.
         ResourceError
             If the result cannot be written.
         """
@@ -210,13 +224,8 @@ class Study:
             with listener.following(self.title, len(missing)):
                 cases = f"{len(self)} case{'s' * (len(self) != 1)}"
                 to_run = "" if len(missing) == len(self) else f", {len(missing)} to run"
-                about: dict[str, Any] = {
-                    "title": self.title,
-                    "cases": len(self),
-                    "missing": len(missing),
-                    "output": self.output,
-                }
-                listener.said("study", f"{self.title}: {cases}{to_run}", **about)
+                values: dict[str, Any] = {"title": self.title, "cases": len(self), "missing": len(missing)}
+                listener.said("study", f"{self.title}: {cases}{to_run}", **values, output=self.output)
                 if pool is not None:
                     self._work(pool, missing, listener, cancel)
             return None if cancel.is_set() else self.collect()
@@ -231,15 +240,15 @@ class Study:
             for outcome in pool.outcomes([self._job(case) for case in missing], cancel):
                 case = by_hash[outcome.hash]
                 self.folder.note(case, outcome)
-                self._say(case, outcome, listener)
+                self._report(case, outcome, listener)
         finally:
             pool.stop()
 
     def _job(self, case: PlannedCase) -> Job:
         return Job(case.hash, case.deck, os.path.realpath(self.folder.path(case)))
 
-    def _say(self, case: PlannedCase, outcome: Outcome, listener: Listener) -> None:
-        """Say how a case ended."""
+    def _report(self, case: PlannedCase, outcome: Outcome, listener: Listener) -> None:
+        """Report the outcome of a case."""
         number, level = self.folder.number(case), logging.INFO
         values: dict[str, Any] = {"parameters": str(case), "seconds": outcome.seconds}
         ending = f"done in {quantity(outcome.seconds, 's', 3)}"
@@ -249,7 +258,7 @@ class Study:
         listener.said(f"case={number}/{len(self)}", f"case {number} ({case}): {ending}", level, **values)
 
     def backend(self, jobs: int | None = None, dask: str | None = None) -> tuple[type[Backend], Any]:
-        """Return what `run` would run cases with, and its settings."""
+        """Return the backend that `run` would use, and its settings."""
         if dask:
             return DaskPool, Dask(address=dask)
         for word, kind in BACKENDS.items():
@@ -259,21 +268,21 @@ class Study:
         return LocalPool, jobs
 
     def run_case(self, number: int, retry: bool = False, listener: Listener | None = None) -> Outcome:
-        """Run one case here, unless it is done; for job arrays.
+        """Run one case in this process unless it is done; for job arrays.
 
         Parameters
         ----------
         number : int
             Number of the case, as in the names of the files.
         retry : bool
-            Also if it failed by itself before.
+            Also if it would fail again.
         listener : Listener, optional
-            Follows the run, besides the log.
+            Receives the progress, besides the log.
 
         Returns
         -------
         Outcome
-            Of this run, or of the one before.
+            Outcome of this run, or of the one before.
         """
         missing = {self.folder.number(case): case for case in self.missing(retry)}
         known = {self.folder.number(case): case for case in self.cases}
@@ -287,11 +296,11 @@ class Study:
         return outcome
 
     def has(self, number: int) -> bool:
-        """Tell whether the result of a case is in place."""
+        """Return whether the result of a case exists."""
         return any(self.folder.number(case) == number and self.folder.done(case) for case in self.cases)
 
     def collect(self) -> xarray.Dataset:
-        """Put together what is there, write it to `output`, and return it.
+        """Combine the finished cases, write the result to `output`, and return it.
 
         Raises
         ------
@@ -300,23 +309,22 @@ class Study:
         """
         self.folder.enter(self.plan)
         attributes = {
-            "title": self.title,
             "source": f"hexcontact {__version__}",
             "hexcontact_version": __version__,
             "study_version": STUDY_VERSION,
             "combine": self.file.combine,
-            "study": json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str),
         }
-        dataset = collect(self.plan, self.folder, self.file.combine, self.file.steps, attributes)
-        write(dataset, self.output)
+        study = json.dumps(self.file.model_dump(mode="json", exclude_defaults=True), default=str)
+        dataset = collect(self.plan, self.folder, self.file.steps, attributes)
+        write(dataset, self.output, {"title": self.title, "study": study})
         return dataset
 
     def __repr__(self) -> str:
         """Name the study, its parameters and the number of its cases."""
-        axes = ", ".join(axis.key for axis in self.plan.axes)
+        axes = ", ".join(key for axis in self.plan.axes for key in axis.keys)
         return f"Study({self.title!r}, {self.file.combine} over {axes}: {len(self)} cases, {self.output})"
 
 
 def run_study(path: str | Path, output: str | Path | None = None, **options: Any) -> xarray.Dataset | None:
-    """Read a study file and run what is missing of it; options as of `Study.run`."""
+    """Read a study file and run its missing cases; options as of `Study.run`."""
     return Study.from_toml(path, output).run(**options)

@@ -1,4 +1,4 @@
-"""The study file: which deck, which of its keys vary, how they are combined. Checked as decks are."""
+"""The study file: base deck, keys that vary, their combination; checked like a deck."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from ..deck.kinds import Kind, Several, Text, Whole, Word, refuse
+from ..deck.formula import Formula
+from ..deck.kinds import Kind, Schema, Several, Text, Whole, Word, refuse
 from ..deck.model import Table, extended, meaning
+from ..deck.schema import schema_of
 from . import backends  # noqa: F401 (each registers its key)
 from .backend import KEYS
 from .job import MOST_CASES
@@ -18,7 +20,7 @@ from .job import MOST_CASES
 
 @dataclass(frozen=True)
 class Anything(Kind):
-    """A value that only the deck can judge."""
+    """A value of any kind, which is checked with the deck."""
 
     def _expected(self) -> str:
         return "a value of that key"
@@ -39,12 +41,47 @@ class VariableName(Text):
         return name if re.fullmatch(r"\w(?:[\w .+-]*[\w.+-])?", name) else refuse(f"expected {self.expected}")
 
 
-class Parameter(Table):
-    """An entry of [[parameter]]: a key of the deck and the values it takes."""
+@dataclass(frozen=True)
+class Keys(Kind):
+    """One dotted key of a deck, or several that share one value."""
 
-    key: Annotated[str, Text()] = meaning(..., "dotted key of the deck, such as load.1.normal_load")
+    def _expected(self) -> str:
+        return 'a dotted key of the deck, or an array of them, such as "load.1.normal_load"'
+
+    def _parse(self, value: object) -> tuple[str, ...]:
+        keys = tuple(value) if isinstance(value, list | tuple) else (value,)
+        whole = keys and all(isinstance(key, str) and key.strip() for key in keys)
+        return keys if whole else refuse(f"expected {self.expected}")
+
+    def _schema(self) -> Schema:
+        text = {"type": "string", "minLength": 1}
+        return {"anyOf": [text, {"type": "array", "items": text, "minItems": 1}]}
+
+    def written(self, value: tuple[str, ...]) -> str | list[str]:
+        """Return one key as text, several as a list."""
+        return value[0] if len(value) == 1 else list(value)
+
+
+@dataclass(frozen=True)
+class Expression(Text):
+    """A formula over parameters and keys of the deck."""
+
+    def _parse(self, value: object) -> str:
+        text = super()._parse(value)
+        try:
+            return text if Formula(text) else ""
+        except ValueError as error:
+            refuse(f"expected {error}")
+
+
+class Parameter(Table):
+    """An entry of [[parameter]]: a key of the deck, or several, and its values."""
+
+    key: Annotated[tuple[str, ...], Keys()] = meaning(
+        ..., "dotted key of the deck, such as load.1.normal_load; several keys have the same value"
+    )
     name: Annotated[str, VariableName()] | None = meaning(
-        None, "what the result calls it; the key with _ for . if absent", '"load"'
+        None, "name in the result; the key with _ for . if absent", '"load"'
     )
     values: Annotated[tuple[Any, ...], Several(Anything(), "values", '["1 N", "2 N"]')] | None = meaning(
         None, "the values"
@@ -58,30 +95,43 @@ class Parameter(Table):
     scale: Annotated[str, Word(("linear", "log"))] = meaning(
         "linear", "log: values in `range` in equal ratios"
     )
+    expression: Annotated[str, Expression()] | None = meaning(
+        None,
+        "formula in SI over parameters and keys of the deck, instead of `values`",
+        '"0.8 * friction.coefficient * load.1.normal_load"',
+    )
+    group: Annotated[str, VariableName()] | None = meaning(
+        None, "parameters of one group vary side by side, as one dimension of this name (grid)", '"material"'
+    )
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Values or a range, never both."""
-        if data.get("key") == "":
-            yield "key", "expected a dotted key of the deck, such as load.1.normal_load"
-        if data.get("values") is None and data.get("range") is None:
-            yield "values", "missing; expected values or range"
-        if "values" in data:
-            for key in ("range", "count", "scale"):
-                if key in data:
-                    yield key, f"expected values or {key}, not both"
+        """Require one of values, range and expression."""
+        sources = {"values": (), "range": ("count", "scale"), "expression": ()}
+        given = [key for key in sources if data.get(key) is not None]
+        if not given:
+            yield "values", "missing; expected values, range or expression"
+            return
+        foreign = [key for key in sources if key != given[0]]
+        if given[0] != "range":
+            foreign += sources["range"]
+        for key in foreign + ["group"] * (given[0] == "expression"):
+            if key in data:
+                yield key, f"expected {given[0]} or {key}, not both"
 
     @property
     def label(self) -> str:
-        """What the result calls the parameter."""
-        return self.name or self.key.replace(".", "_")
+        """Name of the parameter in the result."""
+        return self.name or self.key[0].replace(".", "_")
 
 
 class _Study(Table):
-    """All of a study file but where its cases are run."""
+    """A study file without the keys of backends."""
 
-    title: Annotated[str, Text()] = meaning("", "a line about the study")
-    deck: Annotated[str, Text()] = meaning(..., "the base deck; a relative name starts at the study file")
+    title: Annotated[str, Text()] = meaning("", "a line about the study", '"Energy of a cycle"')
+    deck: Annotated[str, Text()] = meaning(
+        ..., "the base deck; a relative name starts at the study file", '"fretting.toml"'
+    )
     combine: Annotated[str, Word(("grid", "zip", "lhs"))] = meaning(
         "grid",
         "grid: every value with every other; zip: first with first, second with second; lhs: Latin hypercube",
@@ -92,13 +142,13 @@ class _Study(Table):
         "last", "load steps whose history the result holds"
     )
     output: Annotated[str, Text()] | None = meaning(
-        None, "netCDF file of the result; the name of the study file with .nc if absent"
+        None, "netCDF file of the result; the name of the study file with .nc if absent", '"study.nc"'
     )
     parameter: list[Parameter] = Field(min_length=1)
 
     @classmethod
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Each way to combine has its own keys."""
+        """Require the keys of the combination, and refuse those of others."""
         combine = data.get("combine", "grid")
         if combine == "lhs" and "samples" not in data:
             yield "samples", "missing; a Latin hypercube needs the number of its cases"
@@ -106,27 +156,28 @@ class _Study(Table):
             for key in ("samples", "seed"):
                 if key in data:
                     yield key, 'belongs to combine = "lhs"'
-        listed = data.get("parameter")
-        entries = (
-            [entry for entry in listed if isinstance(entry, Mapping)] if isinstance(listed, list) else []
-        )
+        given = data.get("parameter")
+        entries = [entry for entry in given if isinstance(entry, Mapping)] if isinstance(given, list) else []
         for number, entry in enumerate(entries, start=1):
             if combine == "lhs" and "count" in entry:
                 yield f"parameter.{number}.count", "a Latin hypercube takes the number of its cases, samples"
             if combine != "lhs" and "range" in entry and "count" not in entry:
                 yield f"parameter.{number}.count", "missing; expected the number of values in range"
-            if any(entry.get("key") == other.get("key") for other in entries[: number - 1]):
-                yield f"parameter.{number}.key", "expected each key only once"
-        if combine == "zip":
-            lengths = [
-                entry.get("count", 0) if "range" in entry else _length(entry.get("values"))
-                for entry in entries
-            ]
-            if len(set(lengths)) > 1:
-                yield (
-                    "parameter",
-                    f"zip needs as many values of each; they have {', '.join(map(str, lengths))}",
-                )
+            if combine != "grid" and "group" in entry:
+                yield f"parameter.{number}.group", 'belongs to combine = "grid"'
+        varied = [entry for entry in entries if "expression" not in entry]
+        if entries and not varied:
+            yield "parameter", "expected values or a range of one parameter at least"
+        if combine != "lhs":
+            groups: dict[Any, list[int]] = {}
+            for position, entry in enumerate(varied):
+                together = "zip" if combine == "zip" else entry.get("group", position)
+                count = entry.get("count", 0) if "range" in entry else _length(entry.get("values"))
+                groups.setdefault(together, []).append(count)
+            for name, lengths in groups.items():
+                if len(set(lengths)) > 1:
+                    numbers = ", ".join(map(str, lengths))
+                    yield "parameter", f"{name} needs as many values of each; they have {numbers}"
 
 
 _Extended: Any = extended(_Study, KEYS)
@@ -134,6 +185,12 @@ _Extended: Any = extended(_Study, KEYS)
 
 class StudyFile(_Extended):
     """A whole study file."""
+
+
+def study_schema() -> Schema:
+    """Return the JSON schema of study files."""
+    required = [key for key, info in StudyFile.known_keys().items() if info.is_required()]
+    return schema_of(StudyFile, "hexcontact study", "Many cases of one deck") | {"required": required}
 
 
 def _length(values: object) -> int:

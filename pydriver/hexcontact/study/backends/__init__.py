@@ -1,4 +1,4 @@
-"""The places where cases of a study can be run: each module registers one."""
+"""The backends of studies: each module registers one."""
 
 import importlib
 import pkgutil

@@ -1,11 +1,12 @@
-"""Runs the cases of a study in processes of this machine.
+"""Backend that runs the cases of a study in processes of this machine.
 
-Each worker has an executor of its own: a process that dies (out of memory, most often) takes only its own
-case with it, and that case is known. Workers heed no signals: the one who started them ends them.
+Each worker has its own executor, so that a process that dies (mostly out of memory) loses one known case.
+Workers block signals; the parent process ends them.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import queue
 import signal
@@ -15,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 
+from ...core.memory import cores
 from ...errors import DeckError, ResourceError
 from ..backend import Backend, arrived, backend
 from ..job import Job, Outcome, solve_case
@@ -23,30 +25,23 @@ _BLOCKED = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 
 
 def prepare_worker(threads: int) -> None:
-    """Set a worker process up, before it loads the compiled core."""
-    import multiprocessing
-
+    """Set up a worker process before it loads the compiled core."""
     os.environ["OMP_NUM_THREADS"] = str(threads)
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     parent = multiprocessing.parent_process()
 
     def follow() -> None:
         assert parent is not None
-        parent.join()  # returns only when the study was killed
+        parent.join()  # returns only if the parent was killed
         os._exit(1)
 
     if parent is not None:
         threading.Thread(target=follow, daemon=True).start()
 
 
-def cores() -> int:
-    """Return the number of cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 @backend("processes")
 class LocalPool(Backend):
-    """Worker processes on this machine; settings: how many cases at a time, None for one for each core."""
+    """Worker processes on this machine; settings: their number, None for one for each core."""
 
     def __init__(self, settings: int | None, cases: int) -> None:
         if settings is not None and settings < 1:
@@ -61,10 +56,10 @@ class LocalPool(Backend):
         self._attendants: list[threading.Thread] = []
 
     def outcomes(self, jobs: Sequence[Job], cancel: threading.Event) -> Iterator[Outcome]:
-        """Run the jobs; yield each outcome as it comes."""
+        """Run the jobs and yield the outcome of each when it ends, until `cancel` is set."""
         from multiprocessing import resource_tracker
 
-        # Started from a thread it would undo the blocking of signals there.
+        # Started from a thread, the tracker would unblock the signals of that thread.
         resource_tracker.ensure_running()
         waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
         for job in jobs:
@@ -76,8 +71,8 @@ class LocalPool(Backend):
         yield from arrived(self._outcomes, len(jobs), cancel)
 
     def _attend(self, number: int, waiting: queue.SimpleQueue[Job]) -> None:
-        """Give one worker after the other job."""
-        signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)  # which the worker inherits
+        """Run waiting jobs in one worker."""
+        signal.pthread_sigmask(signal.SIG_BLOCK, _BLOCKED)  # inherited by the worker
         try:
             while not self._stopped.is_set():
                 try:
@@ -92,14 +87,16 @@ class LocalPool(Backend):
             self._end(number)
 
     def _solved(self, number: int, job: Job) -> Outcome | None:
-        """Have a job done; None if it was stopped."""
+        """Return the outcome of a job; None if the pool was stopped."""
         started = time.perf_counter()
         try:
             with self._mutex:
                 if self._stopped.is_set():
                     return None
                 if number not in self._executors:
-                    self._executors[number] = self._executor()
+                    context, threads = multiprocessing.get_context("spawn"), (self.threads,)
+                    pool = ProcessPoolExecutor(1, context, initializer=prepare_worker, initargs=threads)
+                    self._executors[number] = pool
                 future = self._executors[number].submit(solve_case, job)
             return future.result()
         except BrokenProcessPool:
@@ -109,12 +106,6 @@ class LocalPool(Backend):
             words = "its process died; was it killed, or out of memory?"
             return Outcome(job.hash, ResourceError.exit_code, words, time.perf_counter() - started, False)
 
-    def _executor(self) -> ProcessPoolExecutor:
-        import multiprocessing
-
-        context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(1, context, initializer=prepare_worker, initargs=(self.threads,))
-
     def _end(self, number: int) -> None:
         with self._mutex:
             executor = self._executors.pop(number, None)
@@ -122,7 +113,7 @@ class LocalPool(Backend):
             executor.shutdown(wait=True, cancel_futures=True)
 
     def stop(self) -> None:
-        """End the workers, whatever they are doing; what they have finished is on the disk."""
+        """Kill the workers; finished load steps are on the disk."""
         self._stopped.set()
         with self._mutex:
             for executor in self._executors.values():

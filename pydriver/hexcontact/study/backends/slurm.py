@@ -1,4 +1,4 @@
-"""A job array of Slurm: a script for sbatch, whose tasks run one case each."""
+"""Job arrays of Slurm: a script for sbatch, each task of which runs one case."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from typing import Annotated, Any
 
 from ...deck.model import meaning, refuse_key
 from ...errors import DeckError
-from ..backend import Settings, backend
+from ..backend import OptionTable, backend
 
 _BATCH_OPTION = re.compile(r"[a-z][a-z0-9_-]*")
 
 
 def _text(value: str) -> str | None:
-    """Return text as it stands in a line of options of sbatch, quoted where needed; None if it cannot."""
+    """Return a value of an option of sbatch, quoted where needed; None if it cannot be written."""
     if not value or not value.isprintable() or '"' in value or "\\" in value:
         return None
     return f'"{value}"' if re.search(r"[\s'#]", value) else value
 
 
 @dataclass(frozen=True)
-class BatchOptions(Settings):
-    """Options of sbatch, which become lines of a script."""
+class BatchOptions(OptionTable):
+    """Options of sbatch, each a line of the script."""
 
     def _parse(self, value: object) -> dict[str, Any]:
         options = super()._parse(value)
@@ -47,7 +47,7 @@ class BatchOptions(Settings):
     meaning({}, "options of sbatch for --slurm, such as time and cpus-per-task"),
 )
 class JobArray:
-    """A job array, which is submitted by hand; settings: options of sbatch."""
+    """A job array that users submit; settings: options of sbatch."""
 
     def __init__(self, settings: dict[str, Any], cases: int) -> None:
         self.options, self.cases = settings, cases
@@ -62,8 +62,10 @@ class JobArray:
         path, output : Path
             The study file, and the file of its result.
         retry : bool
-            Also cases that failed by themselves.
+            Also run cases that would fail again.
         """
+        if not numbers:
+            return "#!/bin/sh\n# no case is missing"
         files = [str(path.resolve()), os.path.abspath(output)]
         for name in files:
             if _text(name) is None:
@@ -71,7 +73,7 @@ class JobArray:
         options: dict[str, Any] = {
             "job-name": output.stem,
             "output": str(output.with_suffix("")).replace("%", "%%") + "/slurm-%A_%a.log",
-            "signal": "B:USR1@60",  # a minute before a time limit, to the command in the shell's place
+            "signal": "B:USR1@60",  # a minute before the time limit, to the command that replaces the shell
         }
         options |= {key.replace("_", "-"): value for key, value in self.options.items()}
         words = ["hexcontact", "study", files[0], "--output", files[1], *(["--retry"] if retry else [])]
@@ -91,7 +93,7 @@ class JobArray:
 
 
 def _ranges(numbers: Sequence[int]) -> str:
-    """Write numbers as Slurm does: 1-4,7."""
+    """Return numbers in the notation of Slurm: 1-4,7."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:

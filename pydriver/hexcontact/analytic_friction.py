@@ -1,3 +1,0 @@
-"""The earlier name of `hexcontact.analytic.friction`."""
-
-from .analytic.friction import *  # noqa: F403

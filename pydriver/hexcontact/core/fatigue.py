@@ -1,0 +1,217 @@
+"""Fatigue quantities of stress histories: critical planes, invariants, fretting parameters, life.
+
+A history has the shape (..., times, 6): xx, yy, zz, xy, yz, xz, tension positive, one closed cycle. Results
+have the shape of the points, the axes before the last two. docs/fatigue.md has definitions and sources.
+
+Examples
+--------
+Tension and pressure of 200 MPa in turn, for Smith, Watson & Topper: sigma^2/E on the plane across
+
+>>> import numpy as np
+>>> from hexcontact import fatigue
+>>> history = np.zeros((3, 6))
+>>> history[:, 0] = [0.0, 200e6, -200e6]
+>>> plane = fatigue.smith_watson_topper(history, young_modulus=200e9, poisson_ratio=0.3)
+>>> f"{plane.value:.4g} Pa, {abs(plane.normal[0]):.3f}"
+'2e+05 Pa, 1.000'
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, number, reals
+from ..errors import DeckError
+from . import _core
+from .calls import called
+
+__all__ = [
+    "CriticalPlane",
+    "Ruiz",
+    "crossland",
+    "dang_van",
+    "fatemi_socie",
+    "findley",
+    "life",
+    "ruiz",
+    "smith_watson_topper",
+]
+
+_flat = _core.hc_f2py_fatigue
+
+
+class CriticalPlane(NamedTuple):
+    """The largest value of a parameter over all planes, and the plane."""
+
+    value: Array
+    """Parameter, shape of the points."""
+    normal: Array
+    """Unit normal of the plane, shape (..., 3), its z not negative."""
+
+
+class Ruiz(NamedTuple):
+    """Fretting parameters of Ruiz, both of one node."""
+
+    f1: Array
+    """largest shear traction times the slip amplitude [Pa m]."""
+    f2: Array
+    """F1 times the largest tension along the slip [Pa^2 m]."""
+    slip_amplitude: Array
+    """Half the range of slip along its main direction [m]."""
+
+
+def smith_watson_topper(stress: ArrayLike, young_modulus: float, poisson_ratio: float) -> CriticalPlane:
+    """Return the largest sigma_n,max times half the range of normal strain [Pa].
+
+    Parameters
+    ----------
+    stress : array_like, shape (..., times, 6)
+        Stress of one cycle [Pa].
+    young_modulus : float
+        E [Pa].
+    poisson_ratio : float
+        Poisson's ratio.
+
+    Raises
+    ------
+    DeckError
+        If the history is empty or not finite, or a number is out of its range.
+    """
+    return _critical(1, stress, _positive(young_modulus, "young_modulus"), _ratio(poisson_ratio))
+
+
+def findley(stress: ArrayLike, slope: float) -> CriticalPlane:
+    """Return the largest tau_a + slope sigma_n,max [Pa]; see `smith_watson_topper` for the history.
+
+    Parameters
+    ----------
+    stress : array_like, shape (..., times, 6)
+        Stress of one cycle [Pa].
+    slope : float
+        Influence of the normal stress, 0.2 to 0.4 for ductile metals.
+    """
+    return _critical(2, stress, _finite(slope))
+
+
+def fatemi_socie(stress: ArrayLike, slope: float, shear_modulus: float, yield_stress: float) -> CriticalPlane:
+    """Return the largest (tau_a/G)(1 + slope sigma_n,max/sigma_y); see `smith_watson_topper` for the history.
+
+    Parameters
+    ----------
+    stress : array_like, shape (..., times, 6)
+        Stress of one cycle [Pa].
+    slope : float
+        Influence of the normal stress.
+    shear_modulus, yield_stress : float
+        G and sigma_y [Pa].
+    """
+    moduli = _positive(shear_modulus, "shear_modulus"), _positive(yield_stress, "yield_stress")
+    return _critical(3, stress, _finite(slope), *moduli)
+
+
+def crossland(stress: ArrayLike, slope: float) -> Array:
+    """Return sqrt(J2,a) + slope sigma_h,max [Pa]; see `smith_watson_topper` for the history.
+
+    Parameters
+    ----------
+    stress : array_like, shape (..., times, 6)
+        Stress of one cycle [Pa].
+    slope : float
+        Influence of the hydrostatic stress: (t - b/sqrt(3))/(b/3) from the limits of torsion t and bending b.
+    """
+    return _invariant(False, stress, slope)
+
+
+def dang_van(stress: ArrayLike, slope: float) -> Array:
+    """Return the largest tau(t) + slope sigma_h(t) [Pa]; see `smith_watson_topper` for the history.
+
+    Parameters
+    ----------
+    stress : array_like, shape (..., times, 6)
+        Stress of one cycle [Pa].
+    slope : float
+        Influence of the hydrostatic stress: 3 (t/b - 1/2) from the limits of torsion t and bending b.
+    """
+    return _invariant(True, stress, slope)
+
+
+def ruiz(traction: ArrayLike, slip: ArrayLike, stress: ArrayLike) -> Ruiz:
+    """Return the fretting parameters of Ruiz.
+
+    Parameters
+    ----------
+    traction, slip : array_like, shape (..., times, 2)
+        Shear traction [Pa] and slip [m] along x and y.
+    stress : array_like, shape (..., times, 6)
+        Stress at the surface [Pa].
+    """
+    (q, points), (s, _), (history, _) = _flattened(traction, 2), _flattened(slip, 2), _flattened(stress, 6)
+    if not q.shape[1:] == s.shape[1:] == history.shape[1:]:
+        raise DeckError("traction, slip, stress: expected the same points and times")
+    values = called(_flat.ruiz, q, s, history)
+    return Ruiz(*(np.reshape(value, points) for value in values))
+
+
+def life(
+    value: ArrayLike, young_modulus: float, strength: float, b: float, ductility: float, c: float
+) -> Array:
+    """Return the life in cycles at a value of the parameter of Smith, Watson & Topper.
+
+    Parameters
+    ----------
+    value : array_like
+        sigma_n,max times half the range of normal strain [Pa].
+    young_modulus, strength : float
+        E and sigma_f' [Pa].
+    b, c : float
+        Exponents of strength and ductility, below zero.
+    ductility : float
+        eps_f'.
+
+    Returns
+    -------
+    ndarray
+        Cycles; inf beyond 1e30, 0 below one half, NaN for NaN.
+    """
+    values = reals(value, "value")
+    names = {"young_modulus": young_modulus, "strength": strength, "b": b, "ductility": ductility, "c": c}
+    numbers = [number(v, name) for name, v in names.items()]
+    cycles = called(_flat.cycles_of, numbers, values.ravel())
+    return np.reshape(cycles, values.shape)
+
+
+def _flattened(history: ArrayLike, components: int) -> tuple[Array, tuple[int, ...]]:
+    """Return a history as the core takes it, and the shape of its points."""
+    array = reals(history, "stress" if components == 6 else "traction, slip")
+    if array.ndim < 2 or array.shape[-1] != components or not array.size:
+        raise DeckError(
+            f"a history of shape {array.shape}: expected (..., times, {components}), a time or more"
+        )
+    return np.ascontiguousarray(array).reshape(-1, *array.shape[-2:]).T, array.shape[:-2]
+
+
+def _critical(criterion: int, stress: ArrayLike, *numbers: float) -> CriticalPlane:
+    history, points = _flattened(stress, 6)
+    values, normals = called(_flat.critical_planes, criterion, (*numbers, 0.0, 0.0)[:3], history)
+    return CriticalPlane(np.reshape(values, points), np.reshape(normals.T, (*points, 3)))
+
+
+def _invariant(of_dang_van: bool, stress: ArrayLike, slope: float) -> Array:
+    history, points = _flattened(stress, 6)
+    return np.reshape(called(_flat.invariants, of_dang_van, _finite(slope), history), points)
+
+
+def _finite(slope: float) -> float:
+    return number(slope, "slope", "a finite number", np.isfinite)
+
+
+def _positive(value: float, name: str) -> float:
+    return number(value, name, "a positive number", lambda found: 0.0 < found < np.inf)
+
+
+def _ratio(value: float) -> float:
+    kind = "a number above -1 and at most 0.5"
+    return number(value, "poisson_ratio", kind, lambda found: -1.0 < found <= 0.5)

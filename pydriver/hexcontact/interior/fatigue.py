@@ -1,0 +1,300 @@
+"""Fatigue parameters of a body over a closed cycle, from the stress histories of its points.
+
+Histories are computed block by block, so that memory does not grow with the number of points: a block is as
+large as the tractions of the cycle, or 128 MiB.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..arrays import Array
+from ..core import fatigue, memory
+from ..core.lattice import Lattice
+from ..deck.below import NEEDS, Criteria
+from ..errors import DeckError
+from . import fields
+from .region import Region, region
+from .stress import Bodies, Fields, add_bulk, material, source_of, summed, tractions, window_over
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
+    import xarray
+
+SLIPS = ("slip_increment_x", "slip_increment_y")
+_BLOCK = 1 << 27  # bytes of stress histories that are held at once, at least
+_AT_ONCE = 8  # steps whose stress on a plane is held besides
+
+
+class Meaning(NamedTuple):
+    """What a parameter is: unit, name in words, definition, source."""
+
+    units: str
+    long_name: str
+    definition: str = ""
+    references: str = ""
+
+
+_SWT = "K. N. Smith et al., J. Mater. 5 (1970) 767-778; D. F. Socie, J. Eng. Mater. Techn. 109 (1987) 293-298"
+_RUIZ = "C. Ruiz et al., Exp. Mech. 24 (1984) 208-217"
+MEANINGS = {
+    "smith_watson_topper": Meaning(
+        "Pa",
+        "parameter of Smith, Watson and Topper",
+        "largest of all planes: largest normal stress times half the range of the normal strain",
+        _SWT,
+    ),
+    "life": Meaning(
+        "1",
+        "cycles to a crack by the parameter of Smith, Watson and Topper",
+        "N of parameter = strength^2/E (2N)^(2b) + strength ductility (2N)^(b+c)",
+        _SWT,
+    ),
+    "findley": Meaning(
+        "Pa",
+        "parameter of Findley",
+        "largest of all planes: shear amplitude plus findley_slope times the largest normal stress",
+        "W. N. Findley, J. Eng. Ind. 81 (1959) 301-306",
+    ),
+    "fatemi_socie": Meaning(
+        "1",
+        "parameter of Fatemi and Socie",
+        "largest of all planes: shear amplitude/G (1 + slope largest normal stress/yield_stress)",
+        "A. Fatemi and D. F. Socie, Fatigue Fract. Eng. Mater. Struct. 11 (1988) 149-165",
+    ),
+    "crossland": Meaning(
+        "Pa",
+        "parameter of Crossland",
+        "sqrt(J2,a) + crossland_slope times the largest hydrostatic stress",
+        "B. Crossland, Int. Conf. on Fatigue of Metals (1956) 138-149",
+    ),
+    "dang_van": Meaning(
+        "Pa",
+        "parameter of Dang Van",
+        "largest in time: largest shear of the deviator less its mean + dang_van_slope hydrostatic stress",
+        "K. Dang Van, ASTM STP 1191 (1993) 120-130",
+    ),
+    "ruiz_f1": Meaning(
+        "Pa m", "first fretting parameter of Ruiz", "largest shear traction times slip_amplitude", _RUIZ
+    ),
+    "ruiz_f2": Meaning(
+        "Pa2 m",
+        "second fretting parameter of Ruiz",
+        "ruiz_f1 times the largest tension along the slip",
+        _RUIZ,
+    ),
+    "slip_amplitude": Meaning("m", "half the range of the slip along its main direction"),
+    "polar": Meaning("rad", "angle from z, 0 to pi, of the normal of the critical plane of the {}"),
+    "azimuth": Meaning("rad", "angle from x, -pi/2 to pi/2, of the normal of the critical plane of the {}"),
+}
+"""The quantities, after the parameters of a deck; those on a critical plane have its angles, too."""
+
+
+def histories(
+    lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, body: int, where: Region, friction: float
+) -> Iterator[tuple[slice, Array]]:
+    """Yield stress histories (points, steps, 6) of a region block by block, and which of its points they are.
+
+    Parameters
+    ----------
+    lattice, steps, bodies, body, friction
+        As of `hexcontact.interior.stress.below`.
+    where : Region
+        The points, which are counted as if flattened.
+
+    Raises
+    ------
+    ResourceError
+        If there is not enough memory for tractions and a block.
+    """
+    poisson_ratio, _ = material(bodies, body)
+    loads, _ = tractions(lattice, steps, bodies, friction, None)
+    block = max(_BLOCK, loads.nbytes)
+    most = max(block // (48 * len(steps)), 1)
+    memory.require(
+        2 * loads.nbytes + 3 * min(block, 48 * len(steps) * where.count) + 80 * where.count,
+        f"the stress at {where.count} points in {len(steps)} steps",
+        "choose fewer points or steps",
+    )
+    if where.lattice is None or summed(lattice, where):
+        points = where.nodes.reshape(-1, 3)
+        for first in range(0, where.count, most):
+            part = slice(first, min(first + most, where.count))
+            stress = fields.at_points(lattice, loads, body, poisson_ratio, points[part])[1]
+            yield part, np.ascontiguousarray(np.moveaxis(add_bulk(stress, steps, body), 0, 1))
+        return
+    whole, rows, cols = window_over(lattice, where.lattice)
+    loads = embedded(lattice, whole, loads)
+    n_row, n_col = where.lattice.shape
+    high = max(most // n_col, 1)
+    for plane, depth in enumerate(where.depths):
+        for row in range(0, n_row, high):
+            shown = slice(rows.start + row, rows.start + min(row + high, n_row))
+            block_of = np.empty(((shown.stop - shown.start) * n_col, len(steps), 6))
+            for first in range(0, len(steps), _AT_ONCE):
+                some = slice(first, first + _AT_ONCE)
+                found = fields.on_planes(whole, loads[some], body, poisson_ratio, [depth])[:, 0]
+                stress = np.moveaxis(found[..., shown, cols], 1, -1)
+                stress = add_bulk(stress.reshape(len(stress), -1, 6), steps[some], body)
+                block_of[:, some] = np.moveaxis(stress, 0, 1)
+            start = plane * where.lattice.size + row * n_col
+            yield slice(start, start + len(block_of)), block_of
+
+
+def embedded(lattice: Lattice, whole: Lattice, values: Array) -> Array:
+    """Return fields (step, component, n_row, n_col) on a window that covers theirs."""
+    if whole == lattice:
+        return values
+    return np.array([[lattice.embed(field, whole) for field in step] for step in values], dtype=float)
+
+
+def parameters_below(
+    lattice: Lattice,
+    steps: Sequence[Fields],
+    bodies: Bodies,
+    body: int,
+    where: Mapping[str, Any],
+    criteria: Criteria,
+    friction: float,
+) -> xarray.Dataset:
+    """Return fatigue parameters of a body.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Window of the steps.
+    steps : sequence of mapping of str to ndarray
+        The load steps of a closed cycle, as of `hexcontact.interior.stress.below`; with `SLIPS` for those of
+        Ruiz.
+    bodies : sequence of Body
+        The two bodies.
+    body : int
+        The one that is meant, 1 or 2.
+    where : mapping
+        Points of it: arguments of `region`.
+    criteria : Criteria
+        The parameters and their constants.
+    friction : float
+        Coefficient of friction.
+
+    Raises
+    ------
+    DeckError
+        If the body is wrong, points lie above the surface, or there is no slip for Ruiz' parameters.
+    ResourceError
+        If there is not enough memory.
+    """
+    import xarray
+
+    found = region(lattice, **where)
+    nu, shear_modulus = material(bodies, body)
+    moduli = {"young_modulus": 2.0 * shear_modulus * (1.0 + nu), "poisson_ratio": nu}
+    moduli["shear_modulus"] = shear_modulus
+    slip = _surface_slip(lattice, steps, found) if "ruiz" in criteria.parameters else None
+    values: dict[str, Array] = {}
+    for part, history in histories(lattice, steps, bodies, body, found, friction):
+        nodal = None if slip is None else slip[..., part]
+        block: dict[str, Array] = {}
+        for name in sorted(set(criteria.parameters), key=list(NEEDS).index):  # life after its parameter
+            block |= _computed(name, criteria, moduli, history, nodal, block.get("smith_watson_topper"))
+        for key, some in block.items():
+            values.setdefault(key, np.empty(found.count))[part] = some
+    return xarray.Dataset(
+        {
+            key: (found.dims, some.reshape(found.shape), _about(key, criteria, moduli))
+            for key, some in values.items()
+        },
+        coords=found.coordinates,
+        attrs={"body": np.int32(body), "tractions": source_of(steps)},
+    )
+
+
+def _computed(
+    name: str,
+    criteria: Criteria,
+    moduli: Mapping[str, float],
+    history: Array,
+    slip: Array | None,
+    energy: Array | None,
+) -> dict[str, Array]:
+    """Return the quantities of a parameter at some points; `energy` is that of Smith, Watson and Topper."""
+    young_modulus, nu = moduli["young_modulus"], moduli["poisson_ratio"]
+    numbers: list[Any] = [getattr(criteria, key) for key in NEEDS[name]]
+    if name == "ruiz":
+        assert slip is not None
+        path = np.ascontiguousarray(np.moveaxis(slip, -1, 0))  # point, step, component
+        found = fatigue.ruiz(path[..., :2], path[..., 2:], history)
+        return {"ruiz_f1": found.f1, "ruiz_f2": found.f2, "slip_amplitude": found.slip_amplitude}
+    if name == "life":
+        if energy is None:
+            energy = fatigue.smith_watson_topper(history, young_modulus, nu).value
+        return {name: fatigue.life(energy, young_modulus, *numbers)}
+    if name in ("crossland", "dang_van"):
+        return {name: getattr(fatigue, name)(history, *numbers)}
+    if name == "smith_watson_topper":
+        plane = fatigue.smith_watson_topper(history, young_modulus, nu)
+    elif name == "findley":
+        plane = fatigue.findley(history, *numbers)
+    else:
+        plane = fatigue.fatemi_socie(history, numbers[0], moduli["shear_modulus"], numbers[1])
+    x, y, z = np.where(plane.value == 0.0, np.nan, plane.normal.T)
+    x, y, z = np.where(x < 0.0, (-x, -y, -z), (x, y, z))  # of the two normals the one that points along x
+    return {
+        name: plane.value,
+        f"{name}_polar": np.arccos(np.clip(z, -1.0, 1.0)),
+        f"{name}_azimuth": np.arctan2(y, x),
+    }
+
+
+def _surface_slip(lattice: Lattice, steps: Sequence[Fields], where: Region) -> Array:
+    """Return shear traction and slip so far at the nodes of the surface, (step, 4, n)."""
+    if where.lattice is None or where.depths.tolist() != [0.0]:
+        raise DeckError("ruiz: expected the nodes of the surface, the region that is taken if none is given")
+    if lost := [name for name in (*SLIPS, "traction_x", "traction_y") if name not in steps[0]]:
+        raise DeckError(f"ruiz: expected {lost[0]} in the result: a contact with friction (output.fields)")
+    whole, rows, cols = window_over(lattice, where.lattice)
+    names = ("traction_x", "traction_y", *SLIPS)
+    nodal = np.array([[np.asarray(step[name], dtype=float) for name in names] for step in steps])
+    nodal[:, 2:] = np.cumsum(nodal[:, 2:], axis=0)
+    return embedded(lattice, whole, nodal)[..., rows, cols].reshape(len(steps), 4, -1)
+
+
+def _about(key: str, criteria: Criteria, moduli: Mapping[str, float]) -> dict[str, Any]:
+    """Return the attributes of a quantity: meaning, source and the constants that it was computed with."""
+    name, _, angle = key.rpartition("_")
+    if angle in ("polar", "azimuth"):
+        meaning = MEANINGS[angle]
+        return {"long_name": meaning.long_name.format(MEANINGS[name].long_name), "units": meaning.units}
+    meaning = MEANINGS[key]
+    attributes = {k: value for k, value in meaning._asdict().items() if value}
+    constants = {name: getattr(criteria, name) for name in NEEDS.get(key, ())}
+    if key in ("smith_watson_topper", "life"):
+        constants |= {name: moduli[name] for name in ("young_modulus", "poisson_ratio")}
+    elif key == "fatemi_socie":
+        constants["shear_modulus"] = moduli["shear_modulus"]
+    return attributes | constants
+
+
+def tabulated(where: Region, part: slice, history: Array, numbers: Sequence[int]) -> pandas.DataFrame:
+    """Return histories as a table that pyLife takes: stresses in MPa by point and load step.
+
+    The columns S11 ... S23 are those that pyLife expects; 1, 2, 3 stand for x, y, z.
+    """
+    import pandas
+
+    if where.lattice is None:
+        places = where.points.reshape(-1, 3)[part]
+    else:
+        node = np.arange(part.start, part.stop)
+        plane, node = np.divmod(node, where.lattice.size)
+        x, y = where.lattice.x.ravel()[node], where.lattice.y.ravel()[node]
+        places = np.stack([x, y, where.depths[plane]], axis=1)
+    index = pandas.MultiIndex.from_product(
+        [range(part.start + 1, part.stop + 1), list(numbers)], names=["node_id", "load_step"]
+    )
+    table = pandas.DataFrame(np.repeat(places, len(numbers), axis=0), index, ["x", "y", "depth"])
+    table[["S11", "S22", "S33", "S12", "S23", "S13"]] = 1e-6 * history.reshape(-1, 6)
+    return table

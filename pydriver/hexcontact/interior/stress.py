@@ -1,0 +1,307 @@
+"""Stress and displacement below the surface: at points, along lines, on planes of any orientation, in boxes.
+
+Points are given by x, y and their depth below the surface of their body; components are those of the axes of
+the result, of which z points into body 1. Stress is positive in tension.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, integer
+from ..core import kernel_cache, memory
+from ..core.contact import ElasticPair
+from ..core.edges import ContactEdges
+from ..core.lattice import Lattice
+from ..deck.below import SOURCES
+from ..deck.tables import Body, Deck
+from ..errors import DeckError
+from ..text import did_you_mean
+from ..variables import BULK_STRESS, STRESSES
+from . import fields
+from .region import Region, region
+
+if TYPE_CHECKING:
+    import xarray
+
+Fields = Mapping[str, NDArray[Any]]
+Bodies = Sequence[Body]
+
+TRACTIONS = ("pressure", "traction_x", "traction_y")
+LOADED = (*TRACTIONS, "bulk_body", *BULK_STRESS)
+"""What the stress below the surface comes from."""
+EDGES = ("gap", "zone")
+"""What else tells where the edges of contact and stick are."""
+_STICK = 1  # value of zone at a sticking node
+_SUMS_FOR_A_NODE = 50  # pyramids summed at single points in the time of a node of a plane, at least
+TENSOR = tuple(f"stress_{ab}" for ab in fields.COMPONENTS)
+"""Components of the stress in the order of the core, which is that of symmetric tensors in VTK."""
+_INVARIANTS = tuple(name for name in STRESSES if STRESSES[name].units == "Pa" and name not in TENSOR)
+_DISPLACEMENTS = tuple(name for name in STRESSES if STRESSES[name].units == "m")
+
+
+def chosen_components(components: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the quantities that are wanted; by default the six stresses and von Mises'."""
+    for name in components:
+        if not isinstance(name, str) or name not in STRESSES:
+            hint = did_you_mean(str(name), STRESSES) or f"; there are {', '.join(STRESSES)}"
+            raise DeckError(f"{name!r} is no quantity below the surface{hint}")
+    return tuple(components) or (*TENSOR, "von_mises_stress")
+
+
+def bodies_of(deck: str) -> Bodies:
+    """Return the two bodies of a deck, none if it does not tell.
+
+    Raises
+    ------
+    DeckError
+        If they touch all over, and not on the window only.
+    """
+    try:
+        tables = Deck.checked(tomllib.loads(deck))[0]
+        bodies = tables["body"]
+    except (ValueError, KeyError):
+        return ()
+    if tables.get("interface") and bodies.separation.flat:
+        raise DeckError("there is no stress to compute below the window of a full contact, which has no end")
+    return bodies.body_1, bodies.body_2
+
+
+def material(bodies: Bodies, body: int) -> tuple[float, float]:
+    """Return Poisson's ratio and shear modulus (Pa) of a body.
+
+    Raises
+    ------
+    DeckError
+        If there is no such body, or it is rigid, or unknown.
+    """
+    if integer(body, "body") not in (1, 2):
+        raise DeckError(f"body = {body}: expected 1 or 2")
+    if not bodies:
+        raise DeckError("the result does not say what the bodies are made of")
+    one = bodies[body - 1]
+    if one.rigid or one.young_modulus is None or one.poisson_ratio is None:
+        raise DeckError(f"body {body} is rigid: there is no stress to compute in it")
+    return one.poisson_ratio, one.young_modulus / (2.0 * (1.0 + one.poisson_ratio))
+
+
+def nodal_tractions(steps: Sequence[Fields]) -> Array:
+    """Return pressure and shear tractions of some steps as the core takes them, (step, 3, n_row, n_col)."""
+    zero = np.zeros_like(np.asarray(steps[0]["pressure"], dtype=float))
+    return np.array([[np.asarray(step.get(name, zero), dtype=float) for name in TRACTIONS] for step in steps])
+
+
+def tractions(
+    lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, friction: float, source: str | None
+) -> tuple[Array, str]:
+    """Return pressure and shear tractions of some steps as the core takes them, and where they come from.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Window of the steps.
+    steps : sequence of mapping of str to ndarray
+        Fields of the steps.
+    bodies : sequence of Body
+        The two bodies.
+    friction : float
+        Coefficient of friction; the shear tractions stay as they are unless it is positive and finite.
+    source : str, optional
+        One of `SOURCES`; by default the edges, if gap and zone of all steps are there to find them.
+
+    Returns
+    -------
+    ndarray, shape (step, 3, n_row, n_col)
+        Pa.
+    str
+        The source.
+
+    Raises
+    ------
+    DeckError
+        If the edges cannot be found.
+    """
+    if source is not None and source not in SOURCES:
+        raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
+    at_nodes = nodal_tractions(steps)
+    if (source or source_of(steps)) == "nodes":
+        return at_nodes, "nodes"
+    if missing := [name for name in EDGES if any(name not in step for step in steps)]:
+        raise DeckError(
+            f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
+        )
+    law = np.full_like(at_nodes[0, 0], friction if np.isfinite(friction) else 0.0)
+    constants = [(body.young_modulus, body.poisson_ratio) for body in bodies]
+    pair = ElasticPair.from_materials(*constants[0], *constants[1])
+    corrected = [
+        _edges(lattice, one, step).tractions(one[1:], np.asarray(step["zone"]) == _STICK, law, pair)
+        for one, step in zip(at_nodes, steps, strict=True)
+    ]
+    return np.array(corrected), "edges"
+
+
+def source_of(steps: Sequence[Fields]) -> str:
+    """Return the source of tractions taken by default: the edges, if all steps tell where they are."""
+    return "edges" if all(name in step for step in steps for name in EDGES) else "nodes"
+
+
+def _edges(lattice: Lattice, loads: Array, step: Fields) -> ContactEdges:
+    """Return the edges of a contact."""
+    gap = np.asarray(step["gap"], dtype=float)
+    touching = np.asarray(step["zone"]) > 0
+    return ContactEdges(loads[0], gap, touching, np.isfinite(gap), lattice.basis, lattice.start)
+
+
+def bulk_stresses(steps: Sequence[Fields], body: int) -> Array:
+    """Return the bulk stress of a body in some steps as three components xx, yy, xy, (step, 3)."""
+    return np.array(
+        [
+            [float(step.get(name, 0.0)) * (step.get("bulk_body") == body) for name in BULK_STRESS]
+            for step in steps
+        ]
+    )
+
+
+def below(
+    lattice: Lattice,
+    steps: Sequence[Fields],
+    bodies: Bodies,
+    body: int,
+    where: Mapping[str, Any],
+    components: Sequence[str] = (),
+    numbers: Sequence[int] | None = None,
+    *,
+    friction: float = 0.0,
+    source: str | None = None,
+) -> xarray.Dataset:
+    """Return quantities below the surface.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Window of the steps.
+    steps : sequence of mapping of str to ndarray
+        Pressure and shear tractions at the nodes in some load steps, with the bulk stress if there is one.
+    bodies : sequence of Body
+        The two bodies.
+    body : int
+        The one that is meant, 1 or 2.
+    where : mapping
+        Points of it: arguments of `region`.
+    components : sequence of str
+        Names of the quantities, see `hexcontact.variables.STRESSES`; by default the six stresses and that of
+        von Mises.
+    numbers : sequence of int, optional
+        Numbers of the steps; without them there is one step, and the dataset has no such dimension.
+    friction, source : float and str, optional
+        See `tractions`.
+
+    Raises
+    ------
+    DeckError
+        If a name or the body is wrong, or points lie above the surface.
+    ResourceError
+        If there is not enough memory.
+    """
+    import xarray
+
+    found = region(lattice, **where)
+    names = chosen_components(components)
+    nu, shear_modulus = material(bodies, body)
+    loads, used = tractions(lattice, steps, bodies, friction, source)
+    if found.lattice is None or summed(lattice, found):
+        moved, stress = _at_points(lattice, loads, body, nu, found)
+    else:
+        moved = np.empty((0, 3))
+        if any(name in _DISPLACEMENTS for name in names):
+            moved = _in_box(lattice, loads, body, nu, found, len(_DISPLACEMENTS))
+        stress = _in_box(lattice, loads, body, nu, found, len(TENSOR))
+    add_bulk(stress, steps, body)
+    values = {name: stress[..., k] for k, name in enumerate(TENSOR)}
+    if any(name in _INVARIANTS for name in names):
+        scalars = fields.invariants(stress)
+        values |= {name: scalars[..., k] for k, name in enumerate(_INVARIANTS)}
+    values |= {name: moved[..., k] / shear_modulus for k, name in enumerate(_DISPLACEMENTS)}
+    one = numbers is None
+    dims = found.dims if one else ("step", *found.dims)
+    return xarray.Dataset(
+        {name: (dims, values[name][0] if one else values[name], STRESSES[name].attributes) for name in names},
+        coords=found.coordinates | ({} if numbers is None else {"step": ("step", list(numbers))}),
+        attrs={"body": np.int32(body), "tractions": used},
+    )
+
+
+def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
+    """Add the bulk stress of a body to the stress (step, ..., component) by its tractions, and return it."""
+    bulk = bulk_stresses(steps, body)
+    for k, name in enumerate(BULK_STRESS):
+        component = TENSOR.index(name.removeprefix("bulk_"))
+        stress[..., component] += bulk[:, k].reshape(-1, *[1] * (stress.ndim - 2))
+    return stress
+
+
+def summed(lattice: Lattice, box: Region) -> bool:
+    """Return whether sums at the nodes of a box take less work than planes that cover it and the window."""
+    assert box.lattice is not None
+    return box.lattice.size * lattice.size < _SUMS_FOR_A_NODE * window_over(lattice, box.lattice)[0].size
+
+
+def memory_needed(lattice: Lattice, where: Region, steps: int, kept: bool = False) -> int:
+    """Return the memory (bytes) that the stress of some steps takes; with what is `kept` for the next one."""
+    if where.lattice is None or summed(lattice, where):
+        return 8 * steps * (6 * lattice.size + 30 * where.count)
+    whole, count = window_over(lattice, where.lattice)[0], steps * where.depths.size
+    # of fifteen influences, of each further depth
+    spectra = 15 * 8 * 2 * whole.size * (where.depths.size - 1)
+    return (
+        fields.planes_memory(whole)
+        + 8 * (12 * count * where.lattice.size + (6 * count + 6 * steps) * whole.size)
+        + kept * min(spectra, kernel_cache.bound())
+    )
+
+
+def _at_points(lattice: Lattice, loads: Array, body: int, nu: float, where: Region) -> tuple[Array, Array]:
+    """Return displacement times the shear modulus, and stress, (step, ..., component)."""
+    shape = len(loads), *where.shape
+    memory.require(
+        memory_needed(lattice, where, len(loads)),
+        f"the stress at {where.count} points in {len(loads)} steps",
+        "choose fewer points or steps",
+    )
+    moved, stress = fields.at_points(lattice, loads, body, nu, where.nodes)
+    return moved.reshape(*shape, 3), stress.reshape(*shape, 6)
+
+
+def _in_box(lattice: Lattice, loads: Array, body: int, nu: float, where: Region, components: int) -> Array:
+    """Return stress, or displacement times shear modulus, (step, depth, n_row, n_col, component)."""
+    depths, target = where.depths, where.lattice
+    assert target is not None
+    whole, rows, cols = window_over(lattice, target)
+    memory.require(
+        memory_needed(lattice, where, len(loads)),
+        f"the stress at {depths.size} x {target.n_row} x {target.n_col} nodes in {len(loads)} steps",
+        "choose a smaller box, or one nearer to the window, fewer depths or steps",
+    )
+    moved = np.array([[lattice.embed(field, whole) for field in step] for step in loads], dtype=float)
+    found = fields.on_planes(whole, moved, body, nu, depths, components=components)
+    return np.moveaxis(found[..., rows, cols], 2, -1)
+
+
+def window_over(lattice: Lattice, target: Lattice) -> tuple[Lattice, slice, slice]:
+    """Return the window that covers two others, and the rows and columns of the second in it."""
+    low = [min(getattr(lattice, name), getattr(target, name)) for name in ("row_first", "col_first")]
+    high = [
+        max(one.row_first + one.n_row for one in (lattice, target)),
+        max(one.col_first + one.n_col for one in (lattice, target)),
+    ]
+    whole = dataclasses.replace(
+        lattice, row_first=low[0], col_first=low[1], n_row=high[0] - low[0], n_col=high[1] - low[1]
+    )
+    row, col = target.row_first - low[0], target.col_first - low[1]
+    return whole, slice(row, row + target.n_row), slice(col, col + target.n_col)

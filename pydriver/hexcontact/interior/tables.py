@@ -1,0 +1,148 @@
+"""The tables [[stress]] and [[fatigue]] of a deck, computed from its result, for other programs."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..deck.below import Criteria, Fatigue, Stress
+from ..deck.tables import Deck
+from ..errors import DeckError
+from ..files import replacing
+from ..text import quantity
+from .below import BelowSurface
+
+if TYPE_CHECKING:
+    import xarray
+
+
+STRESS, FATIGUE = "stress below the surface", "fatigue parameters"
+
+
+def tables_of(deck: str) -> dict[str, Stress | Fatigue]:
+    """Return the tables [[stress]] and [[fatigue]] of a deck by their names, stress_1, ... without one."""
+    try:
+        tables = Deck.checked(tomllib.loads(deck))[0]
+    except ValueError:
+        return {}
+    found: dict[str, Stress | Fatigue] = {}
+    for kind in ("stress", "fatigue"):
+        for number, table in enumerate(tables.get(kind, []), 1):
+            found[table.name or f"{kind}_{number}"] = table
+    return found
+
+
+def files_of(deck: str, output: Path) -> dict[str, Path]:
+    """Return the files beside an output that hold what its deck wants, by the names of the tables."""
+    return {name: output.with_name(f"{output.stem}_{name}.nc") for name in tables_of(deck)}
+
+
+def computed(
+    result: BelowSurface, kept: list[int], names: list[str] | None = None
+) -> Iterator[tuple[str, xarray.Dataset]]:
+    """Yield name and dataset of each table of stresses or fatigue parameters of the deck of a result.
+
+    Parameters
+    ----------
+    result : BelowSurface
+        The result.
+    kept : list of int
+        Numbers of the steps whose fields it has.
+    names : list of str, optional
+        Only these tables.
+
+    Raises
+    ------
+    DeckError
+        If the fields of a step were not kept.
+    """
+    for name, table in tables_of(result.deck).items():
+        if names is None or name in names:
+            yield name, of_table(result, name, table, kept)
+
+
+def of_table(
+    result: BelowSurface, name: str, table: Stress | Fatigue, kept: list[int] | None = None
+) -> xarray.Dataset:
+    """Return what a table of a deck wants; arguments and errors as of `computed`."""
+    if isinstance(table, Fatigue):
+        found = of_cycle(result, table)
+    else:
+        kept = kept or []
+        steps = kept[-1:] if table.steps is None else kept
+        if isinstance(table.steps, tuple):
+            steps = list(table.steps)
+        if missing := [number for number in steps if number not in kept]:
+            raise DeckError(f"stress {name}: there are no fields of step {missing[0]} (output.every)")
+        chosen = {"step": steps, "body": table.body, "source": table.source}
+        found = result.stress(*table.components, **chosen, **table.where)  # type: ignore[arg-type]
+    attributes = result.dataset.attrs
+    return found.assign_attrs(
+        {key: attributes[key] for key in ("source", "hexcontact_version")},
+        title=f"{attributes.get('title') or 'hexcontact'}: {name}",
+        stress_of=attributes["run"],
+        content=FATIGUE if isinstance(table, Fatigue) else STRESS,
+    )
+
+
+def of_cycle(result: BelowSurface, table: Fatigue) -> xarray.Dataset:
+    """Return the fatigue parameters that a table wants."""
+    constants = {key: getattr(table, key) for key in Criteria.model_fields if key != "parameters"}
+    given = {key: value for key, value in constants.items() if value is not None}
+    cycle = {"segment": table.segment, "steps": table.steps}
+    return result.fatigue(*table.parameters, **cycle, body=table.body, **given, **table.where)  # type: ignore[arg-type]
+
+
+def description(path: Path) -> list[str]:
+    """Return lines about a file of stresses or fatigue parameters; none if it is not one."""
+    import xarray
+
+    if not path.is_file():  # a pipe would block
+        return []
+    try:
+        with xarray.open_dataset(path, engine="netcdf4") as found:
+            found.load()
+    except (OSError, ValueError):
+        return []
+    about = found.attrs
+    if about.get("content") not in (STRESS, FATIGUE):
+        return []
+    steps = np.atleast_1d(about["steps"] if "steps" in about else found["step"].values).tolist()
+    sizes = " x ".join(str(n) for name, n in found.sizes.items() if name != "step") or "1"
+    over = f"step {steps[0]}" if len(steps) == 1 else f"steps {steps[0]} to {steps[-1]}"
+    lines = [str(about["title"]), f"{about['content']} of body {about['body']}, {over}, {sizes} points"]
+    for name, values in found.data_vars.items():
+        unit = str(values.attrs.get("units", "")).removesuffix("1")
+        if unit == "rad":  # of critical planes
+            continue
+        prefixed = unit if " " not in unit else ""  # Pa2 m takes none
+        low, high = (quantity(float(end), prefixed) for end in (np.nanmin(values), np.nanmax(values)))
+        extent = f"{low} and more" if name == "life" else f"{low} to {high} {unit[len(prefixed) :]}"
+        lines.append(f"  {name:<22} {extent}".rstrip())
+    return [*lines, str(about["source"])]
+
+
+def write_netcdf(found: xarray.Dataset, target: Path) -> Path:
+    """Write a dataset of stresses or fatigue parameters to a file, complete or not at all."""
+    packed = {name: {"zlib": True, "complevel": 1} for name in found.data_vars}
+    with replacing(target) as path:
+        found.to_netcdf(path, format="NETCDF4_CLASSIC", engine="netcdf4", encoding=packed)
+    return target
+
+
+def as_volume(found: xarray.Dataset) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    """Return the points (n, 3) of one step, and their numbers along three directions, the last one fastest.
+
+    z points into body 1, so that depths in body 2 are negative there.
+    """
+    x, y, depth = (found[name].values for name in ("x", "y", "depth"))
+    if "row" in found.sizes:
+        x, y, depth = x[None], y[None], depth[:, None, None]
+    places = np.broadcast_arrays(x, y, depth if found.attrs["body"] == 1 else -depth)
+    shape = places[0].shape
+    return np.stack([place.ravel() for place in places], axis=1), (1,) * (3 - len(shape)) + shape

@@ -1,0 +1,236 @@
+"""Checks before a run whether half-space theory, the lattice and the load steps suit a case.
+
+Expected values follow from the estimate of the contact; a table has their limits, with warning and reason.
+The rules for errors are those of the core (fortran/path/expected_error.f90).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.estimators import LATTICE_ERRORS, expected_entry_error, expected_lattice_errors
+from ..deck.interface import TwoCoefficients
+from ..text import listed, percent, quantity
+from ..variables import LOADS, spelled
+
+if TYPE_CHECKING:
+    from .loads import LoadStep
+    from .problem import Problem
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit of an expected value.
+
+    Attributes
+    ----------
+    quantity : str
+        One of `expected`.
+    least, most : float
+        Range without a warning.
+    words : str
+        The warning, with quantities in braces.
+    reason : str
+        Reason for the limit, with its source.
+    """
+
+    quantity: str
+    words: str
+    reason: str
+    least: float = -math.inf
+    most: float = math.inf
+
+    @property
+    def usual(self) -> float:
+        """A value within the limits, for an unknown one."""
+        return self.least if math.isinf(self.most) else self.most
+
+
+_LATTICE_ERROR = 0.05  # of any quantity, that the lattice may leave
+_STEP_ERROR = 0.1  # of the shear tractions, that load steps may leave
+LIMITS = (
+    Limit(
+        "slope",
+        "the surfaces slope by {slope:.2g} at the edge of the contact (a/R of a sphere), expected at most "
+        "0.1: half-space theory takes them as flat",
+        "Points at the edge move inwards, by 2 (1 - 2 nu) / (3 pi (1 - nu)) a/R of their distance under a "
+        "sphere, which the theory leaves out: 1.2 % at a/R = 0.1 and nu = 0.3 (for cones: Hay, Bolshakov, "
+        "Pharr, Journal of Materials Research 14, 1999, 2296)",
+        most=0.1,
+    ),
+    Limit(
+        "pressure_ratio",
+        "the largest pressure is {pressure_ratio:.2g} E*, expected at most 0.05: beyond, strains are not "
+        "small and solids other than rubber yield",
+        "Strains are about p_max/E*, and linear elasticity leaves out their squares; von Mises's stress is "
+        "0.62 p_max below a sphere, so that a body yields at 1.6 (1 - nu^2) Y/E: 0.014 for a steel with "
+        "Y = 2 GPa",
+        most=0.05,
+    ),
+    Limit(
+        "pressure_ratio",
+        "the largest pressure is only {pressure_ratio:.2g} E*, expected at least 1e-4: below, roughness or "
+        "adhesion carry the contact, or a unit is wrong",
+        "Smooth theory is within 7 % up to a roughness of 0.05 a^2/R (Greenwood, Johnson, Matsubara, Wear "
+        "100, 1984, 47); p_max/E* = 0.64 a/R, so that this is 8 nm for a = 1 mm at the limit",
+        least=1e-4,
+    ),
+    Limit(
+        "friction_coefficient",
+        "friction.coefficient = {friction_coefficient:g}, expected at most 3 (was it in percent?), or inf "
+        "for no slip",
+        "Tables of dry pairs end at 1.6, copper on copper (Physics Fundamentals, eCampusOntario, table A.1); "
+        "3 leaves room for rubber",
+        most=3.0,
+    ),
+    Limit(
+        "lattice_error",
+        "{spacings:.2g} spacings in the contact radius may leave errors of {lattice_words}; "
+        "{needed_spacings:g} leave at most 5 %",
+        "Errors fall with the square of the spacings, or faster: (X1), (X2)",
+        most=_LATTICE_ERROR,
+    ),
+    Limit(
+        "step_error",
+        "the contact grows in {growing_steps:.2g} even steps, which leaves an error of about {step_percent} "
+        "in the shear tractions (rings of nodes that enter together); {needed_steps:.2g} steps leave 10 %, "
+        'solver.entry = "interpolated" less at two to six times the work of a step',
+        "Nodes that enter are charged with the slip of the whole step: (X3) to (X5)",
+        most=_STEP_ERROR,
+    ),
+)
+"""All limits, in the order of the warnings."""
+
+_OPEN = (-math.inf, math.inf)
+_ASSUMED = 0.5  # Q/mu P of shear that is prescribed by a motion: a ring of a fifth of the radius
+_NOTICED = 0.2  # Q/mu P below which slip dissipates next to no energy
+_ALIKE = 0.02  # beta up to which the shear of pressing is less than 1.5 % of the pressure
+_STEADY = 0.05  # exponent of the radius on the load up to which a contact does not grow: punches
+
+
+def expected(case: Problem) -> dict[str, Any]:
+    """Return the known expected values at the largest load, SI.
+
+    Parameters
+    ----------
+    case : Problem
+        The case. For a gap over the nodes of a window only the friction is known.
+    """
+    mu, known = case.deck.friction.coefficient if case.deck.friction else 0.0, case.estimate
+    found: dict[str, Any] = {}
+    if isinstance(mu, TwoCoefficients):
+        mu = max(mu.along, mu.across)
+    if isinstance(mu, float):
+        found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
+    if known is None:
+        return found
+    found |= {
+        "contact_radius": known.radius,
+        "half_width": known.half_width,
+        "max_pressure": known.max_pressure,
+        "slope": known.slope,
+        "pressure_ratio": known.max_pressure / case.pair.effective_modulus,
+        "spacings": known.half_width / case.lattice.spacing,
+    }
+    if case.accuracy is None:
+        errors, needed = expected_lattice_errors(found["spacings"], _slipping(case), _LATTICE_ERROR)
+        found |= {
+            "lattice_error": float(errors.max()),
+            "needed_spacings": math.ceil(needed),
+            **{f"{name}_error": error for name, error in zip(LATTICE_ERRORS, errors.tolist(), strict=True)},
+        }
+    if entering := list(_entering(case)):
+        error, steps, needed = max(entering)
+        found |= {"step_error": error, "growing_steps": steps, "needed_steps": math.ceil(needed)}
+    return found
+
+
+def warnings(case: Problem) -> list[str]:
+    """Return a sentence for each limit that a case exceeds."""
+    found = expected(case)
+    errors = sorted(((found.get(f"{name}_error", 0.0), name) for name in LATTICE_ERRORS), reverse=True)
+    worth = [f"{percent(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
+    known = found | {
+        "lattice_words": listed(worth, "and") if worth else "",
+        "step_percent": percent(found.get("step_error", 0.0)),
+    }
+    passed = [
+        limit for limit in LIMITS if not limit.least <= found.get(limit.quantity, limit.usual) <= limit.most
+    ]
+    return [limit.words.format(**known) for limit in passed]
+
+
+def row(case: Problem) -> str:
+    """Return the expected values as a line of a table; empty if they are unknown."""
+    if case.estimate is None:
+        return ""
+    found = expected(case)
+    radius, pressure = quantity(found["contact_radius"], "m", 3), quantity(found["max_pressure"], "Pa", 3)
+    return (
+        f"radius about {radius}, {found['spacings']:.2g} spacings; p_max about {pressure}, "
+        f"{found['pressure_ratio']:.2g} E*; slope at the edge {found['slope']:.2g}"
+    )
+
+
+def limits() -> list[dict[str, Any]]:
+    """Return the table of limits for programs, without infinite ones."""
+    return [
+        {name: value for name, value in asdict(limit).items() if name != "words" and value not in _OPEN}
+        for limit in LIMITS
+    ]
+
+
+def _load_ratio(case: Problem, step: LoadStep) -> float:
+    """Return Q/mu P of a load step; assumed for a prescribed motion or another law."""
+    if any(t.control == "displacement" and t.value for t in (step.x, step.y, step.twist)):
+        return _ASSUMED
+    bound = case.friction_coefficient * step.z.value
+    force = math.hypot(step.x.value, step.y.value)
+    if step.z.control != "force" or not bound > 0.0:
+        return _ASSUMED if force else 0.0
+    return min(force / bound, 1.0)
+
+
+def _slipping(case: Problem) -> float:
+    """Return the largest Q/mu P; that of a wide ring if shear is due to pressing alone; 0 without shear."""
+    if not case.frictional or math.isinf(case.friction_coefficient):
+        return 0.0
+    ratio = max(_load_ratio(case, step) for step in case.load_steps)
+    return max(ratio, _NOTICED) if ratio else 0.8 * (abs(case.pair.beta) > _ALIKE)
+
+
+def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:
+    """Yield the error by steps with nodes that enter the contact, these steps, and the needed number."""
+    solver, mu, beta = case.solver, case.friction_coefficient, abs(case.pair.beta)
+    if solver.algorithm != "incremental" or solver.entry != "implicit" or not mu or case.adaptive:
+        return
+    growing = list(_growing(case))
+    if growing and beta > _ALIKE and not math.isnan(mu):
+        before, after, _ = np.array(growing).T
+        yield expected_entry_error(before, after, mu / beta, None, _STEP_ERROR)
+    if oblique := [entry for entry in growing if entry[2]]:
+        before, after, ratios = np.array(oblique).T
+        yield expected_entry_error(before, after, 0.0, float(ratios[-1]), _STEP_ERROR)
+
+
+def _growing(case: Problem) -> Iterator[tuple[float, float, float]]:
+    """Yield the radius before and after each step in which the contact grows, and Q/mu P if it changes."""
+    ((name, largest),) = case.largest_drives[0].items()
+    assert case.estimate is not None
+    radius, control = case.estimate.radius, LOADS["z"].index(name)
+    if case.growth < _STEADY:
+        return
+    before, sheared = 0.0, (0.0, 0.0, 0.0)
+    for step in case.load_steps:
+        after = before
+        if step.z.control == ("force", "displacement")[control]:
+            after = radius * max(step.z.value / largest, 0.0) ** case.growth
+        shear = (step.x.value, step.y.value, step.twist.value)
+        if after > before:
+            yield before, after, _load_ratio(case, step) if shear != sheared else 0.0
+        before, sheared = after, shear

@@ -1,0 +1,356 @@
+"""A path through the load history, and then through cycles that wear the surfaces: ``[wear]``.
+
+Of many cycles alike one is solved, with the gap as it is worn by then, and recorded as one load step: its
+end. What friction dissipates in it is worn off as many times as the jump to the next cycle says; see
+docs/theory/wear.md.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..core.friction import MOTION, ContactState
+from ..core.lattice import Lattice
+from ..core.steps import FAILED, LIMITED, REJECTED, Change, StepControl, archard_depth, change_by_jump, worn
+from ..errors import ConvergenceError, DeckError
+from ..problem.loads import LoadStep
+from ..problem.problem import Problem
+from ..result.step import Step
+from ..variables import LOADS, RESIDUALS, WORN
+from .adaptive import GivenPath
+from .frictional import FrictionWindow, state_of
+
+LABEL = "wear"  # of the cycles that wear, which are no part of the load history
+_LEAST = 1e-12  # smallest jump, as a share of all cycles
+
+
+@dataclass(frozen=True)
+class _Cycle:
+    """A cycle that was solved, and how it was reached.
+
+    `state` is its end, with all that was slipped and dissipated before it; `energy` (J/m2), `path` (m) and
+    `spent` (J) are of the cycle alone. `change` is by how much jumps of half the size differ so far (m).
+    """
+
+    lattice: Lattice
+    state: ContactState
+    worn: Array
+    energy: Array
+    path: Array
+    spent: float
+    change: Array
+    cycles: float = 0.0
+    until: float = 0.0  # cycles at the end of the second of two jumps, if the first one led here
+    about: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def on(self, window: FrictionWindow) -> _Cycle:
+        """Return the cycle on a window that may have grown since."""
+        if self.lattice == window.lattice:
+            return self
+        fields: dict[str, Any] = {
+            name: self.lattice.embed(getattr(self, name), window.lattice, 0.0)
+            for name in ("worn", "energy", "path", "change")
+        }
+        fields["state"] = window.carried(self.state, self.lattice)
+        return dataclasses.replace(self, lattice=window.lattice, **fields)
+
+
+class _Ends:
+    """How the load steps of the cycle ended when they were last solved, and what a cycle changes of it.
+
+    The next cycle starts from there; in single precision, which a start needs no more than. The first load
+    step is the one onto the worn gap.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    count : int
+        Number of load steps.
+    """
+
+    def __init__(self, lattice: Lattice, count: int) -> None:
+        self.lattice = lattice
+        # tractions and their rates by cycle; motions and theirs; cycles by then, none yet
+        self.fields = np.zeros((count, 2, 3, *lattice.shape), dtype=np.float32)
+        self.numbers = np.zeros((count, 2, len(MOTION)))
+        self.cycles = np.full(count, -1.0)
+
+    def expected(self, step: int, cycles: float) -> tuple[Array, Array] | None:
+        """Return tractions and motions at the end of a load step, after so many cycles of wear."""
+        if self.cycles[step] < 0.0:
+            return None
+        ahead = cycles - self.cycles[step]
+        (fields, rates), (numbers, changes) = self.fields[step], self.numbers[step]
+        tractions = fields + np.float32(ahead) * rates * (fields[0] > 0.0)
+        np.maximum(tractions[0], 0.0, out=tractions[0])
+        return tractions, numbers + ahead * changes
+
+    def found(self, step: int, cycles: float, state: ContactState) -> None:
+        """Remember the end of a load step, in the place of the one before: records are written by then."""
+        passed = cycles - self.cycles[step] if self.cycles[step] >= 0.0 else 0.0
+        tractions = state.pressure, state.traction_x, state.traction_y
+        motions = np.array([getattr(state, name) for name in MOTION])
+        for known, new in (
+            *zip(self.fields[step].swapaxes(0, 1), tractions, strict=True),
+            (self.numbers[step], motions),
+        ):
+            known[1] = (new - known[0]) / passed if passed else 0.0
+            known[0] = new
+        self.cycles[step] = cycles
+
+    @classmethod
+    def from_record(cls, step: Step, count: int) -> _Ends:
+        """Read them from the record of a step; without them the next cycle starts as the first one."""
+        ends = cls(step.lattice, count)
+        if step.companion:
+            for place in range(count):
+                ends.fields[place] = step.companion[f"end_{place}"]
+            ends.cycles, ends.numbers = (
+                np.array(step.control[f"end_{name}"]) for name in ("cycles", "numbers")
+            )
+        return ends
+
+
+class WearPath(GivenPath):
+    """A path through load steps that are given, and cycles that wear the surfaces.
+
+    Parameters
+    ----------
+    case : Problem
+        The problem.
+    window : FrictionWindow
+        Window to start with.
+    before : sequence of Step
+        The steps that are solved already: heads, the last one with all its fields.
+    """
+
+    window: FrictionWindow
+
+    def __init__(self, case: Problem, window: FrictionWindow, before: Sequence[Step]) -> None:
+        super().__init__(case, window, before)
+        assert case.deck.wear is not None
+        self._wear, self._number = case.deck.wear, len(before)
+        self._size, self._started = StepControl(_LEAST), time.perf_counter()
+        self._ends = _Ends(window.lattice, 1 + len(case.cycle))
+        self._tolerance = case.deck.wear.cycle_tolerance(case.solver.tolerance)
+        self._last = before[-1] if self._number > len(case.load_steps) else None
+
+    def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
+        """Solve a load step before the first cycle that wears."""
+        for step, reached in super().steps(state, target, begun):
+            self._number += 1
+            yield self._placed(step, 0.0, 0.0), reached
+
+    def after(self, state: Any) -> Iterator[Step]:
+        """Solve the cycles that wear the surfaces.
+
+        Parameters
+        ----------
+        state : ContactState
+            End of the load history, or of the last cycle.
+
+        Yields
+        ------
+        Step
+            Each cycle that was solved, at its end.
+        """
+        self._started = time.perf_counter()
+        if self._last is None:
+            zero = np.zeros(self.window.lattice.shape)
+            unworn = _Cycle(self.window.lattice, state, zero, zero, zero, 0.0, zero)
+            cycle = self._solved(unworn, 0.0)
+            if not cycle.energy.any():
+                label = self._wear.cycle
+                raise DeckError(f'wear.cycle = "{label}": no node slips in this cycle, so that nothing wears')
+            self._begin_size(cycle)
+            yield self._recorded(cycle, state)
+        else:
+            cycle = self._restored(self._last)
+        while cycle.cycles < self._wear.cycles:
+            before = cycle
+            cycle = self._next(before)
+            yield self._recorded(cycle, before.on(self.window).state)
+
+    # --- jumps --------------------------------------------------------------------------------------------
+
+    def _next(self, cycle: _Cycle) -> _Cycle:
+        """Return the next cycle that is solved: after a jump that is given, or one that is small enough."""
+        if cycle.until:
+            return self._solved(cycle, cycle.until)
+        total = float(self._wear.cycles)
+        if not isinstance(self._wear.jump, str):
+            after = self._solved(cycle, min(cycle.cycles + self._wear.jump, total))
+            return self._judged(cycle, after)[1]
+        attempt = self._size.first_attempt(cycle.cycles / total, 1.0)
+        while True:
+            until = attempt.end * total
+            try:
+                after = self._solved(cycle, 0.5 * (cycle.cycles + until))
+            except ConvergenceError:
+                if self._size.judge(attempt, None, self._wear.tolerance) == FAILED:
+                    raise
+                continue
+            change, after = self._judged(cycle, after)
+            verdict = self._size.judge(attempt, change, self._wear.tolerance)
+            if verdict != REJECTED:
+                break
+        self._size.accept(attempt, change, self._wear.tolerance, verdict)
+        about = {"rejected_steps": attempt.rejected, "step_limited": int(verdict == LIMITED)}
+        return dataclasses.replace(after, until=until, about=after.about | about)
+
+    def _judged(self, cycle: _Cycle, after: _Cycle) -> tuple[Change, _Cycle]:
+        """Return what the size of the jump between two cycles changes; the second one knows the error."""
+        cycle = cycle.on(self.window)
+        jump, window = after.cycles - cycle.cycles, self.window
+        slower = archard_depth(after.energy - cycle.energy, jump * self._wear.coefficient, window.friction)
+        change = self._change((cycle.energy, after.energy), jump, cycle.state)
+        return change, dataclasses.replace(after, change=after.change + slower)
+
+    def _change(self, energies: tuple[Array, Array], jump: float, state: ContactState) -> Change:
+        window = self.window
+        given = window.lattice, self.case.pair, window.friction, self._wear.coefficient
+        return change_by_jump(*given, energies, jump, float(state.pressure.max()))
+
+    def _begin_size(self, cycle: _Cycle) -> None:
+        """Choose the first jump: both halves wear as much as the largest pressure indents a node."""
+        change = self._change((0.0 * cycle.energy, cycle.energy), 1.0, cycle.state)
+        self._size.begin_with(min(1.0, 1.0 / max(change.added * self._wear.cycles, 1e-300)))
+
+    # --- cycles -------------------------------------------------------------------------------------------
+
+    def _solved(self, cycle: _Cycle, until: float) -> _Cycle:
+        """Wear the surfaces until a number of cycles is done, and solve the cycle then."""
+        cycle, jump = cycle.on(self.window), until - cycle.cycles
+        depth, *_ = self._worn(cycle, jump)
+        window = self.window
+        window.wear(depth)
+        slipped = cycle.state.accumulated_slip + jump * cycle.path
+        density = cycle.state.dissipation_density + jump * cycle.energy
+        spent = cycle.state.dissipated_energy + jump * cycle.spent
+        state = self._unspent(cycle.state)
+        *_, last = self.case.load_steps
+        # the loads at the end of the cycle on the new gap; what slips is no part of the cycle
+        state = self._unspent(self._through(state, [last], until)[0])
+        state, about = self._through(state, self.case.cycle, until, first=1)
+        energy, path = state.dissipation_density, state.accumulated_slip
+        spread = (window.lattice.embed(values, self.window.lattice, 0.0) for values in (slipped, density))
+        sums: dict[str, Any] = dict(zip(("accumulated_slip", "dissipation_density"), spread, strict=True))
+        return _Cycle(
+            self.window.lattice,
+            dataclasses.replace(state, **sums, dissipated_energy=spent),
+            np.asarray(self.window.worn),
+            energy,
+            path,
+            state.dissipated_energy,
+            np.asarray(window.lattice.embed(cycle.change, self.window.lattice, 0.0)),
+            until,
+            about=about,
+        )
+
+    def _worn(self, cycle: _Cycle, jump: float) -> tuple[Array, float, float]:
+        """Return depth, volume and largest depth after a jump."""
+        window = self.window
+        return worn(window.lattice, window.friction, self._wear.coefficient, cycle.energy, jump, cycle.worn)
+
+    def _through(
+        self, state: ContactState, targets: Sequence[LoadStep], cycles: float, first: int = 0
+    ) -> tuple[ContactState, dict[str, float]]:
+        """Return the end of some load steps, with their work and their largest residuals."""
+        segment, begun, about = -1, {}, dict[str, float]()
+        for place, target in enumerate(targets, first):
+            if target.segment != segment:
+                segment, begun = target.segment, _standing(state)
+            numbered = dataclasses.replace(target, index=self._number)
+            how = {"guess": self._ends.expected(place, cycles), "tolerance": self._tolerance}
+            _, state = self._reached(state, numbered, target.values(begun), **how)
+            if self._ends.lattice != self.window.lattice:
+                self._ends = _Ends(self.window.lattice, 1 + len(self.case.cycle))
+            self._ends.found(place, cycles, state)
+            for name in ("sweeps", "cuts", "operator_applications"):
+                about[name] = about.get(name, 0) + getattr(state, name)
+            for name in RESIDUALS.values():
+                about[name] = max(about.get(name, 0.0), getattr(state, name))
+        return state, about
+
+    @staticmethod
+    def _unspent(state: ContactState) -> ContactState:
+        """Return a state from which slip and dissipated energy count anew."""
+        zero = np.zeros(state.pressure.shape)
+        return dataclasses.replace(
+            state, accumulated_slip=zero, dissipation_density=zero, dissipated_energy=0.0
+        )
+
+    # --- records ------------------------------------------------------------------------------------------
+
+    def _recorded(self, cycle: _Cycle, before: ContactState) -> Step:
+        """Return a cycle as a load step."""
+        *_, last = self.case.load_steps
+        target = dataclasses.replace(last, index=self._number, segment=last.segment + 1, label=LABEL)
+        step = self.window.step(target, cycle.state, before, time.perf_counter())
+        _, volume, deepest = self._worn(cycle, 0.0)
+        history = {
+            **step.history,
+            **cycle.about,
+            "wear_cycles": cycle.cycles,
+            "wear_volume": volume,
+            "max_worn_depth": deepest,
+            "worn_depth_step_error": float(abs(cycle.change).max()),
+            "seconds": time.perf_counter() - self._started,
+            "cycle_dissipated_energy": cycle.spent,
+        }
+        fields = {
+            **step.fields,
+            "worn_depth_step_change": cycle.change,
+            "cycle_dissipation_density": cycle.energy,
+            "cycle_slip_amplitude": 0.25 * cycle.path,
+        }
+        self._number, self._started = self._number + 1, time.perf_counter()
+        step = dataclasses.replace(step, history=history, fields=fields)
+        return self._placed(step, cycle.cycles / self._wear.cycles, cycle.until)
+
+    def _placed(self, step: Step, done: float, until: float) -> Step:
+        """Return a load step with all that the next cycle needs to be chosen and solved."""
+        count = len(self.case.load_steps)
+        known = np.flatnonzero(self._ends.cycles >= 0.0)
+        beside = {f"end_{place}": self._ends.fields[place] for place in known}
+        control = {
+            "end_cycles": self._ends.cycles.tolist(),
+            "end_numbers": self._ends.numbers.tolist(),
+            "position": min(self._number, count),
+            "fraction": done,
+            "load_steps": count,
+            "done": done,
+            "chooser": self._size.record,
+            "until": until,
+        }
+        return dataclasses.replace(step, control=control, companion=beside, load_fraction=done)
+
+    def _restored(self, step: Step) -> _Cycle:
+        """Return the last cycle of a run that goes on."""
+        self._size = StepControl.from_record(step.control["chooser"], _LEAST)
+        self._ends = _Ends.from_record(step, 1 + len(self.case.cycle))
+        fields = {name: np.array(step.fields[name]) for name in WORN}
+        return _Cycle(
+            step.lattice,
+            state_of(step),
+            fields["worn_depth"],
+            fields["cycle_dissipation_density"],
+            4.0 * fields["cycle_slip_amplitude"],
+            float(step.history["cycle_dissipated_energy"]),
+            fields["worn_depth_step_change"],
+            float(step.history["wear_cycles"]),
+            float(step.control["until"]),
+        )
+
+
+def _standing(state: ContactState) -> dict[str, float]:
+    """Return the loads and motions of a state by the keys of the deck."""
+    return {name: float(getattr(state, name)) for pair in LOADS.values() for name in pair}

@@ -38,6 +38,8 @@ PROBLEMS = {
     "frictionless": "",
     "friction, alike": "[friction]\ncoefficient = 0.3\n",
     "friction, unlike": "[friction]\ncoefficient = 0.3\n",
+    "wear": "[friction]\ncoefficient = 0.3\n"
+    '[wear]\ncoefficient_1 = 1e-14\ncycle = "cycle"\ncycles = 30\njump = 10\n',
 }
 LARGEST_DIRECT = 80  # nodes along a side
 
@@ -77,6 +79,9 @@ def deck(problem: str, side: int, *, share: float = 0.8, steps: int = 2, more: s
     load = stiffness * radius**3
     second = "rigid = true" if unlike else f"young_modulus = {MODULUS}\npoisson_ratio = 0.3"
     shear = f"[[load]]\ntangential_load_x = {0.15 * load}\nsteps = {steps}\n" if PROBLEMS[problem] else ""
+    if problem == "wear":
+        path = [f"{{ tangential_load_x = {q * load}, steps = {steps} }}" for q in (0.15, -0.15, 0.0)]
+        shear = f'[[load]]\nlabel = "cycle"\npath = [{", ".join(path)}]\n'
     return (
         f'title = "{problem}, {side}"\n'
         f"[body.1]\nyoung_modulus = {MODULUS}\npoisson_ratio = 0.3\n"

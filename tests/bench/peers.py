@@ -237,7 +237,7 @@ def side_by_side(
 
 def left_out(code: Entry, side: int) -> str:
     """Return why a code is not run on a window."""
-    return f"{code.label} at {side}²: left out, more than {code.expected(side):.0f} s are expected."
+    return f"{code.label} at {side}²: left out, since more than {code.expected(side):.0f} s are expected."
 
 
 def taken(answer: dict[str, Any]) -> float:

@@ -62,7 +62,7 @@ def main() -> int:
         os.environ["BENCH_CLOCK"] = "cpu"
     store = QUICK_STORE if partial_run else STORE
     today = date.today().isoformat()
-    threads = "1, where nothing else is said" + (", processor time" if options.cpu_time else "")
+    threads = "1, unless stated otherwise" + (", processor time" if options.cpu_time else "")
     header = machine.describe(threads, today)
     print(header.text(), "\n")
     report.keep(store, "machine", [header], today)

@@ -60,7 +60,7 @@ def operator(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) 
         print(f"  {table.rows[-1]}", flush=True)
     table.remarks.append(
         "Bare: the pruned transforms as FFTW plans them for the whole array; blocked: in blocks of columns "
-        "that fit the cache. Nothing is copied, padded or multiplied in either."
+        "that fit the cache. Both are without copies, padding and multiplications."
     )
     return [table]
 
@@ -99,8 +99,8 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
             "set-up times faster",
         ],
         remarks=[
-            "Two processes side by side, one thread each: how much more they do together than one alone, "
-            "which is the most that two threads could gain on this machine at that time."
+            "Two processes side by side, one thread each: their speed together over that of one alone, "
+            "the upper bound for two threads on this machine at that time."
         ],
     )
     memory = Table(
@@ -183,7 +183,8 @@ def setups(*, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
             print(f"  {table.rows[-1]}", flush=True)
     table.remarks.append(
         "The folder is on a local disk, and its files are in the memory of the operating system. "
-        "The first in a process lets FFTW plan. With friction: N19, beta and gamma of unlike materials."
+        "The first set-up in a process contains the planning of FFTW. "
+        "With friction: N19, beta and gamma of unlike materials."
     )
     return [table]
 
@@ -233,12 +234,11 @@ def add_ratio(
 
 def estimated_memory(name: str, side: int) -> int:
     """Bytes that the program expects a problem to take."""
-    from hexcontact.core import contact as native
-    from hexcontact.core import friction as native_friction
+    from hexcontact.core import contact, friction
 
     if name == "HERTZ":
-        return native.memory_needed("fft", side, side)
-    return native_friction.memory_needed("fft", side, side, loads=2)
+        return contact.memory_needed("fft", side, side)
+    return friction.memory_needed("fft", side, side, loads=2)
 
 
 def command(*, quick: bool) -> list[Table]:

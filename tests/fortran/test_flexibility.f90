@@ -14,7 +14,7 @@ module test_flexibility
   use hc_contact_residuals, only: normal_self_compliance
   use hc_lattice_symbol, only: kernel_symbols, symbol_1, symbol_xx, symbol_xy
   use hc_triangle_integrals, only: linear_load_displacement
-  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner, node_compliance, soft
+  use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol, node_compliance
   use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
   private
@@ -22,6 +22,8 @@ module test_flexibility
   public :: collect_flexibility
 
   integer, parameter :: all_components(3) = [normal, along_x, along_y]
+  !> Compliance of soft springs over that of a node
+  real(wp), parameter :: soft = 8.0_wp
 
   interface
     subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info)
@@ -392,7 +394,7 @@ contains
     call check_true(error, cache%found == 2 .and. cache%missed == 3, 'another lattice, other components')
     if (allocated(error)) return
     other = cache
-    call check_true(error, other%bound == cache%bound .and. other%held == 0, 'a copy of a cache begins empty')
+    call check_true(error, other%bound == cache%bound .and. other%stored == 0, 'a copy of a cache begins empty')
     if (allocated(error)) return
     ! what is in use stays when the cache goes
     deallocate (cache)
@@ -489,7 +491,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(fft_flexibility_t) :: fft
-    type(symbol_preconditioner_t) :: preconditioner
+    type(inverse_symbol_t) :: preconditioner
     type(elastic_pair_t) :: pair
     real(wp), dimension(65, 65, 1) :: traction, closing, back
     real(wp) :: x(65, 65), y(65, 65)
@@ -499,7 +501,7 @@ contains
     if (allocated(error)) return
     call new_fft_flexibility(fft, lattice, pair, error, normal_only=.true.)
     if (allocated(error)) return
-    call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), error)
+    call new_inverse_symbol(preconditioner, lattice, pair, field_space_t(), error)
     if (allocated(error)) return
     ! waves of zero mean under a wide envelope
     call lattice%coordinates(x, y)
@@ -515,7 +517,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(fft_flexibility_t) :: fft
-    type(symbol_preconditioner_t) :: preconditioner
+    type(inverse_symbol_t) :: preconditioner
     type(elastic_pair_t) :: pair
     real(wp), dimension(65, 65, 2) :: traction, displacement, back
     real(wp) :: x(65, 65), y(65, 65)
@@ -526,7 +528,7 @@ contains
     if (allocated(error)) return
     call new_fft_flexibility(fft, lattice, pair, error)
     if (allocated(error)) return
-    call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=.true.)
+    call new_inverse_symbol(preconditioner, lattice, pair, field_space_t(), error, soft)
     if (allocated(error)) return
     call lattice%coordinates(x, y)
     traction(:, :, 1) = cos(0.9_wp*x + 0.5_wp*y)*exp(-(x**2 + y**2)/100.0_wp)
@@ -547,7 +549,7 @@ contains
   subroutine test_preconditioner_definite(error)
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
-    type(symbol_preconditioner_t) :: preconditioner
+    type(inverse_symbol_t) :: preconditioner
     type(elastic_pair_t) :: pair
     integer, parameter :: n_col = 9, n_row = 6
     real(wp), allocatable :: matrix(:, :), unit(:), answer(:, :, :), values(:), work(:)
@@ -557,7 +559,8 @@ contains
     call new_lattice(lattice, equilateral_basis(0.2_wp), [-4, 7], [n_col, n_row], error)
     if (allocated(error)) return
     do n_component = 1, 2
-      call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), error, tangential=n_component == 2)
+      if (n_component == 1) call new_inverse_symbol(preconditioner, lattice, pair, field_space_t(), error)
+      if (n_component == 2) call new_inverse_symbol(preconditioner, lattice, pair, field_space_t(), error, soft)
       if (allocated(error)) return
       n = n_col*n_row*n_component
       if (allocated(matrix)) deallocate (matrix, unit, answer, values, work)

@@ -11,7 +11,8 @@ module test_friction
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
     separated, stick, slip, normal, about_z
-  use hc_coulomb, only: coulomb_t, linearize, on_cone, normal_to
+  use hc_coulomb, only: coulomb_t
+  use hc_disc_law, only: linearize, on_cone, normal_to
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_projected_cg, only: projected_cg
@@ -39,11 +40,13 @@ contains
       new_test('residual_scales', test_residual_scales), &
       new_test('self_compliance', test_self_compliance), &
       new_test('load_residuals', test_load_residuals), &
-      new_test('conclude', test_conclude), &
+      new_test('complete_state', test_conclude), &
       new_test('shear_system', test_shear_system), &
       new_test('slip_preconditioner', test_slip_preconditioner), &
       new_test('cattaneo_mindlin', test_cattaneo_mindlin), &
       new_test('lubkin', test_lubkin), &
+      new_test('bulk_strain', test_bulk_strain), &
+      new_test('bulk_shear', test_bulk_shear), &
       new_test('no_friction', test_no_friction), &
       new_test('gross_sliding', test_gross_sliding), &
       new_test('threads', test_threads), &
@@ -232,7 +235,7 @@ contains
     ! prescribed motions have no residuals
     target%control = d
     target%value = state%motion
-    call problem%conclude(target, 1.0e-8_wp, state%relative_displacement, spread(0.0_wp*state%traction(:, :, 1), 3, 3), state)
+    call problem%complete_state(target, 1.0e-8_wp, state%relative_displacement, spread(0.0_wp*state%traction(:, :, 1), 3, 3), state)
     call check(error, [state%residual_force, state%residual_shear_force, state%residual_torque], spread(0.0_wp, 1, 3), &
                0.0_wp, 'prescribed motions')
     if (allocated(error)) return
@@ -267,11 +270,11 @@ contains
       area = 0.125_wp*sqrt(3.0_wp)
       radius = sqrt(2.0_wp*area/pi)
       target%control = f
-      target%value = scale*area*[0.98_wp*30.0_wp, 3.0_wp + 0.03_wp*mu*30.0_wp, 4.0_wp - 0.04_wp*mu*30.0_wp, &
+      target%value(:4) = scale*area*[0.98_wp*30.0_wp, 3.0_wp + 0.03_wp*mu*30.0_wp, 4.0_wp - 0.04_wp*mu*30.0_wp, &
                                  0.5_wp*4.0_wp + 0.07_wp*mu*30.0_wp*radius]
       displacement = 0.0_wp
-      call problem%conclude(target, 1.0e-8_wp, state%relative_displacement, displacement, state)
-      call check(error, state%load, scale*area*[30.0_wp, 3.0_wp, 4.0_wp, 2.0_wp], 1.0e-14_wp, 'resultants')
+      call problem%complete_state(target, 1.0e-8_wp, state%relative_displacement, displacement, state)
+      call check(error, state%load(:4), scale*area*[30.0_wp, 3.0_wp, 4.0_wp, 2.0_wp], 1.0e-14_wp, 'resultants')
     end subroutine load_state
 
   end subroutine test_load_residuals
@@ -296,7 +299,7 @@ contains
     call new_friction_state(state, lattice)
     state%pressure(:2, 1) = [10.0_wp, 4.0_wp]
     state%traction(2, 1, 2) = 2.0_wp
-    state%motion = [1.0_wp, 0.2_wp, 0.3_wp, 0.1_wp]
+    state%motion(:4) = [1.0_wp, 0.2_wp, 0.3_wp, 0.1_wp]
     target%control = d
     target%value = state%motion
     ! w = approach - h in contact; s = u - (0.2, 0.3 + 0.1 x) at x = 2, 3, 4
@@ -306,7 +309,7 @@ contains
     reference = 0.0_wp
     reference(1, 1, 1) = 0.5_wp
     reference(2, 1, 2) = 0.1_wp
-    call problem%conclude(target, 1.0e-8_wp, reference, displacement, state)
+    call problem%complete_state(target, 1.0e-8_wp, reference, displacement, state)
     call check(error, state%gap(:, 1), [0.0_wp, 0.0_wp, 4.5_wp], 1.0e-15_wp, 'gap')
     if (allocated(error)) return
     call check(error, state%relative_displacement(:, 1, 1), [0.5_wp, 0.0_wp, -0.2_wp], 1.0e-15_wp, 'relative displacement x')
@@ -326,12 +329,12 @@ contains
     call ieee_set_halting_mode(ieee_invalid, .false.)
     nan = ieee_value(nan, ieee_quiet_nan)
     state%traction(1, 1, 1) = nan
-    call problem%conclude(target, 1.0e-8_wp, reference, displacement, state)
+    call problem%complete_state(target, 1.0e-8_wp, reference, displacement, state)
     call check_true(error, .not. state%converged, 'a traction that is not a number')
     if (.not. allocated(error)) then
       state%traction(1, 1, 1) = 0.0_wp
       displacement(3, 1, 1) = nan
-      call problem%conclude(target, 1.0e-8_wp, reference, displacement, state)
+      call problem%complete_state(target, 1.0e-8_wp, reference, displacement, state)
       call check_true(error, .not. state%converged, 'a gap that is not a number')
     end if
     call ieee_set_halting_mode(ieee_invalid, halting)
@@ -343,7 +346,7 @@ contains
     integer, parameter :: n = 30
     type(lattice_t) :: lattice
     type(operators_t), target :: operators
-    type(shear_system_t) :: system
+    type(shear_system_t), target :: system
     type(dense_flexibility_t) :: dense
     type(elastic_pair_t) :: pair
     real(wp) :: angle(n), x(2*n), y(2*n), expected(2*n), plane(n, 2), frame(2*n), answer(2*n), m(2*n, 2*n), scale, &
@@ -363,7 +366,7 @@ contains
     system%direction(2, :) = sin(2.0_wp*pi*angle)
     ! stick, and slip with compliances from far below to far above that of a node
     system%compliance = [(merge(0.0_wp, system%elastic_compliance*10.0_wp**(0.4_wp*(i - 14)), modulo(i, 3) == 0), i=1, n)]
-    call system%weigh(spread(.true., 1, n))
+    call system%set_contact(spread(.true., 1, n))
     call random_number(x)
     call system%product(x, y, error)
     if (allocated(error)) return
@@ -408,9 +411,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice
     type(operators_t), target :: operators
-    type(shear_system_t) :: system
+    type(shear_system_t), target :: system
     type(elastic_pair_t) :: pair
-    real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:), none(:, :)
+    real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:), none(:, :), m_none(:, :)
     logical, allocatable :: active(:)
     real(wp) :: no_multiplier(0), residual
     integer :: level, side, n, iterations, outcome
@@ -423,19 +426,19 @@ contains
       if (allocated(error)) return
       call new_operators(operators, lattice, pair, field_space_t(), error)
       if (allocated(error)) return
-      if (allocated(x)) deallocate (x, y, unknown, image, rhs, none)
-      allocate (x(side, side), y(side, side), unknown(2*n), image(2*n), rhs(2*n), none(2*n, 0))
+      if (allocated(x)) deallocate (x, y, unknown, image)
+      allocate (x(side, side), y(side, side), unknown(2*n), image(2*n), rhs(2*n), none(2*n, 0), m_none(2*n, 0))
       call lattice%coordinates(x, y)
       call new_shear_system(system, operators)
       ! compliances from nothing to that of the whole contact, as they grow across a slip zone
       system%compliance = reshape(2.0_wp*sqrt(x**2 + y**2)**3, [n])
       active = [reshape(x**2 + y**2 < 0.8_wp, [n]), spread(.false., 1, n)]
       system%space = field_space_t()
-      call system%weigh(active(:n))
+      call system%set_contact(active(:n))
       unknown = 0.0_wp
       image = 0.0_wp
       rhs = merge(1.0_wp, 0.0_wp, active)
-      call projected_cg(system, active, none, none, rhs, unknown, image, 1.0e-6_wp, 100, no_multiplier, residual, &
+      call projected_cg(system, active, none, m_none, rhs, unknown, image, 1.0e-6_wp, 100, no_multiplier, residual, &
                         iterations, outcome, error)
       if (allocated(error)) return
       call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 9, 'iterations')
@@ -490,8 +493,8 @@ contains
     type(frictional_contact_t), intent(inout) :: contact
     !> From and to
     type(contact_state_t), intent(inout) :: state
-    integer, intent(in) :: control(4)
-    real(wp), intent(in) :: value(4)
+    integer, intent(in) :: control(:)
+    real(wp), intent(in) :: value(:)
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(in), optional :: tolerance
     type(contact_state_t) :: next
@@ -544,6 +547,86 @@ contains
     if (allocated(error)) return
     call check(error, state%load(along_y), 0.5_wp*mu*load, 1.0e-7_wp, 'load under the shift')
   end subroutine test_cattaneo_mindlin
+
+  !> Bulk strain moves the stick disc of alike spheres with nu = 0 by 2 a E* e_xx/(pi mu p0); the traction is Cattaneo's with the
+  !> disc there. Nothing enters the contact and no node slips back, so that one step will do.
+  subroutine test_bulk_strain(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: virgin, state
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.3_wp, p0 = 2.0_wp/pi, strain = 0.2_wp*mu*p0
+    real(wp) :: c, e, shift, q, worst, center
+    integer :: sign_of, row, col
+
+    c = 0.5_wp**(1.0_wp/3.0_wp)
+    do sign_of = -1, 1, 2
+      e = sign_of*2.0_wp*strain/(pi*mu*p0)
+      shift = pi*mu*p0/4.0_wp*(2.0_wp*(1.0_wp - c**2) + e**2)
+      call new_sphere(contact, 16, 0.0_wp, 0.0_wp, coulomb_t(mu), error)
+      if (allocated(error)) return
+      state = virgin
+      call step(contact, state, [f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)
+      if (allocated(error)) return
+      call step(contact, state, [f, f, f, d, d, d, d], &
+                [load, 0.5_wp*mu*load, 0.0_wp, 0.0_wp, sign_of*strain, 0.0_wp, 0.0_wp], error)
+      if (allocated(error)) return
+      call check(error, state%motion(along_x), shift, 6.0e-4_wp*shift, 'shift')
+      if (allocated(error)) return
+      associate (x => contact%problem%x, y => contact%problem%y)
+        center = sum(x, mask=state%zone == stick)/count(state%zone == stick)
+        call check(error, center, e, 0.004_wp, 'center of the stick disc')
+        if (allocated(error)) return
+        worst = 0.0_wp
+        do row = 1, size(x, 2)
+          do col = 1, size(x, 1)
+            q = sqrt(max(0.0_wp, 1.0_wp - x(col, row)**2 - y(col, row)**2)) &
+                - c*sqrt(max(0.0_wp, 1.0_wp - ((x(col, row) - e)**2 + y(col, row)**2)/c**2))
+            worst = worst + (state%traction(col, row, 1)/(mu*p0) - q)**2
+          end do
+        end do
+        call check(error, sqrt(worst/count(state%pressure > 0.0_wp)), 0.0_wp, 0.0150_wp, 'traction')
+        if (allocated(error)) return
+        call check(error, state%motion(5:), [sign_of*strain, 0.0_wp, 0.0_wp], 0.0_wp, 'strain')
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine test_bulk_strain
+
+  !> Strain xy is strain xx - yy turned by 45 degrees, and its relief does not restore the tractions: friction remembers.
+  subroutine test_bulk_shear(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(contact_state_t) :: pressed, sheared, relieved, stretched
+    real(wp), parameter :: load = 4.0_wp/3.0_wp, mu = 0.3_wp, strain = 0.1_wp
+    integer, parameter :: control(7) = [f, f, f, d, d, d, d]
+    real(wp), parameter :: rest(4) = [load, 0.0_wp, 0.0_wp, 0.0_wp]
+
+    call new_sphere(contact, 10, 0.4_wp, 0.2_wp, coulomb_t(mu), error)
+    if (allocated(error)) return
+    call step(contact, pressed, control, [rest, 0.0_wp, 0.0_wp, 0.0_wp], error)
+    if (allocated(error)) return
+    sheared = pressed
+    call step(contact, sheared, control, [rest, 0.0_wp, 0.0_wp, strain], error)
+    if (allocated(error)) return
+    call check_true(error, any(sheared%zone == stick) .and. any(sheared%zone == slip), 'stick and slip')
+    if (allocated(error)) return
+    stretched = pressed
+    call step(contact, stretched, control, [rest, strain, -strain, 0.0_wp], error)
+    if (allocated(error)) return
+    call check(error, dissipation(stretched), dissipation(sheared), 0.01_wp*dissipation(sheared), 'dissipation')
+    if (allocated(error)) return
+    call check_true(error, dissipation(sheared) > 0.0_wp, 'a positive dissipation')
+    if (allocated(error)) return
+    relieved = sheared
+    call step(contact, relieved, control, [rest, 0.0_wp, 0.0_wp, 0.0_wp], error)
+    if (allocated(error)) return
+    call check_true(error, largest(relieved%traction - pressed%traction) > 0.05_wp*mu, 'friction remembers')
+  contains
+    pure real(wp) function dissipation(state)
+      type(contact_state_t), intent(in) :: state
+      dissipation = -sum(state%traction*state%slip_increment)
+    end function dissipation
+  end subroutine test_bulk_shear
 
   !> Torsion of spheres: twist and torque where the stick radius is 0.6 a, for nu > 0, to 0.07 %.
   subroutine test_lubkin(error)

@@ -52,7 +52,7 @@ contains
     call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
-    call now%begin(contact%problem, operators, state, state%relative_displacement, &
+    call now%set_start(contact%problem, operators, state, state%relative_displacement, &
                    load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
     if (allocated(error)) return
     before = huge(1.0_wp)

@@ -1,15 +1,16 @@
-!> Laws of friction that the core does not know, how nodes are held and steps damped, and parts of the window.
+!> Laws of friction that the core does not know, how nodes are fixed and steps damped, and parts of the window.
 module test_laws
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_field_space, only: field_space_t
   use hc_transfer, only: restrict_field
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
     separated, stick, slip, normal
   use hc_friction_law, only: friction_law_t
   use hc_coulomb, only: coulomb_t
-  use hc_load_constraints, only: hold_nodes
+  use hc_load_constraints, only: fix_in_stick
   use hc_globalization, only: globalization_t
   use hc_subwindow, only: next_part
   use hc_contact_problem, only: friction_problem_t
@@ -48,7 +49,7 @@ contains
       new_test('same_everywhere', test_same_everywhere), &
       new_test('two_halves', test_two_halves), &
       new_test('any_solver', test_any_solver), &
-      new_test('held_nodes', test_held_nodes), &
+      new_test('fixed_nodes', test_fixed_nodes), &
       new_test('damping', test_damping), &
       new_test('next_part', test_next_part) &
     ]
@@ -161,7 +162,7 @@ contains
   end subroutine test_any_solver
 
   !> The quarter that slips least.
-  subroutine test_held_nodes(error)
+  subroutine test_fixed_nodes(error)
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: compliance(10)
     integer :: zone(10)
@@ -169,11 +170,11 @@ contains
     compliance = [8.0_wp, 0.0_wp, 2.0_wp, 7.0_wp, huge(1.0_wp), 1.0_wp, 3.0_wp, 5.0_wp, 0.0_wp, 4.0_wp]
     zone = slip
     zone([2, 9]) = [stick, separated]
-    call hold_nodes(0.25_wp, compliance, zone)
+    call fix_in_stick(field_space_t(), 0.25_wp, compliance, zone)
     call check_true(error, all(zone == [slip, stick, stick, slip, slip, stick, slip, slip, separated, slip]), 'zones')
     if (allocated(error)) return
     call check_true(error, all(compliance([3, 6]) <= 0.0_wp) .and. compliance(7) > 2.9_wp, 'compliances')
-  end subroutine test_held_nodes
+  end subroutine test_fixed_nodes
 
   !> Whole steps at first, then smaller and smaller ones while the residual stays; a whole one again with half of r.
   subroutine test_damping(error)
@@ -264,9 +265,12 @@ contains
     if (size(self%coefficient) /= lattice%size()) error = error_t()
   end subroutine check_nodal
 
-  pure real(wp) function strength(self)
+  pure real(wp) function strength(self, p_max)
     class(nodal_law_t), intent(in) :: self
-    strength = maxval(self%coefficient)
+    real(wp), intent(in) :: p_max
+    associate (under_any => p_max)
+      strength = maxval(self%coefficient)
+    end associate
   end function strength
 
   pure subroutine find_bounds(self, first, p, bound)
@@ -321,7 +325,7 @@ contains
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
     integer, intent(out), contiguous :: zone(:)
     real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
-    call self%unit_law%linearize(first, self%strength()*p_max, r, in_contact, self%coefficient(first:first + size(p) - 1)*p, &
+    call self%unit_law%linearize(first, self%strength(p_max)*p_max, r, in_contact, self%coefficient(first:first + size(p) - 1)*p, &
                                  qx, qy, dsx, dsy, zone, direction, compliance)
   end subroutine linearize
 

@@ -4,9 +4,9 @@ module test_linear_solvers
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
-  use hc_projected_cg, only: projected_cg
-  use hc_projected_gmres, only: projected_gmres
-  use hc_linear_system, only: linear_system_t, precondition_constraints, fulfil, solution_accurate, &
+  use hc_projected_cg, only: freeing_cg => projected_cg
+  use hc_projected_gmres, only: freeing_gmres => projected_gmres
+  use hc_linear_system, only: linear_system_t, precondition_constraints, satisfy_constraints, solution_accurate, &
     iterations_used_up, solution_broke_off
   use testing, only: test_t, new_test, check, check_true
   implicit none
@@ -70,6 +70,51 @@ contains
     call recurrence%last_share(1.0_wp, share, anew)
     call check_true(error, anew, 'begun again')
   end subroutine test_recurrence
+
+  !> Conjugate gradients that free copies of what is given.
+  subroutine projected_cg(system, active, constraint, mb, rhs, x, ax, tolerance, max_iterations, multiplier, residual, &
+                          iterations, outcome, error, drift)
+    type(dense_system_t), intent(inout) :: system
+    logical, intent(in) :: active(:)
+    real(wp), intent(in) :: constraint(:, :), mb(:, :), rhs(:), tolerance
+    real(wp), intent(inout), contiguous :: x(:), ax(:)
+    integer, intent(in) :: max_iterations
+    real(wp), intent(out) :: multiplier(:), residual
+    integer, intent(out) :: iterations, outcome
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(out), optional :: drift
+    real(wp), allocatable :: b(:, :), m_b(:, :), right(:)
+
+    allocate (b, source=constraint)
+    allocate (m_b, source=mb)
+    allocate (right, source=rhs)
+    call freeing_cg(system, active, b, m_b, right, x, ax, tolerance, max_iterations, multiplier, residual, iterations, &
+                    outcome, error, drift)
+  end subroutine projected_cg
+
+  !> GMRES that frees copies of what is given.
+  subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, multiplier, &
+                             independent, residual, iterations, outcome, error, drift)
+    type(dense_system_t), intent(inout) :: system
+    logical, intent(in) :: active(:)
+    real(wp), intent(in) :: columns(:, :), mb(:, :), rows(:, :), weight(:), rhs(:), tolerance
+    real(wp), intent(inout), contiguous :: x(:), ax(:)
+    integer, intent(in) :: max_iterations
+    real(wp), intent(inout) :: multiplier(:)
+    logical, intent(out) :: independent
+    real(wp), intent(out) :: residual
+    integer, intent(out) :: iterations, outcome
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(out), optional :: drift
+    real(wp), allocatable :: b(:, :), m_b(:, :), c(:, :), right(:)
+
+    allocate (b, source=columns)
+    allocate (m_b, source=mb)
+    allocate (c, source=rows)
+    allocate (right, source=rhs)
+    call freeing_gmres(system, active, b, m_b, c, weight, right, x, ax, tolerance, max_iterations, multiplier, independent, &
+                       residual, iterations, outcome, error, drift)
+  end subroutine projected_gmres
 
   !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
   subroutine test_projected_cg(error)
@@ -261,7 +306,7 @@ contains
     call check(error, mb(:, 3), [1.5_wp, 0.0_wp, 0.0_wp, 0.2_wp, -1.0_wp/6.0_wp], 1.0e-15_wp, 'M B')
     if (allocated(error)) return
     x = [0.0_wp, 0.0_wp, 7.0_wp, 0.0_wp, 0.0_wp]
-    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
+    call satisfy_constraints(constraint, mb, wanted, x, independent, field_space_t())
     call check_true(error, independent, 'independent constraints')
     if (allocated(error)) return
     call check(error, matmul(transpose(constraint), x), wanted, 1.0e-13_wp, 'constraints at the start')
@@ -281,7 +326,7 @@ contains
     call precondition_constraints(system, active, constraint, mb, error)
     if (allocated(error)) return
     ax = x
-    call fulfil(constraint, mb, wanted, x, independent, field_space_t())
+    call satisfy_constraints(constraint, mb, wanted, x, independent, field_space_t())
     call check_true(error, .not. independent, 'constraints that depend on each other')
     if (allocated(error)) return
     call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')

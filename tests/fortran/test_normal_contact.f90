@@ -13,7 +13,8 @@ module test_normal_contact
   use hc_lattice_symbol, only: kernel_symbols, normal_symbols
   use hc_transfer, only: prolong, prolong_edge
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
-  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner
+  use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol
+  use hc_options, only: preconditioner_options_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control
   use hc_contact_residuals, only: normal_residual, normal_self_compliance
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
@@ -154,7 +155,7 @@ contains
     active = disc(n, 12.5_wp)
     active(3:5, 30:34) = .true.
     active(1, 1) = .true.
-    call new_edge_extension(edge, active, field_space_t(2))
+    call new_edge_extension(edge, active, field_space_t(2), preconditioner_options_t())
     call random_number(x)
     call random_number(y)
     x = merge(x, 0.0_sp, active)
@@ -193,7 +194,7 @@ contains
     integer, parameter :: n = 121
     type(lattice_t) :: lattice
     type(fft_flexibility_t) :: flexibility
-    type(symbol_preconditioner_t) :: preconditioner
+    type(inverse_symbol_t) :: preconditioner
     type(edge_extension_t) :: edge
     logical :: active(n, n)
     real(wp), dimension(n, n, 1) :: x, r, z, d, kd
@@ -205,10 +206,10 @@ contains
       call new_fft_flexibility(flexibility, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), error, normal_only=.true.)
     end if
     if (allocated(error)) return
-    call new_symbol_preconditioner(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), field_space_t(), error)
+    call new_inverse_symbol(preconditioner, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), field_space_t(), error)
     if (allocated(error)) return
     active = disc(n, 40.3_wp)
-    call new_edge_extension(edge, active, field_space_t(2))
+    call new_edge_extension(edge, active, field_space_t(2), preconditioner_options_t())
     x = 0.0_wp
     r(:, :, 1) = merge(1.0_wp, 0.0_wp, active)
     do i = 1, n, 2
@@ -245,14 +246,14 @@ contains
 
     active = .false.
     active(3::5, 3::5) = .true.
-    call new_edge_extension(edge, active, field_space_t(2))
+    call new_edge_extension(edge, active, field_space_t(2), preconditioner_options_t())
     field = reshape(merge(1.0_sp, 0.0_sp, active), [n*n])
     before = field
     call edge%extend(field)
     call check_true(error, all(abs(field - before) <= 0.0_sp), 'the field is as it was')
     if (allocated(error)) return
     active = .true.
-    call new_edge_extension(edge, active, field_space_t(2))
+    call new_edge_extension(edge, active, field_space_t(2), preconditioner_options_t())
     field = 1.0_sp
     call edge%extend(field)
     call edge%fold(field)

@@ -6,13 +6,22 @@ module test_steps
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, along_x, about_z, &
     displacement_control, rim_reached, stick
   use hc_coulomb, only: coulomb_t
+  use hc_field_space, only: field_space_t
   use hc_frictional_contact, only: frictional_contact_t
   use hc_load_path, only: advance
+  use hc_options, only: step_options_t
   use hc_step_error, only: compare_halves, shear_free, step_change_t
-  use hc_step_control, only: accepted, failed, least_step, limited, rejected, step_attempt_t, step_control_t
+  use hc_step_control, only: accepted, failed, limited, rejected, step_attempt_t, step_control_t
   use hc_adaptive_path, only: adaptive_path_t
   use hc_state_measures, only: elastic_energy, nodal_normal_residual, nodal_tangential_residual, zone_extent
-  use hc_discretization_error, only: limits_of_error
+  use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
+  use hc_load_cycles, only: find_cycles, loop_area, turning_points
+  use hc_contact_residuals, only: normal_self_compliance
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_wear_jumps, only: jump_change, wear_by
+  use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
+    oblique_error, oblique_steps, slip_ring
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
@@ -38,9 +47,70 @@ contains
       new_test('path_to_the_rim', test_rim), &
       new_test('nodal_residuals', test_nodal_residuals), &
       new_test('energy', test_energy), &
-      new_test('limits_of_error', test_limits) &
+      new_test('limits_of_error', test_limits), &
+      new_test('cycles', test_cycles), &
+      new_test('expected_errors', test_expected), &
+      new_test('wear_jumps', test_wear_jumps) &
     ]
   end subroutine collect_steps
+
+  !> Depth and volume of cycles that are all alike, and what two jumps change: by hand, with nodes that cannot wear.
+  subroutine test_wear_jumps(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: energy(2, 2) = reshape([3.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [2, 2]), &
+                           friction(2, 2) = reshape([0.5_wp, 0.5_wp, 0.25_wp, 0.0_wp], [2, 2])
+    type(lattice_t) :: lattice
+    type(step_change_t) :: change
+    type(step_options_t) :: options
+    real(wp) :: depth(2, 2), volume
+
+    depth = 1.0_wp
+    call wear_by(energy, 2.0_wp, friction, 10.0_wp, 0.5_wp, depth, volume)
+    call check(error, [depth, volume], [121.0_wp, 1.0_wp, 81.0_wp, 1.0_wp, 102.0_wp], thr, 'depth and volume')
+    if (allocated(error)) return
+    call new_lattice(lattice, equilateral_basis(0.3_wp), [0, 0], [2, 2], error)
+    if (allocated(error)) return
+    associate (pair => elastic_pair_t(0.2_wp, 0.0_wp, 0.0_wp), after => energy + reshape([-1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp], [2, 2]))
+      ! 40 and 40 more or less at two of the three nodes where friction dissipates
+      call jump_change(lattice, pair, energy, after, 2.0_wp, friction, 10.0_wp, 5.0_wp, change)
+      call check(error, change%added/options%added_share*5.0_wp*normal_self_compliance(lattice, pair), &
+                 40.0_wp*sqrt(2.0_wp/3.0_wp), thr, 'root mean square')
+      if (allocated(error)) return
+      call jump_change(lattice, pair, energy, after, 2.0_wp, friction, 10.0_wp, 0.0_wp, change)
+      call check(error, change%added, 0.0_wp, 0.0_wp, 'without pressure')
+    end associate
+  end subroutine test_wear_jumps
+
+  !> Turning points and cycles of a motion that goes to and fro, and the area of an elliptic loop.
+  subroutine test_cycles(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 400
+    real(wp) :: angle(0:n)
+    integer, allocatable :: first(:), last(:)
+    integer :: k
+
+    associate (to_and_fro => [0.0_wp, 0.0_wp, 1.0_wp, 2.0_wp, 0.0_wp, -2.0_wp, -1.0_wp, -1.001_wp, 2.0_wp, 0.5_wp])
+      call check_true(error, all(turning_points(to_and_fro) == [2, 4, 6, 9, 10]), 'noise is no turning point')
+      if (allocated(error)) return
+      call find_cycles(to_and_fro, 0.0_wp*to_and_fro, first, last)
+      call check_true(error, all([size(first), first, last] == [1, 4, 9]), 'the first loading is no cycle')
+      if (allocated(error)) return
+    end associate
+    associate (pulses => [0.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.01_wp])
+      call find_cycles(pulses, pulses, first, last)
+      call check_true(error, all([first, last] == [1, 3, 3, 5]), 'pulses')
+      if (allocated(error)) return
+    end associate
+    ! the motion drifts, its load does not
+    call find_cycles([0.0_wp, 1.0_wp, -0.5_wp, 1.2_wp], [0.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], first, last)
+    call check_true(error, all([first, last] == [2, 4]), 'a load that comes back')
+    if (allocated(error)) return
+    call check_true(error, size(turning_points([1.0_wp, 1.0_wp, 1.0_wp])) == 0, 'a constant does not turn')
+    if (allocated(error)) return
+
+    angle = [(2.0_wp*pi*k/n, k=0, n)]
+    call check(error, loop_area(3.0_wp*cos(angle), -2.0_wp*sin(angle)), 6.0_wp*pi, 1.0e-3_wp, 'area of a loop')
+  end subroutine test_cycles
 
   !> The first step of a segment follows from that of the last one; the last two steps are equally large.
   subroutine test_first_attempts(error)
@@ -48,15 +118,15 @@ contains
     type(step_control_t) :: control
     type(step_attempt_t) :: attempt
 
-    call control%begin_segment()
+    call control%start_segment()
     attempt = control%first_attempt(0.0_wp, 1.0_wp)
-    call check(error, [attempt%begin, attempt%end], [0.0_wp, 1.0_wp], thr, 'a whole segment')
+    call check(error, [attempt%start, attempt%end], [0.0_wp, 1.0_wp], thr, 'a whole segment')
     if (allocated(error)) return
     attempt = control%first_attempt(0.0_wp, 0.2_wp)
     call check(error, attempt%end, 0.2_wp, thr, 'the largest step that is allowed')
     if (allocated(error)) return
     control%first = 0.2_wp
-    call control%begin_segment()
+    call control%start_segment()
     attempt = control%first_attempt(0.3_wp, 1.0_wp)
     call check(error, attempt%end, 0.65_wp, thr, 'half of what is left')
   end subroutine test_first_attempts
@@ -69,26 +139,26 @@ contains
     integer :: verdict
     real(wp), parameter :: tolerance = 0.02_wp
 
-    call control%judge(attempt, .true., step_change_t(stick=0.009_wp, added=0.009_wp), tolerance, verdict)
+    call control%decide(attempt, .true., step_change_t(stick=0.009_wp, added=0.009_wp), tolerance, verdict)
     call check(error, verdict, accepted, 'below the tolerance')
     if (allocated(error)) return
-    call control%judge(attempt, .true., step_change_t(stick=-0.02_wp), tolerance, verdict)
+    call control%decide(attempt, .true., step_change_t(stick=-0.02_wp), tolerance, verdict)
     call check(error, verdict, rejected, 'twice the tolerance')
     if (allocated(error)) return
     call check(error, [attempt%end, attempt%last_excess, attempt%last_size], [0.4_wp, 2.0_wp, 1.0_wp], thr, 'a smaller step')
     if (allocated(error)) return
-    call control%judge(attempt, .true., step_change_t(stick=-0.0195_wp), tolerance, verdict)
+    call control%decide(attempt, .true., step_change_t(stick=-0.0195_wp), tolerance, verdict)
     call check(error, verdict, limited, 'the smaller one changes as much')
     if (allocated(error)) return
-    call control%judge(attempt, .true., step_change_t(stick=0.02_wp, lattice=0.05_wp), tolerance, verdict)
+    call control%decide(attempt, .true., step_change_t(stick=0.02_wp, lattice=0.05_wp), tolerance, verdict)
     call check(error, verdict, accepted, 'rings of nodes')
     if (allocated(error)) return
-    call control%judge(attempt, .true., step_change_t(stick=0.009_wp, added=0.011_wp), tolerance, verdict)
+    call control%decide(attempt, .true., step_change_t(stick=0.009_wp, added=0.011_wp), tolerance, verdict)
     call check_true(error, verdict /= accepted, 'tractions')
     if (allocated(error)) return
     control%stick = -0.018_wp
     attempt = step_attempt_t()
-    call control%judge(attempt, .true., step_change_t(stick=-0.02_wp), tolerance, verdict)
+    call control%decide(attempt, .true., step_change_t(stick=-0.02_wp), tolerance, verdict)
     call check(error, verdict, accepted, 'the steps before have left it')
   end subroutine test_verdicts
 
@@ -100,13 +170,13 @@ contains
     integer :: verdict, k
 
     do k = 1, 5
-      call control%judge(attempt, .false., step_change_t(), 0.02_wp, verdict)
+      call control%decide(attempt, .false., step_change_t(), 0.02_wp, verdict)
       call check(error, verdict, rejected, 'a smaller step is tried')
       if (allocated(error)) return
-      call check(error, attempt%end, max(least_step, 0.25_wp**k), thr, 'its size')
+      call check(error, attempt%end, max(control%options%least_step, 0.25_wp**k), thr, 'its size')
       if (allocated(error)) return
     end do
-    call control%judge(attempt, .false., step_change_t(), 0.02_wp, verdict)
+    call control%decide(attempt, .false., step_change_t(), 0.02_wp, verdict)
     call check(error, verdict, failed, 'there is no smaller one')
     if (allocated(error)) return
     call check(error, attempt%n_rejected, 5, 'attempts before')
@@ -120,18 +190,20 @@ contains
     type(step_change_t) :: change
     real(wp), parameter :: tolerance = 0.02_wp
 
-    attempt = step_attempt_t(begin=0.0_wp, end=0.1_wp)
+    attempt = step_attempt_t(start=0.0_wp, end=0.1_wp)
     change = step_change_t(stick=0.008_wp, traction=0.001_wp, gain=2.0_wp, lattice=0.003_wp)
     call control%accept(attempt, change, tolerance, accepted)
     call check(error, [control%size, control%first], [0.1_wp, 0.1_wp], thr, 'on the aim')
     if (allocated(error)) return
-    call check(error, control%bound(change), 2.0_wp*0.008_wp + 1.5_wp*2.0_wp*0.001_wp + 0.003_wp, thr, 'bound')
+    call check(error, control%bound(change), 2.0_wp*0.008_wp + 2.0_wp*2.0_wp*0.001_wp + 0.003_wp, thr, 'bound')
     if (allocated(error)) return
-    attempt = step_attempt_t(begin=0.1_wp, end=0.2_wp, n_rejected=1)
+    call check(error, control%traction_bound(0.01_wp), 0.01_wp + 3.0_wp*0.001_wp, thr, 'bound of the tractions')
+    if (allocated(error)) return
+    attempt = step_attempt_t(start=0.1_wp, end=0.2_wp, n_rejected=1)
     call control%accept(attempt, step_change_t(), tolerance, accepted)
     call check(error, [control%size, control%first], [0.1_wp, 0.1_wp], thr, 'no growth after a rejection')
     if (allocated(error)) return
-    call check(error, control%bound(step_change_t()), 2.0_wp*0.004_wp + 1.5_wp*0.0008_wp, thr, 'changes fade')
+    call check(error, control%bound(step_change_t()), 2.0_wp*0.0072_wp + 2.0_wp*0.0008_wp, thr, 'changes fade')
     if (allocated(error)) return
     call control%accept(attempt, step_change_t(added=10.0_wp), tolerance, limited)
     call check(error, control%size, 0.2_wp, thr, 'larger where smaller ones are of no use')
@@ -148,16 +220,16 @@ contains
     call new_sphere(contact, 12, 0.5_wp, 0.3_wp, coulomb_t(mu), error)
     if (allocated(error)) return
     call new_friction_state(virgin, contact%problem%lattice)
-    call check_true(error, shear_free(virgin), 'no shear before the first load')
+    call check_true(error, shear_free(virgin, field_space_t(), step_options_t()), 'no shear before the first load')
     if (allocated(error)) return
     call press(contact, virgin, load, whole, error)
     if (.not. allocated(error)) call press(contact, virgin, 0.5_wp*load, half, error)
     if (.not. allocated(error)) call press(contact, half, load, halves, error)
     if (allocated(error)) return
-    call check_true(error, .not. shear_free(whole), 'unlike bodies shear each other')
+    call check_true(error, .not. shear_free(whole, field_space_t(), step_options_t()), 'unlike bodies shear each other')
     if (allocated(error)) return
     associate (p => contact%problem)
-      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, virgin, virgin, 4.0_wp, change)
+      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, virgin, virgin, 4.0_wp, change, field_space_t())
       expected = sum(norm2(whole%traction - halves%traction, dim=3))/(mu*sum(halves%pressure))
       ! of a contact area of pi, where the largest one is 4
       call check(error, change%traction, expected*pi/4.0_wp, 0.05_wp*expected, 'change of the tractions')
@@ -169,7 +241,7 @@ contains
       if (allocated(error)) return
       call check_true(error, change%lattice > 0.0_wp .and. change%gain >= 1.0_wp, 'rings of nodes enter')
       if (allocated(error)) return
-      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, whole, halves, 4.0_wp, change)
+      call compare_halves(p%lattice, p%candidate, p%friction, whole, half, halves, whole, halves, 4.0_wp, change, field_space_t())
       call check(error, [change%added, change%lattice], [0.0_wp, 0.0_wp], thr, 'nothing added, no node entered')
     end associate
   end subroutine test_halving
@@ -207,6 +279,14 @@ contains
       if (allocated(error)) return
       call check(error, path%state%load(along_x), 0.3_wp*mu*load, 1.0e-8_wp, 'end of the path')
       if (allocated(error)) return
+      associate (p => contact%problem)
+        call check(error, path%state%residual_tangential, &
+                   largest(nodal_tangential_residual(p%lattice, p%pair, p%friction, path%state, field_space_t())), 1.0e-12_wp, &
+                   'residual of the step as it is recorded')
+      end associate
+      if (allocated(error)) return
+      call check_true(error, path%state%residual_tangential > 1.0e-4_wp, 'which is more than that of its halves')
+      if (allocated(error)) return
     end do
     call check_true(error, steps(2) > steps(1), 'a smaller tolerance needs more steps')
     if (allocated(error)) return
@@ -232,11 +312,11 @@ contains
     integer :: segment
 
     call new_friction_state(state, contact%problem%lattice)
-    call path%begin(state, pi)
+    call path%initialize(state, pi)
     n_step = 0
     within = .true.
     do segment = 1, 2
-      target%value = [load, merge(0.0_wp, 0.3_wp*mu*load, segment == 1), 0.0_wp, 0.0_wp]
+      target%value(:4) = [load, merge(0.0_wp, 0.3_wp*mu*load, segment == 1), 0.0_wp, 0.0_wp]
       do
         call path%advance(contact, target, tolerance, 1.0e-8_wp, 60, 6, error)
         if (allocated(error)) return
@@ -260,7 +340,7 @@ contains
     call new_sphere(contact, 8, 0.5_wp, 0.3_wp, coulomb_t(mu), error)
     if (allocated(error)) return
     call new_friction_state(state, contact%problem%lattice)
-    call path%begin(state, pi)
+    call path%initialize(state, pi)
     target%value(normal) = 20.0_wp*load
     call path%advance(contact, target, 0.05_wp, 1.0e-8_wp, 60, 6, error)
     if (allocated(error)) return
@@ -283,8 +363,10 @@ contains
       call new_friction_state(virgin, contact%problem%lattice)
       call advance(contact, virgin, load_target_t(value=[load, 0.2_wp, 0.0_wp, 0.0_wp]), .true., 1.0e-5_wp, 60, 0, state, error)
       if (allocated(error)) return
-      allocate (along_normal, source=nodal_normal_residual(contact%problem%lattice, contact%problem%pair, state))
-      allocate (tangential, source=nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, friction, state))
+      allocate (along_normal, source=nodal_normal_residual(contact%problem%lattice, contact%problem%pair, &
+                                                           contact%problem%normal_law, state, field_space_t()))
+      allocate (tangential, source=nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, friction, state, &
+                                                             field_space_t()))
       call check(error, [maxval(along_normal), maxval(tangential)], [state%residual_normal, state%residual_tangential], &
                  1.0e-12_wp, 'largest residuals')
       if (allocated(error)) return
@@ -292,8 +374,9 @@ contains
       if (allocated(error)) return
       deallocate (along_normal, tangential)
     end do
-    call check(error, largest(nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, coulomb_t(), state)), &
-               0.0_wp, 0.0_wp, 'nothing to fulfil without friction')
+    call check(error, largest(nodal_tangential_residual(contact%problem%lattice, contact%problem%pair, coulomb_t(), state, &
+                                                        field_space_t())), &
+               0.0_wp, 0.0_wp, 'nothing to satisfy without friction')
   end subroutine test_nodal_residuals
 
   !> Pressed, U = 2/5 P delta of Hertz; a twist adds M beta/2 when all sticks, wherever the origin lies.
@@ -314,7 +397,7 @@ contains
     call check(error, energy, 0.4_wp*load*pressed%motion(normal), 0.004_wp, 'energy of Hertz')
     if (allocated(error)) return
     target%control(about_z) = displacement_control
-    target%value = [load, 0.0_wp, 0.0_wp, 0.01_wp]
+    target%value(:4) = [load, 0.0_wp, 0.0_wp, 0.01_wp]
     call advance(contact, pressed, target, .false., 1.0e-9_wp, 60, 0, twisted, error)
     if (allocated(error)) return
     call check(error, elastic_energy(contact%problem%lattice, contact%problem%initial_gap, twisted) - energy, &
@@ -322,12 +405,12 @@ contains
     if (allocated(error)) return
     allocate (x, y, mold=pressed%pressure)
     call contact%problem%lattice%coordinates(x, y)
-    call zone_extent(x, y, pressed%zone == stick, center, lower, upper)
+    call zone_extent(x, y, pressed%zone == stick, center, lower, upper, field_space_t())
     call check(error, [center, lower + upper], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 1.0e-13_wp, 'a zone about the origin')
     if (allocated(error)) return
     call check(error, upper, [1.0_wp, 1.0_wp], 0.09_wp, 'as large as the contact')
     if (allocated(error)) return
-    call zone_extent(x, y, pressed%zone > 2, center, lower, upper)
+    call zone_extent(x, y, pressed%zone > 2, center, lower, upper, field_space_t())
     call check_true(error, all(ieee_is_nan([center, lower, upper])), 'no nodes')
   end subroutine test_energy
 
@@ -351,8 +434,64 @@ contains
     if (allocated(error)) return
     call check_true(error, errors(4) <= 0.0_wp .and. ieee_is_nan(errors(5)), 'nothing, and no value')
     if (allocated(error)) return
+    values(:, 1) = 3.0_wp + 0.1_wp*sqrt(spacings)
+    call limits_of_error(spacings, values, errors, error, [.true., .false., .false., .true., .true.])
+    if (allocated(error)) return
+    call check(error, [errors(1), errors(2)/1.0e9_wp], [0.125_wp, 0.125_wp], 1.0e-6_wp, 'a trend of order 1/2')
+    if (allocated(error)) return
+    call check_true(error, errors(4) <= 0.0_wp .and. ieee_is_nan(errors(5)), 'rough, but nothing, and no value')
+    if (allocated(error)) return
+    values(:, 3) = 3.0_wp + 0.1_wp*spacings**0.15_wp
+    call limits_of_error(spacings, values(:, :3), errors(:3), error, [.false., .false., .true.], [.true., .false., .true.])
+    if (allocated(error)) return
+    call check(error, [errors(1), errors(3)], [0.125_wp, 0.125_wp], 1.0e-6_wp, 'a slip zone that is not resolved')
+    if (allocated(error)) return
     call limits_of_error(spacings(:3), values(:3, :), errors, failure)
     call check_raised(error, failure, status%invalid_input, 'three lattices')
+    if (allocated(error)) return
+    ! rings of 0.9 and 1.1 spacings about a disc of 20 (half a spacing of curvature is 2 % of their width), full slip, no shear
+    call check_true(error, all(is_slip_zone_unresolved(1.0_wp, pi*400.0_wp, pi*[19.1_wp, 18.9_wp, 0.0_wp, 20.0_wp]**2, &
+                                                       [1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], 4.0_wp) &
+                           .eqv. [.true., .false., .false., .false.]), 'slip zones')
   end subroutine test_limits
+
+  !> Rules for errors before a solution: docs/theory/expected_errors.md, the measured values of its tables, and inverses.
+  subroutine test_expected(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_errors_t) :: found
+    real(wp) :: radii(0:5), ring
+    integer :: k
+
+    ring = slip_ring(0.5_wp)
+    call check(error, ring, 1.0_wp - 0.5_wp**(1.0_wp/3.0_wp), thr, 'slip ring')
+    if (allocated(error)) return
+    found = lattice_errors(5.0_wp, ring)
+    call check(error, [found%max_pressure, found%contact_area, found%stick_area, found%dissipated_energy], &
+               [0.0048_wp, 0.016_wp, 0.032_wp, 0.0807_wp], 1.0e-4_wp, 'five spacings')
+    if (allocated(error)) return
+    found = lattice_errors(lattice_spacings(0.05_wp, ring), ring)
+    call check(error, max(found%stick_area, found%dissipated_energy), 0.05_wp, thr, 'spacings for an error')
+    if (allocated(error)) return
+    found = lattice_errors(2.0_wp, 0.0_wp)
+    call check(error, [found%stick_area, found%dissipated_energy], [0.0_wp, 0.0_wp], thr, 'nothing slips')
+    if (allocated(error)) return
+
+    radii = [(real(k, wp)/5.0_wp, k=0, 5)]
+    call check(error, even_steps(radii(:4), radii(1:)), 5.0_wp, thr, 'even radii')
+    if (allocated(error)) return
+    radii = radii**(1.0_wp/3.0_wp)
+    call check(error, even_steps(radii(:4), radii(1:)), 5.0_wp, thr*10.0_wp, 'even loads')
+    if (allocated(error)) return
+    call check(error, even_steps(radii(1:0), radii(1:0)), 1.0_wp, thr, 'no growth')
+    if (allocated(error)) return
+    call check(error, entry_error([1.0_wp, 5.0_wp, 20.0_wp], 0.3_wp/0.1167_wp), [0.60_wp, 0.42_wp, 0.14_wp], 0.05_wp, &
+               'dissimilar bodies pressed')
+    if (allocated(error)) return
+    call check(error, entry_error(entry_steps(0.1_wp, 2.0_wp), 2.0_wp), 0.1_wp, thr, 'steps for an error')
+    if (allocated(error)) return
+    call check(error, oblique_error([1.0_wp, 5.0_wp, 20.0_wp], 0.2_wp), [0.69_wp, 0.336_wp, 0.121_wp], 0.015_wp, 'oblique')
+    if (allocated(error)) return
+    call check(error, oblique_error(oblique_steps(0.1_wp, 0.2_wp), 0.2_wp), 0.1_wp, thr, 'oblique steps for an error')
+  end subroutine test_expected
 
 end module test_steps

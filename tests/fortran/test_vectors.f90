@@ -4,8 +4,9 @@ module test_vectors
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
-  use hc_coulomb, only: coulomb_t, cone_row, linearize, on_cone, residual_row, zone_row
-  use hc_shear_system, only: soften_row
+  use hc_coulomb, only: coulomb_t
+  use hc_disc_law, only: cone_row, linearize, on_cone, residual_row, zone_row
+  use hc_shear_system, only: slip_compliance_row
   use hc_contact_state, only: separated
   use hc_active_set, only: active_set_t, new_active_set
   use testing, only: test_t, new_test, check, check_true, largest
@@ -255,7 +256,7 @@ contains
 
     qx = [300.0_wp, 300.0_wp, 300.0_wp, 0.0_wp]
     qy = [400.0_wp, 400.0_wp, 400.0_wp, 0.0_wp]
-    call soften_row(4, compliance, u, none, qx, qy)
+    call slip_compliance_row(4, compliance, u, none, qx, qy)
     call check(error, largest(qx - 300.0_wp*[1.0_wp, 0.5_wp, 0.25_wp, 0.0_wp]), 0.0_wp, 1.0e-12_wp, 'along x')
     if (allocated(error)) return
     call check(error, largest(qy - 400.0_wp*[1.0_wp, 0.5_wp, 0.25_wp, 0.0_wp]), 0.0_wp, 1.0e-12_wp, 'along y')

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from hexcontact.core.lattice import Lattice
-from hexcontact.result.result import Metadata, Step
+from hexcontact.result.layout import Metadata
+from hexcontact.result.step import Step
 from hexcontact.result.store import Store
 
 WINDOW = Lattice(spacing=1e-4, row_first=-4, col_first=-5, n_row=9, n_col=10)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from matplotlib import colors
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -18,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 from PIL import Image
 
-from hexcontact.plotting.style import SLIP, STICK
+from hexcontact.result.raster import SLIP, STICK
 from hexcontact.result.view import StepView
 
 PREFIXES = {"p": 1e-12, "n": 1e-9, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
@@ -52,47 +53,66 @@ def visible(figure: Figure) -> list[Axes]:
 
 
 def is_field(axes: Axes, view: StepView, values: np.ndarray, label: str, bar: Axes | None = None) -> None:
-    """Check that a map shows a field: its values at the nodes in contact, its scale and its units."""
-    bar = bar or axes.child_axes[0]
-    assert bar.get_ylabel().startswith(f"{label} (")
-    mesh, factor, to_length = axes.collections[0], units(bar.get_ylabel()), units(axes.get_xlabel())
+    """Check that a map shows a field: values at the nodes in contact, edge, scale and units."""
+    bar = bar or [*axes.child_axes, *axes.figure.axes[1:]][0]  # of an elongated contact below the map
+    scale = bar.get_ylabel() or bar.get_xlabel()
+    assert scale.startswith(f"{label} (")
+    mesh, factor, to_length = axes.collections[0], units(scale), units(axes.get_xlabel())
     assert axes.get_xlabel().startswith("x (") and axes.get_ylabel().startswith("y (")
     triangulation = mesh._triangulation  # type: ignore[attr-defined]
     x, y = triangulation.x * to_length, triangulation.y * to_length
     shown = np.asarray(mesh.get_array()) * factor
     largest = np.abs(values).max()
     assert shown.size >= view.contact.sum() > 0
-    np.testing.assert_allclose(shown, view.at(x, y, values), rtol=0, atol=1e-7 * largest)
-    corners = np.unique(triangulation.triangles)
-    assert places(view.x[view.contact], view.y[view.contact], view) <= places(x[corners], y[corners], view)
+    corners = triangulation.triangles
+    a, b = (
+        np.stack([x[corners[:, k]] - x[corners[:, 0]], y[corners[:, k]] - y[corners[:, 0]]]) for k in (1, 2)
+    )
+    assert 0.5 * (a[0] * b[1] - a[1] * b[0]).sum() == pytest.approx(view.edges().contact().area)
+    nodes = places(view.x[view.contact], view.y[view.contact], view)
+    at_node = np.array([at in nodes for at in pairs(x, y, view)])
+    assert at_node.sum() == view.contact.sum()
+    expected = view.at(x, y, values)
+    np.testing.assert_allclose(shown[at_node], expected[at_node], rtol=0, atol=1e-7 * largest)
+    if "Pa" in scale:  # tractions vanish at the edge
+        assert not shown[~at_node].any()
     low, high = mesh.get_clim()
     assert abs(high * factor / largest - 1.0) < 1e-9
     assert low == (-high if values.min() < -0.01 * largest else 0.0)
 
 
-def places(x: np.ndarray, y: np.ndarray, view: StepView) -> set[tuple[float, float]]:
+def pairs(x: np.ndarray, y: np.ndarray, view: StepView) -> list[tuple[float, float]]:
     """Return points as pairs that can be compared."""
-    return set(zip(*(np.round(at / view.spacing, 6).tolist() for at in (x, y)), strict=True))
+    return list(zip(*(np.round(at / view.spacing, 6).tolist() for at in (x, y)), strict=True))
+
+
+def places(x: np.ndarray, y: np.ndarray, view: StepView) -> set[tuple[float, float]]:
+    """Return points as a set of pairs."""
+    return set(pairs(x, y, view))
 
 
 def are_zones(axes: Axes, view: StepView, to_length: float | None = None) -> None:
-    """Check that a map fills the cells of the nodes that stick and slip, each in its color."""
+    """Check that a map fills the areas of contact and stick to their edges, each in its color."""
     factor = to_length or units(axes.get_xlabel() or axes.get_ylabel())
-    cell = 0.5 * np.sqrt(3.0) * view.spacing**2
+    stick = view.contact & view.stick
+    areas = {SLIP: view.edges().contact().area, STICK: view.edges().stick(stick, view.reserve).area}
     patches = {colors.to_hex(patch.get_facecolor()): patch for patch in axes.patches}
-    zones = {SLIP: view.contact, STICK: view.contact & (view.data["zone"].values == 1)}
+    zones = {SLIP: view.contact, STICK: stick}
     assert {name.lower() for name, nodes in zones.items() if nodes.any()} <= patches.keys()
     for color, nodes in zones.items():
         if not nodes.any():
             continue
         path = patches[color.lower()].get_path()
         polygons = [polygon * factor for polygon in path.to_polygons(closed_only=False)]
-        assert abs(area(polygons) / (cell * nodes.sum()) - 1.0) < 1e-9
+        assert area(polygons) == pytest.approx(areas[color], rel=1e-9)
         inside = np.zeros(nodes.shape, dtype=bool)
         points = np.stack([view.x.ravel(), view.y.ravel()], axis=1)
         for polygon in polygons:
             inside ^= Outline(polygon).contains_points(points).reshape(nodes.shape)
-        np.testing.assert_array_equal(inside, nodes)
+        edges = view.edges()
+        away = edges.contact_distances() if color == SLIP else edges.stick_distances(stick, view.reserve)
+        beside = np.abs(away) > 1e-6  # not on the edge itself
+        np.testing.assert_array_equal(inside[beside], nodes[beside])
 
 
 def area(polygons: Sequence[np.ndarray]) -> float:
@@ -174,6 +194,13 @@ def added_strokes(figure: Figure, kind: str) -> int:
     for artist in artists:
         artist.set_visible(True)
     return found[0] - found[1]
+
+
+def has_pixels(figure: Figure, kind: str) -> bool:
+    """Tell whether anything in a figure that is written as PDF or SVG is a picture of pixels."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format=kind)
+    return {"pdf": b"/Subtype /Image", "svg": b"<image"}[kind] in stream.getvalue()
 
 
 def apart(picture: np.ndarray, reference: np.ndarray) -> float:

@@ -3,7 +3,7 @@
 Each run is a fork of this process, which has loaded everything but solved nothing; that takes milliseconds
 where a new process takes a second. ``python killed_runs.py FOLDER COUNT SEED`` prints for each run
 when it was killed, and how many finished steps there were. With ``signals`` behind, it is the command that
-runs, and gets signals instead.
+runs, and gets signals instead; with ``wear``, the surfaces wear.
 """
 
 import builtins
@@ -26,7 +26,8 @@ import hexcontact
 from hexcontact.case import Case
 from hexcontact.cli import app as cli
 from hexcontact.result import store
-from hexcontact.result.result import Step
+from hexcontact.result.journal import Journal, journal_of
+from hexcontact.result.step import Step
 
 CALLS = (  # what a run does to the disk
     *((os, name) for name in ("fsync", "replace", "unlink", "rmdir", "ftruncate", "pwrite", "mkdir", "open")),
@@ -35,18 +36,24 @@ CALLS = (  # what a run does to the disk
     (builtins, "open"),
 )
 MOST_KILLS = 3  # of one run
+LONGEST = 60  # seconds of a process: hundred times what it takes, whatever else the machine does
 PRESS_AND_SHEAR = [{"normal_load": 20.0, "steps": 3}, {"tangential_load_x": 1.0, "steps": 3}]
 
 
 def made() -> Case:
-    """Return a case of six steps, some milliseconds each."""
+    """Return a case of six steps, some milliseconds each; with cycles of wear after them if asked for."""
+    changes: dict[str, Any] = {"loads": PRESS_AND_SHEAR}
+    if "wear" in sys.argv[4:]:
+        to_and_fro = {"label": "cycle", "path": [{"tangential_load_x": 2.0}, {"tangential_load_x": 0.0}]}
+        wear = {"coefficient_1": 1e-14, "cycle": "cycle", "cycles": 80, "jump": 20}
+        changes = {"loads": [{"normal_load": 20.0, "tangential_load_x": 0.0}, to_and_fro], "wear": wear}
     sphere = {"young_modulus": 432e9, "poisson_ratio": 0.32, "surface": {"shape": "sphere", "radius": 1e-3}}
     return Case(
         body_1=sphere,
         body_2={"young_modulus": 72e9, "poisson_ratio": 0.32},
         nodes_in_radius=3,
         friction_coefficient=0.2,
-        loads=PRESS_AND_SHEAR,
+        **changes,
     )
 
 
@@ -54,6 +61,7 @@ def in_fork(work: Callable[[], object], delay: float | None = None) -> int:
     """Do `work` in a process of its own, killed after `delay` seconds; return its status, 0 if it is done."""
     child = os.fork()
     if child == 0:
+        signal.alarm(LONGEST)
         code = 1
         try:
             work()
@@ -135,7 +143,7 @@ def main(folder: Path, count: int, seed: int) -> None:
                 path.write_bytes(bytes([step.number]))
 
             def work(out: Path = out, note: Callable[[Step], None] = note) -> None:
-                if not out.exists() and not store.Journal(store.journal_of(out)):
+                if not out.exists() and not Journal(journal_of(out)):
                     made().run(out, on_step=note)
                 else:
                     hexcontact.resume(out, on_step=note)
@@ -152,7 +160,9 @@ def main(folder: Path, count: int, seed: int) -> None:
                 story.append(f"{delay:.4f} s")
             if status == 0:
                 break
-            assert os.WIFSIGNALED(status), f"{out}: {story}: failed with {status}"
+            assert os.waitstatus_to_exitcode(status) == -signal.SIGKILL, (
+                f"{out}: {story}: failed with {status}"
+            )
             kills += 1
             told = committed.read_bytes() if committed.exists() else b""
             known, kept = max(kept, *told, 0), steps_of(out)
@@ -180,6 +190,7 @@ def commanded(words: list[str], sent: signal.Signals, delay: float | None = None
 
     child = os.fork()
     if child == 0:
+        signal.alarm(LONGEST)
         work()
         os._exit(0)
     if delay is not None:
@@ -201,7 +212,7 @@ def signaled(folder: Path, count: int, seed: int) -> None:
         out = folder / f"{number}.nc"
         story: list[str] = []
         for attempt in range(MOST_KILLS + 1):
-            there = out.exists() or bool(store.Journal(store.journal_of(out)))
+            there = out.exists() or bool(Journal(journal_of(out)))
             words = ["resume", str(out)] if there else ["run", str(deck), "-o", str(out)]
             sent = rng.choice([signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
             delay = rng.uniform(0.0, duration) if attempt < MOST_KILLS else None

@@ -14,6 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 from validation.error_bars import PROBLEMS, estimates_over_errors
+from validation.hard_problems import bars_over_errors
 
 import hexcontact
 from hexcontact import AccuracyWarning, Case, ConvergenceError, DeckError
@@ -65,6 +66,20 @@ def test_true_errors_lie_within_the_estimate_on_the_way_to_a_target() -> None:
         assert len(ratios) >= 60
         assert np.mean(ratios >= 1.0) >= 0.95, name
         assert np.median(ratios) < 30.0, name
+
+
+def test_errors_with_strong_friction_lie_within_the_estimate() -> None:
+    """Against a fine lattice: the largest shear traction, at the edge of the stick zone, converges slowly."""
+    found = bars_over_errors("strong friction", 4, seed=3)
+    assert np.mean(found["max_traction"] >= 1.0) >= 0.95  # 0.85 with the orders of smooth quantities
+    assert np.mean(np.concatenate(list(found.values())) >= 1.0) >= 0.98
+
+
+def test_a_rough_quantity_may_converge_with_the_root_of_the_spacing() -> None:
+    values = (3.0 + 0.1 * SPACINGS**0.5)[:, None].repeat(2, axis=1)
+    errors = accuracy.limits_of_error(SPACINGS, values, np.array([True, False]))
+    assert_allclose(errors[0], 0.125, rtol=1e-6)
+    assert errors[1] < 0.059
 
 
 SPACINGS = np.array([1.0, RATIO, 2.0, 2.0, 2.0, 2.0, 2.0])

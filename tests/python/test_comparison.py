@@ -106,6 +106,27 @@ def test_similar_bodies_sheared_have_cattaneo_and_mindlin() -> None:
     assert set(found(result, step=1).values()) == {"Hertz"}
 
 
+@pytest.mark.parametrize("name", ["cone", "power", "rounded punch", "punch"])
+@pytest.mark.parametrize("back", [False, True])
+def test_other_similar_surfaces_sheared_are_superposed(name: str, back: bool) -> None:
+    plain, surface = {"young_modulus": 210e9, "poisson_ratio": 0.0}, SURFACES[name][0]
+    loads = [*SHEAR, {"tangential_load_x": -3.0, "tangential_load_y": -1.0}] if back else SHEAR
+    result = sheared(body_1={**plain, "surface": surface}, body_2=plain, loads=loads)
+    comparison = result.compare()
+    whose = {entry.quantity for entry in comparison if entry.solution == "Jaeger, Ciavarella"}
+    singular, rim = name in ("cone", "punch"), name == "punch"
+    tractions = set() if singular else {"traction_x", "traction_y"}
+    assert whose == {"shift_x", "shift_y"} | tractions | (set() if rim else {"stick_radius_fit"})
+    for entry in comparison:  # 12 spacings in the radius, as above; a kink of the traction at the stick zone
+        assert abs(entry.error) < (0.05 if entry.quantity in tractions | {"pressure"} else 0.02), entry
+    # shares of the shift are those of the load
+    assert comparison["shift_y"].exact == pytest.approx(comparison["shift_x"].exact / 3)
+    if name == "cone" and not back:  # delta = pi/2 m a, a ~ P^(1/2)
+        slid = 1.0 - math.sqrt(1.0 - math.hypot(18, 6) / 30)
+        shift = math.hypot(comparison["shift_x"].exact, comparison["shift_y"].exact)
+        assert shift == pytest.approx(0.3 * comparison["approach"].exact * slid)
+
+
 def test_after_a_reversal_it_is_mindlin_and_deresiewicz() -> None:
     result = sheared(loads=[{"normal_load": 100.0}, *({"tangential_load_x": q} for q in (20.0, -5.0))])
     comparison = result.compare()
@@ -137,7 +158,7 @@ def test_dissimilar_bodies_have_what_goodman_and_spence_know() -> None:
     assert goodman.compare()["max_pressure"].solution == "Hertz"
     full = run(**given, loads=loads).compare()
     assert len(full) == 0
-    assert "no closed solution is known for dissimilar bodies with friction" in full.note
+    assert "no closed-form solution is known for dissimilar bodies with friction" in full.note
     assert math.isnan(full.largest_error)
     assert full.note in repr(full)
     let_go = run(**given, coupling="goodman", loads=[*loads, {"normal_load": 50.0}])
@@ -175,7 +196,7 @@ def test_bodies_that_cannot_slip_have_mossakovskii_and_spence() -> None:
 def test_where_nothing_is_known_it_says_so(arguments: dict[str, Any]) -> None:
     comparison = run(**arguments).compare()
     assert len(comparison) == 0
-    assert comparison.note == "no closed solution is known for these surfaces"
+    assert comparison.note == "no closed-form solution is known for these surfaces"
 
 
 def test_a_quadratic_gap_of_python_has_hertz() -> None:
@@ -219,7 +240,7 @@ def test_a_solution_of_ones_own() -> None:
         result.compare({"pressure": 1.0})
     with pytest.raises(DeckError, match="exact: expected values by the names of quantities"):
         result.compare(3.0)
-    with pytest.raises(KeyError, match="no closed solution here knows shift_x"):
+    with pytest.raises(KeyError, match="no closed-form solution has shift_x"):
         _ = result.compare()["shift_x"]
 
 
@@ -230,7 +251,7 @@ def test_a_comparison_is_a_table() -> None:
     assert table.unit["approach"] == "m"
     assert table.error["approach"] == comparison["approach"].error
     lines = repr(comparison).splitlines()
-    assert lines[0] == "Load step 1 against closed solutions"
+    assert lines[0] == "Load step 1 against closed-form solutions"
     assert len({line.index("Hertz") for line in lines if "Hertz" in line}) == 1
     assert "<table" in comparison._repr_html_()
     assert comparison[0] is next(iter(comparison))

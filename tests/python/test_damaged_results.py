@@ -13,13 +13,12 @@ from fuzz.file_made import WINDOW, made_step, written
 from hexcontact import Case
 from hexcontact.errors import DeckError
 from hexcontact.result import check
-from hexcontact.result.journal import read_record, write_record
-from hexcontact.result.result import Metadata, assemble
-from hexcontact.result.store import Store, journal_of, open_result
-from hexcontact.result.trials import TrialFolder
-from hexcontact.solve.accuracy import Solution
+from hexcontact.result.journal import journal_of, read_record, write_record
+from hexcontact.result.layout import Metadata, assemble
+from hexcontact.result.store import Store, open_result
+from hexcontact.result.trials import Solution, TrialFolder
 from hexcontact.study.collect import histories
-from hexcontact.variables import VARIABLES
+from hexcontact.variables import LARGEST, RESIDUALS, VARIABLES
 
 MATERIALS = {
     **{"effective_modulus": 2e11, "dundurs_beta": 0.0, "tangential_compliance_ratio": 1.0},
@@ -194,7 +193,7 @@ def test_records_of_a_journal_are_of_one_run(out: Path, changes: dict[str, objec
         open_result(out)
     with pytest.raises(DeckError, match=r"000002\.npz does not belong to the records before it") as caught:
         Store.reopened(out)
-    assert "goes on after step 1" in caught.value.__notes__[0]
+    assert "continues after step 1" in caught.value.__notes__[0]
 
 
 @pytest.mark.parametrize("story", ["", "resumed, tolerance = 1e-07 instead of 1e-05"])
@@ -233,7 +232,10 @@ def test_values_that_no_step_has_are_refused(out: Path, story: str) -> None:
     for name, value in {
         **{"residual_normal": 1.0, "residual_tangential": 3 * tolerance, "residual_force": -1e-9},
         **{"max_pressure": -1.0, "cuts": -2, "seconds": -1.0, "contact_area": -1e-9, "step_limited": 7},
-        **{"approach": 1e31, "sweeps": -3},
+        **{"approach": 1e31, "sweeps": -1, "segment": 0, "segment_fraction": 1.5},
+        **{"dissipated_energy": -1.0, "dissipated_energy_step": -1.0, "elastic_energy": -1.0},
+        **{"operator_applications": -1.0, "contact_area_fit": 1.1 * WINDOW.size * WINDOW.cell_area},
+        **{"stick_area": 1.01 * contact.sum() * WINDOW.cell_area, "stick_radius": 1.1},
     }.items():
         assert fault({}, {name: value}) == f"{name} holds numbers that no load step has"
     assert fault({}, {"cuts": 1, "residual_tangential": 0.04}) == ""  # of the parts one after the other
@@ -246,6 +248,79 @@ def test_values_that_no_step_has_are_refused(out: Path, story: str) -> None:
     assert fault({"gap": outside}, {}) == ""
     assert fault({"pressure": fields["pressure"] * 2}, {}) == "pressure does not fit to max_pressure"
     assert fault({"zone": 0 * fields["zone"]}, {}) == "zone does not fit to contact_area"
+
+
+def test_every_bound_of_the_table_is_looked_at() -> None:
+    window = 2.0
+    known = {"normal_load": 1.0, "contact_radius": 0.5, "contact_area": 1.0}
+    quantities = {**known, "window": window}
+
+    def fault(name: str, value: float) -> str:
+        return check._fault_of_numbers({**known, name: value}, {"tolerance": 1.0}, "", window)
+
+    found = 0
+    for name, variable in VARIABLES.items():
+        if variable.dims != ("step",) or variable.dtype == "str" or name in RESIDUALS.values():
+            continue
+        least, most = variable.least, quantities.get(str(variable.most), variable.most)
+        assert isinstance(most, float)
+        if variable.dtype != "f8":
+            least, most = max(least, -1), max(variable.flags, default=most)
+        for limit, beyond in ((least, -1.0), (most, 1.0)):
+            if abs(limit) < LARGEST:
+                assert fault(name, limit) == "", name
+                assert name in fault(name, limit + beyond), name
+                found += 1
+    assert found > 60
+    for energy in ("dissipated_energy", "dissipated_energy_step"):  # noise, where nodes stick
+        assert fault(energy, -1e-4) == ""
+        assert fault(energy, -1e-3) != ""
+
+
+CONTROL = {
+    **{"position": 1, "fraction": 0.5, "load_steps": 3, "done": 0.5, "area": 1e-8},
+    "chooser": {**dict.fromkeys(("size", "first", "stick", "traction"), 0.5)}
+    | {"memory": {"stick": 0.0, "traction": 0.0}},
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({}, ""),
+        ({"done": 1.0}, "control.done does not fit"),
+        ({"done": 7.0}, "control.done is not"),
+        ({"done": "all"}, "control.done is not"),
+        ({"position": 3}, "control.done does not fit"),
+        ({"position": -1}, "control.position is not"),
+        ({"fraction": float("nan")}, "control.fraction is not"),
+        ({"load_steps": 0}, "control.done does not fit"),
+        ({"area": -1.0}, "control.area is not"),
+        ({"chooser": {"size": 1.0}}, "control.chooser is not"),
+        ({"chooser": 7}, "control.chooser is not"),
+        ({"companion": {}}, "second solution is not whole"),
+    ],
+)
+def test_an_impossible_place_in_the_load_history_is_refused(
+    out: Path, changes: dict[str, object], named: str
+) -> None:
+    record = out.parent / "000001.npz"
+    write_record(record, Metadata(), replace(made_step(0), control=CONTROL | changes))
+    if not named:
+        assert read_record(record)[1].done == 0.5
+        return
+    with pytest.raises(DeckError, match=rf"000001\.npz is damaged: its .*{named}[^\n]*$"):
+        read_record(record)
+
+
+def test_a_record_beyond_the_planned_steps_is_refused(out: Path) -> None:
+    record = out.parent / "000003.npz"
+    write_record(record, Metadata(planned_steps=3), made_step(2))
+    assert read_record(record)[1].number == 3
+    for index, named in ((3, "index is beyond the 3 planned"), (-5, "index is no count")):
+        write_record(record, Metadata(planned_steps=3), replace(made_step(2), index=index))
+        with pytest.raises(DeckError, match=named):
+            read_record(record)
 
 
 def test_files_of_earlier_versions_are_read_and_searched(out: Path) -> None:

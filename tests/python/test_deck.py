@@ -10,8 +10,7 @@ from typing import Any, get_args
 import pytest
 
 from hexcontact.deck import tables
-from hexcontact.deck.faults import Source
-from hexcontact.deck.location import places
+from hexcontact.deck.faults import Source, places
 from hexcontact.deck.model import Table, kind_of
 from hexcontact.deck.surfaces import SHAPES, Sphere, Surface
 from hexcontact.deck.tables import Deck, Load, Segment
@@ -200,13 +199,13 @@ WRONG = [
         '"sphere"',
         '"spere"',
         'body.1.surface.shape = "spere": expected "flat", "sphere", "paraboloid", "cylinder", "cone", '
-        '"power", "punch" or "rounded_punch"; did you mean sphere?',
+        '"power", "punch", "rounded_punch" or "formula"; did you mean sphere?',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',
         "{ radius = 1 }",
         'body.1.surface.shape: missing; expected "flat", "sphere", "paraboloid", "cylinder", "cone", '
-        '"power", "punch" or "rounded_punch"',
+        '"power", "punch", "rounded_punch" or "formula"',
     ),
     (
         '{ shape = "sphere", radius = "1 mm" }',
@@ -299,7 +298,7 @@ WRONG = [
     (
         "steps = 10",
         "path = [{normal_load = 1}]",
-        'load.1.normal_load = "31.5 N": expected inside the path, not beside it',
+        'load.1.normal_load = "31.5 N": expected in the path, not beside it',
     ),
     ("steps = 10", "path = []", "load.1.path: expected at least one entry"),
 ]
@@ -520,6 +519,65 @@ def test_values_are_shown_as_decks_write_them() -> None:
     assert shown(deep) == "[[[[[...]]]]]"
 
 
+# --- shares of friction ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["0.6 mu P", "0.6*mu*P", " .6e0 \u00b5 P", "+0.6\u03bcP"])
+def test_a_tangential_load_may_be_a_share_of_what_friction_carries(text: str) -> None:
+    press = {"normal_load": 20.0, "tangential_load_x": text}
+    more = {"normal_load": "40 N", "tangential_load_y": "-0.5 mu P", "steps": 2}
+    steps = history(press, {"path": [more], "repeat": 1}, mu=0.3)
+    assert steps[0].x.value == pytest.approx(0.6 * 0.3 * 20.0, rel=1e-15)
+    assert steps[-1].y.value == pytest.approx(-0.5 * 0.3 * 40.0, rel=1e-15)
+    assert steps[1].y.value == pytest.approx(0.5 * steps[2].y.value, rel=1e-15)
+    assert steps[-1].x == steps[0].x  # newtons: a later segment does not change it
+    load = Load(**press)
+    assert load.written()["tangential_load_x"] == "0.6 mu P"
+    assert Load(**load.written()) == load
+
+
+@pytest.mark.parametrize(
+    ("mu", "load", "sentence"),
+    [
+        (None, {"normal_load": 1.0}, "expected nothing, or a [friction] table with a coefficient above 0"),
+        (math.inf, {"normal_load": 1.0}, "expected newtons, since friction.coefficient is inf"),
+        (0.3, {"approach": 1e-6}, "expected newtons, since the approach is given and not the normal load"),
+    ],
+)
+def test_a_share_of_what_is_not_known_is_refused(
+    mu: float | None, load: dict[str, object], sentence: str
+) -> None:
+    assert complaints(load | {"tangential_load_x": "0.6 mu P"}, mu=mu) == {
+        "load.0.tangential_load_x": sentence
+    }
+
+
+def test_a_share_of_no_normal_load_is_refused() -> None:
+    """Without it 0.5 mu P would be 0 N in silence."""
+    found = complaints({"tangential_load_x": "0.5 mu P"}, {"normal_load": 1.0}, mu=0.5)
+    assert found == {
+        "load.0.tangential_load_x": "expected 0, since the normal load at the end of this segment is 0"
+    }
+    assert history({"tangential_load_x": "0 mu P"}, {"normal_load": 1.0}, mu=0.5)[-1].x.value == 0.0
+
+
+def test_a_share_above_one_is_gross_sliding_and_other_text_is_no_share() -> None:
+    found = complaints({"normal_load": 1.0, "tangential_load_x": "1.2 mu P"}, mu=0.5)
+    assert found["load.0.tangential_load_x"].startswith("gross sliding: the tangential load of 0.6 N")
+    for text in (
+        "0.6 mu",
+        "mu P",
+        "0.6 nu P",
+        "0.6 mu P N",
+        "60 % mu P",
+        "0,6 mu P",
+        "1e400 mu P",
+        "3/5 mu P",
+    ):
+        with pytest.raises(ValueError, match='a force, or a share of mu P, such as "10 N" or "0.6 mu P"'):
+            Load(normal_load=1.0, tangential_load_x=text)
+
+
 # --- the load history --------------------------------------------------------------------------------------
 
 
@@ -665,7 +723,9 @@ def test_the_normal_load_may_return_to_zero() -> None:
 @pytest.mark.parametrize("key", ["tangential_load_x", "tangential_load_y", "torque", "shift_x", "shift_y"])
 def test_frictionless_contact_carries_nothing_tangential(key: str) -> None:
     loads = {"normal_load": 1.0}, {key: -0.1, "steps": 3}
-    assert complaints(*loads, mu=None) == {f"load.1.{key}": "expected 0, or a [friction] table"}
+    assert complaints(*loads, mu=None) == {
+        f"load.1.{key}": "expected 0, or a [friction] table with a coefficient above 0"
+    }
     assert complaints(*loads, mu=0.3) == {}
     assert complaints({"normal_load": 1.0, key: 0.0}, mu=None) == {}
     # solved with a coefficient of 0, the surfaces may be moved, but no force moves them
@@ -690,9 +750,9 @@ def test_gross_sliding_known_from_the_deck_is_refused() -> None:
     assert sliding(press, {"tangential_load_y": 3.0}, {"normal_load": 0.0, "steps": 5}) == [
         "load.2.normal_load"
     ]
-    # the second turn presses with the tangential load still there: blamed once, as is the load itself
+    # the second turn presses with the tangential load still there, which only follows from that load
     turns = {"repeat": 3, "path": [press, {"tangential_load_x": 6.0}]}
-    assert sliding(turns) == ["load.0.path.0.normal_load", "load.0.path.1.tangential_load_x"]
+    assert sliding(turns) == ["load.0.path.1.tangential_load_x"]
     # what only the solution tells is left to the run
     assert sliding({"approach": 1.0}, {"tangential_load_x": 100.0}) == []
     assert sliding(press, {"shift_x": 100.0}) == []
@@ -716,7 +776,7 @@ def reference() -> dict[str, Any]:
     return names
 
 
-@pytest.mark.parametrize("name", ["deck.md", "studies.md"])
+@pytest.mark.parametrize("name", ["deck.md", "studies.md", "theory/expected_errors.md"])
 def test_the_deck_reference_is_up_to_date(name: str) -> None:
     page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     assert reference()["filled"](page) == page, "run: python docs/deck_tables.py"

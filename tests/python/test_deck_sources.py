@@ -153,7 +153,6 @@ def test_mistakes_of_tables_and_between_tables_come_together_in_the_order_of_the
     keys = [re.split(r"(?<=[a-z_])(?: =|: )", line)[0] for line in complaint(put("deck.toml", text))]
     assert keys == [
         "deck.toml:5:1: body.1.surface",
-        "deck.toml:11:1: grid.spacing",
         "deck.toml:12:1: grid.nodes_in_radus",
         "deck.toml:13:1: load",
         "deck.toml:14:1: load.1.tangential_load_x",
@@ -285,7 +284,7 @@ WRONG = [
     ),
     (
         "normal_load [N]\n1 N\n",
-        ['"1 N": expected a number without a unit, since the header says [N]'],
+        ['"1 N": expected a number without a unit, since the header has the unit [N]'],
     ),
     (
         "normal_load [mm]\n1\n",

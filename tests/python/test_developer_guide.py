@@ -50,8 +50,8 @@ def test_example_of_a_surface_has_its_closed_solution(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(surfaces, "SHAPES", dict(surfaces.SHAPES))
     monkeypatch.setattr(recognise, "_SHAPES", dict(recognise._SHAPES))
-    executed("Add a surface with a closed solution", "hexcontact.deck.surfaces")
-    executed("Add a surface with a closed solution", "hexcontact.analytic.recognise", 1)
+    executed("Add a surface with a closed-form solution", "hexcontact.deck.surfaces")
+    executed("Add a surface with a closed-form solution", "hexcontact.analytic.recognise", 1)
     surface = {"shape": "steepening", "radius": "10 mm", "factor": 3000.0}
     case = hexcontact.Case(
         body_1={**STEEL, "surface": surface}, body_2=STEEL, nodes_in_radius=12, normal_load=100.0

@@ -45,9 +45,13 @@ def test_zones_without_an_edge() -> None:
     assert full.contact().segments.shape == (0, 2, 2)
     assert full.stick(everywhere, one).area == pytest.approx(30 * cell)
     assert full.stick(nowhere, one).area == 0.0
-    # a single node has no slopes: its edge is about half way to its neighbors
+    # so has one whose rim lies within the window
     single = nowhere.copy()
     single[2, 3] = True
+    punch = ContactEdges(one * single, one * ~single, single, single, basis)
+    assert punch.contact().area == pytest.approx(cell)
+    assert punch.contact().segments.shape == (0, 2, 2)
+    # a single node has no slopes: its edge is about half way to its neighbors
     edge = ContactEdges(one * single, one * ~single, single, everywhere, basis).contact()
     assert 0.6 * cell < edge.area < cell
     assert edge.segments.shape == (6, 2, 2)

@@ -58,6 +58,7 @@ COARSE = {  # what is changed so that they take a second, and the pictures that 
         {"nodes_in_radius": 8},
         ["hertz_section", "fretting_zones", "fretting_tractions", "mindlin_loop"],
     ),
+    "two_pads": ({"nodes_in_radius": 6}, ["two_pads"]),
     "stick_map": ({"nodes_in_radius": 6, "steps": 3}, ["stick_map", "stick_section"]),
 }
 

@@ -14,9 +14,10 @@ import pytest
 import hexcontact
 from hexcontact import Case
 from hexcontact.result import store as store_module
+from hexcontact.result.journal import journal_of
 from hexcontact.result.netcdf import read_output
-from hexcontact.result.result import Step
-from hexcontact.result.store import journal_of, open_result
+from hexcontact.result.step import Step
+from hexcontact.result.store import open_result
 
 DECK = """
 title = "A sphere"
@@ -46,7 +47,7 @@ ENVIRONMENT = os.environ | {
 LATE = """
 import atexit, os, sys, time
 from hexcontact.cli import app as cli, json_output, messages
-from hexcontact.result import store
+from hexcontact.result import journal, store
 
 number, sent = int(sys.argv.pop(1)), []
 def signaled(module, name):
@@ -60,7 +61,7 @@ def signaled(module, name):
     setattr(module, name, call)
 
 signaled(store, "write")  # the output is assembled
-signaled(store.Journal, "remove")
+signaled(journal.Journal, "remove")
 signaled(store.Store, "close")
 signaled(messages, "overview")
 signaled(messages.Messages, "conclude")
@@ -211,7 +212,7 @@ def test_a_run_is_sent_to_resume_wherever_steps_are_kept(
         state(out)
         with pytest.raises(
             hexcontact.DeckError,
-            match=rf"holds \d finished steps of an unfinished run; hexcontact resume {out} goes on, ",
+            match=rf"holds \d finished steps of an unfinished run; hexcontact resume {out} continues it, ",
         ):
             Case.from_text(DECK).run(out)
     again = tmp_path / "again.nc"
@@ -233,7 +234,7 @@ def test_signals_at_random_moments_leave_what_the_code_says(tmp_path: Path) -> N
         "3",
         "signals",
     ]
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=3600)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     *runs, signals = done.stdout.splitlines()
     assert len(runs) == 20

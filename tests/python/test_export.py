@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, open_result
 from hexcontact.cli.app import app
+from hexcontact.result.journal import journal_of
 from hexcontact.result.mesh import triangles
-from hexcontact.result.result import Step
-from hexcontact.result.store import journal_of
+from hexcontact.result.step import Step
 
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SPHERES = {"body_1": BODY | {"surface": {"shape": "sphere", "radius": 0.01}}, "body_2": BODY}
@@ -222,7 +222,7 @@ def test_history_and_fields_as_tables(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((), "expected --vtk, --ugrid or --csv"),
+        ((), "expected --vtk, --ugrid, --csv or --histories"),
         (("--vtk", "-s", "9"), "there is no step 9"),
         (("--vtk", "-s", "2,3"), "step 3 were not kept"),
         (("--vtk", "-s", "x"), "--step x"),

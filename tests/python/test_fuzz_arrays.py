@@ -1,6 +1,8 @@
 """Odd arrays and values in the Python interface: a result, or a sentence that is a `DeckError`."""
 
 import dataclasses
+import functools
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -19,14 +21,16 @@ from hexcontact import (
     HexcontactError,
     Lattice,
     NormalContact,
+    RimWarning,
     Study,
     analytic,
+    fatigue,
 )
-from hexcontact.core import contact as native
-from hexcontact.core import influence
+from hexcontact.core import contact, influence
 
 LATTICE = Lattice(spacing=1e-4, row_first=-4, col_first=-4, n_row=9, n_col=9)
 GAP = (LATTICE.x**2 + LATTICE.y**2) / 20e-3
+HISTORY = 1e8 * np.outer([0.0, 1.0, -1.0], np.ones(6))
 MIDDLE = np.arange(81).reshape(9, 9) == 40
 PAIR = ElasticPair.from_materials(210e9, 0.3, 70e9, 0.33)
 ELASTIC: dict[str, Any] = {"young_modulus": 210e9, "poisson_ratio": 0.3}
@@ -179,9 +183,37 @@ TAKERS: dict[str, Callable[[Any], object]] = {
         LATTICE, PAIR, GAP, friction_coefficient=0.3, threads=a
     ),
     "threads of an operator": lambda a: FlexibilityOperator(LATTICE, PAIR, threads=a),
-    "rows of a memory": lambda a: native.memory_needed("fft", a, 9),
+    "rows of a memory": lambda a: contact.memory_needed("fft", a, 9),
     "study": study,
+    "stress at points": lambda a: pressed().stress(points=a),
+    "stress on a line": lambda a: pressed().stress(line=a),
+    "stress at depths": lambda a: pressed().stress(depths=a),
+    "box of stress": lambda a: pressed().stress(depths=[1e-5], box=a),
+    "count of stress": lambda a: pressed().stress(line=[[0, 0, 0], [0, 0, 1e-4]], count=a),
+    "step of stress": lambda a: pressed().stress(points=[0, 0, 1e-5], step=a),
+    "body of stress": lambda a: pressed().stress(points=[0, 0, 1e-5], body=a),
+    "component of stress": lambda a: pressed().stress(a, points=[0, 0, 1e-5]),
+    "points of pyramid stress": lambda a: finite(influence.pyramid_stress(a, 0.0, 1.0, 0.3)),
+    "depths of pyramid stress": lambda a: finite(influence.pyramid_displacement(0.0, 0.0, a, 0.3)),
+    "vertices of a triangle": lambda a: finite(influence.triangle_stress(a, 0.2, 0.2, 0.5, 0.3)),
+    "vertices of a mesh": lambda a: finite(influence.mesh_stress(a, np.ones((1, 3, 3)), 0.0, 0.0, 1.0, 0.3)),
+    "history": lambda a: fatigue.smith_watson_topper(a, 2e11, 0.3),
+    "slope": lambda a: fatigue.findley(HISTORY, a),
+    "traction of Ruiz": lambda a: fatigue.ruiz(a, np.ones((3, 2)), HISTORY),
+    "parameter of a life": lambda a: fatigue.life(a, 2e11, 1e9, -0.1, 0.5, -0.6),
 }
+DOCUMENTED = {"Hertz, tensor": ValueError, "Hertz, load": ValueError, "step of stress": IndexError}
+
+
+@functools.cache
+def pressed() -> Any:
+    return case(friction_coefficient=0.3).run()
+
+
+def finite(values: Any) -> None:
+    assert np.isfinite(values).all()
+
+
 # No solver may believe what is no number of a sensible size, and none may iterate for ever.
 REFUSED: dict[str, tuple[Any, ...]] = {
     "lambda_1": (np.nan, np.inf, -np.inf, 0.0, -1e-11),
@@ -199,6 +231,11 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "sweeps of a step": (0, -1, 2**31),
     "cuts of a step": (-1, 2**31),
     "number of a state": (np.nan, np.inf),
+    "points of pyramid stress": (np.nan, np.inf, 1e200),
+    "depths of pyramid stress": (np.nan, np.inf, 1e200, -1.0),
+    "vertices of a triangle": ([[0, 0], [1e200, 0], [0, 1e200]],),
+    "history": (np.full((3, 6), np.nan), np.full((3, 6), 1e200)),
+    "slope": (np.nan, np.inf),
     "values of an advance": ([np.nan, 0, 0, 0], [1, np.inf, 0, 0], [-1, 0, 0, 0]),
     "threads": (-1, 1025, 10**6, 10**12, 1.5),
     "threads with friction": (-1, 1025, 10**6, 10**12, 1.5),
@@ -208,7 +245,6 @@ REFUSED: dict[str, tuple[Any, ...]] = {
     "control of an advance": ([["force"]] * 4, ["force"] * 3, ["force", "force", "force", "torque"]),
     "method": ("lapack", ["fft"], 1),
 }
-DOCUMENTED = {"Hertz, tensor": ValueError, "Hertz, load": ValueError}  # of the closed solutions
 
 
 def contact_of(pair: ElasticPair) -> object:
@@ -261,11 +297,28 @@ def test_solvers_say_why_they_stopped() -> None:
 
 
 def test_contact_at_the_rim_is_flagged() -> None:
-    small, large = (NormalContact(LATTICE, PAIR, GAP).solve(normal_load=load) for load in (10.0, 1e5))
+    contact = NormalContact(LATTICE, PAIR, GAP)
+    small = contact.solve(normal_load=10.0)
+    with pytest.warns(RimWarning, match="contact at the rim of the window") as warned:
+        large = contact.solve(normal_load=1e5)
+        step = advanced(FORCES, [1e5, 0.0, 0.0, 0.0])
+    assert len(warned) == 2 and all(warning.filename == __file__ for warning in warned)
     assert (small.converged, small.touches_rim) == (True, False)
     assert (large.converged, large.touches_rim) == (True, True)
-    step = advanced(FORCES, [1e5, 0.0, 0.0, 0.0])
     assert (step.converged, step.touches_rim) == (True, True)
+    NormalContact(LATTICE, PAIR, GAP, rim_warning=False).solve(normal_load=1e5)
+
+
+def test_a_punch_that_fills_its_window_gives_no_warning_of_the_rim() -> None:
+    flat, punch = np.zeros(LATTICE.shape), np.hypot(LATTICE.x, LATTICE.y) < 1.01 * LATTICE.x.max()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert NormalContact(LATTICE, PAIR, flat, punch).solve(normal_load=10.0).touches_rim
+        contact = FrictionalContact(LATTICE, PAIR, flat, punch, friction_coefficient=0.3)
+        assert contact.advance(contact.virgin(), FORCES, [10.0, 0.0, 0.0, 0.0]).touches_rim
+    for gap in (flat, GAP):
+        with pytest.warns(RimWarning):  # nothing says that the bodies end there
+            NormalContact(LATTICE, PAIR, gap, np.ones_like(punch)).solve(normal_load=2e3)
 
 
 def made(name: str, value: Any) -> Any:
@@ -367,7 +420,7 @@ def test_both_methods_find_the_same_contact_of_odd_gaps(block: int) -> None:
     pair = ElasticPair(1 / np.pi, 0.0, 0.0)
     for seed in range(40 * block, 40 * block + 40):
         lattice, gap, candidate, driven = odd_gap(seed)
-        methods: tuple[native.Method, ...] = ("fft", "direct")
+        methods: tuple[contact.Method, ...] = ("fft", "direct")
         solvers = [NormalContact(lattice, pair, gap, candidate, method, threads=1) for method in methods]
         found, expected = (solver.solve(**driven, tolerance=1e-10) for solver in solvers)
         assert found.converged and expected.converged, seed

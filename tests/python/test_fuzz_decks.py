@@ -13,9 +13,9 @@ import typer
 from fuzz import harness
 from fuzz.deck_mutations import garbled, mutated
 
-from hexcontact.cli import deck as cli_deck
 from hexcontact.cli import guard as cli_guard
 from hexcontact.cli import run as cli_solve
+from hexcontact.cli.deck import check
 from hexcontact.result.store import open_result
 from hexcontact.study.study import Study
 
@@ -88,6 +88,34 @@ normal_load = "100 N"
 [[load]]
 torque = "3 N mm"
 """,
+    BODIES
+    + """[friction]
+coefficient = "0.3 + 0.1*tanh(x/50e-6)"
+shear_limit = "300 MPa"
+[interface]
+coefficient = "1e21 Pa/m^2"
+exponent = 2
+tangential_stiffness = "1e15 Pa/m"
+[bulk]
+body = 2
+[grid]
+nodes_in_radius = 5
+[[load]]
+normal_load = "100 N"
+[[load]]
+bulk_stress_xx = "30 MPa"
+bulk_stress_xy = "-5 MPa"
+[[stress]]
+name = "axis"
+body = 2
+line = [["0 mm", "0 mm", "0 mm"], ["0 mm", "0 mm", "1 mm"]]
+count = [5]
+steps = "all"
+[[stress]]
+depths = ["10 um", "0.1 mm"]
+box = [["-0.1 mm", "0.1 mm"], ["-0.1 mm", "0.1 mm"]]
+components = ["von_mises_stress"]
+""",
 )
 
 
@@ -105,7 +133,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def judged(command: Callable[..., Any], seed: object, place: Path, **options: Any) -> harness.Ending:
-    """Run a command that may only write what is called out.nc, and see that it ends as it should."""
+    """Run a command that may only write what is called out, and see that it ends as it should."""
     before = untouchable(place)
     with warnings.catch_warnings():
         warnings.filterwarnings("error", module="hexcontact")
@@ -119,7 +147,7 @@ def judged(command: Callable[..., Any], seed: object, place: Path, **options: An
 
 
 def untouchable(place: Path) -> dict[str, str]:
-    return {name: hash_ for name, hash_ in harness.contents(place).items() if not name.startswith("out.nc")}
+    return {name: hash_ for name, hash_ in harness.contents(place).items() if not name.startswith("out")}
 
 
 def decks() -> list[str]:
@@ -132,7 +160,7 @@ def test_mutated_decks_are_checked_with_a_sentence_for_each_mistake(part: int, f
     for seed in range(part, CHECKED, PARTS):
         rng = random.Random(seed)
         (folder / "deck.toml").write_bytes(mutated(rng.choice(known), rng))
-        codes[judged(cli_deck.check, seed, folder, deck=folder / "deck.toml").exit_code] += 1
+        codes[judged(check, seed, folder, deck=folder / "deck.toml").exit_code] += 1
     assert codes[0] > 0.1 * CHECKED / PARTS  # mutations that leave nothing whole would test little
     assert codes[2] > 0.5 * CHECKED / PARTS
 
@@ -150,7 +178,7 @@ def test_decks_that_are_too_large_are_refused_by_estimate(folder: Path) -> None:
         keys = [setting]
         deck = folder / "deck.toml"
         deck.write_text(SMALL[0].replace("nodes_in_radius = 5", "") if "grid" in setting else SMALL[0])
-        end = judged(cli_deck.check, setting, folder, deck=deck, settings=keys)
+        end = judged(check, setting, folder, deck=deck, settings=keys)
         assert end.exit_code == code, end.error
         if code == 4:
             run = judged(cli_solve.run, setting, folder, deck=deck, settings=keys, output=folder / "out.nc")
@@ -164,7 +192,7 @@ def test_gently_mutated_decks_are_run_to_a_result_or_a_sentence(tmp_path: Path) 
         rng = random.Random(seed)
         deck, output = tmp_path / "deck.toml", tmp_path / "out.nc"
         deck.write_bytes(mutated(rng.choice(SMALL), rng, gently=True))
-        end = judged(cli_deck.check, seed, tmp_path, deck=deck)
+        end = judged(check, seed, tmp_path, deck=deck)
         if end.exit_code == 0 and harness.told(end)["nodes"] * harness.told(end)["load_steps"] < MOST_WORK:
             end = judged(cli_solve.run, seed, tmp_path, deck=deck, output=output, overwrite=True, quiet=True)
             if end.exit_code == 0:
@@ -192,7 +220,7 @@ def test_other_files_with_mistakes_get_a_sentence(kind: str, folder: Path) -> No
         if kind == "study":
             end = judged(planned, (kind, seed), folder, file=file)
         else:
-            end = judged(cli_deck.check, (kind, seed), folder, deck=deck)
+            end = judged(check, (kind, seed), folder, deck=deck)
         codes[end.exit_code] += 1
     assert codes[0] > 0
     assert codes[2] > 0
@@ -209,7 +237,7 @@ def test_tables_in_tables_in_tables_are_refused(kind: str, depth: int, folder: P
     }
     for deck in ("measured_history.toml", "hertz_spheres.toml"):  # one that is put together of several files
         (folder / deck).write_text(f"{(CASES / deck).read_text()}\n{deep[kind]}\n")
-        end = judged(cli_deck.check, depth, folder, deck=folder / deck)
+        end = judged(check, depth, folder, deck=folder / deck)
         assert end.exit_code == 2
         assert "nested too deeply" in end.error
 

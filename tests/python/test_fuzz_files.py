@@ -13,7 +13,7 @@ import pytest
 from fuzz.file_scan import scan
 
 from hexcontact import Case
-from hexcontact.result.result import Step
+from hexcontact.result.step import Step
 
 FILES, PARTS = 200, 2
 SCANNED = 250

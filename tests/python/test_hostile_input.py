@@ -299,6 +299,38 @@ def test_devices_pipes_and_endless_files_are_refused(folder: Path) -> None:
             assert odd in sentence(*words), words
         for words in (("resume", name), ("run", "deck.toml", "-o", name, "--overwrite")):
             assert "is not a regular file" in sentence(*words), words
+    assert "No such device" in sentence("run", "deck.toml", "--log-file", "pipe")  # nobody reads it
+    assert "is not a regular file" in sentence("schema", "-o", "pipe")
+
+
+def test_exports_go_through_no_link_and_into_no_pipe(folder: Path) -> None:
+    Path("deck.toml").write_text(toml(BODIES) + PRESS)
+    assert command("run", "deck.toml", "--quiet").exit_code == 0
+    victim = Path("victim")
+    victim.write_text("precious")
+    names = ("deck_0001.vtu", "deck.pvd", "deck_ugrid.nc", "deck_history.csv", "deck_0001.csv")
+    words = ("export", "deck.nc", "--vtk", "--ugrid", "--csv", "--step", "1")
+    os.mkdir("deck_export")
+    for name in names:
+        (Path("deck_export") / name).symlink_to(victim.absolute())
+    assert command(*words).exit_code == 0
+    assert victim.read_text() == "precious"
+    assert sorted(os.listdir("deck_export")) == sorted(names)
+    assert all((Path("deck_export") / name).stat().st_size > 100 for name in names)
+    for name in names:
+        (Path("deck_export") / name).unlink()
+        os.mkfifo(Path("deck_export") / name)
+        assert f"{name} is not a regular file" in sentence(*words)
+        (Path("deck_export") / name).unlink()
+
+
+def test_a_schema_replaces_schemas_only(folder: Path) -> None:
+    Path("package.json").write_text('{"name": "mine"}')
+    assert "no schema of hexcontact" in sentence("schema", "-o", "package.json")
+    assert Path("package.json").read_text() == '{"name": "mine"}'
+    for _ in range(2):
+        assert command("schema", "-o", "deck.json").exit_code == 0
+        assert command("schema", "--study", "-o", "deck.json").exit_code == 0
 
 
 def test_a_study_meets_pipes_in_its_folder(folder: Path) -> None:

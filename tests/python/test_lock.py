@@ -12,10 +12,10 @@ from fuzz.file_made import made_step
 
 from hexcontact import DeckError
 from hexcontact.files import replacing
-from hexcontact.lock import Lock
-from hexcontact.result.journal import Journal
-from hexcontact.result.result import Metadata
-from hexcontact.result.store import Store, journal_of
+from hexcontact.lock import Lock, names_a_run
+from hexcontact.result.journal import Journal, journal_of
+from hexcontact.result.layout import Metadata
+from hexcontact.result.store import Store
 from hexcontact.result.trials import TrialFolder
 
 THESIS = "what somebody wrote\n"
@@ -89,6 +89,13 @@ def test_a_file_that_came_in_the_place_of_a_lock_stays(tmp_path: Path) -> None:
     (tmp_path / "lock").write_text(THESIS)
     lock.release()
     assert (tmp_path / "lock").read_text() == THESIS
+
+
+def test_a_link_to_a_lock_does_not_name_a_run(tmp_path: Path) -> None:
+    lock = Lock(tmp_path / "lock", tmp_path / "out.nc")
+    (tmp_path / "link").symlink_to(lock.path)
+    assert names_a_run(lock.path) and not names_a_run(tmp_path / "link")
+    lock.release()
 
 
 def test_no_descriptor_is_left_by_a_lock_that_was_refused(tmp_path: Path) -> None:

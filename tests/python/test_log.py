@@ -35,8 +35,10 @@ young_modulus = "70 GPa"
 poisson_ratio = 0.33
 [friction]
 coefficient = 0.2
+[solver]
+entry = "interpolated"
 [grid]
-nodes_in_radius = 6
+nodes_in_radius = 12
 [[load]]
 normal_load = "100 N"
 label = "press"
@@ -123,7 +125,7 @@ def test_fractions_are_those_of_ramps_with_values(caplog: Any) -> None:
 
 
 def test_a_contact_without_friction_has_no_stick(caplog: Any) -> None:
-    text = DECK.partition("[friction]")[0] + '[grid]\nnodes_in_radius = 6\n[[load]]\nnormal_load = "9 N"\n'
+    text = DECK.partition("[friction]")[0] + '[grid]\nnodes_in_radius = 12\n[[load]]\nnormal_load = "9 N"\n'
     with caplog.at_level(logging.INFO, logger="hexcontact"):
         Case.from_text(text).run()
     [row] = steps_of([record.getMessage() for record in caplog.records])
@@ -217,7 +219,9 @@ def test_log_level_shows_the_log_instead_of_the_progress(deck: Path) -> None:
 
 
 def test_a_run_that_stops_leaves_the_reason(deck: Path) -> None:
-    deck.write_text(DECK.replace("[grid]\nnodes_in_radius = 6", '[grid]\nspacing = "60 um"\nwindow = [9, 9]'))
+    deck.write_text(
+        DECK.replace("[grid]\nnodes_in_radius = 12", '[grid]\nspacing = "60 um"\nwindow = [9, 9]')
+    )
     code, _, error = command("run", deck, "-o", deck.parent / "a.nc", "--log-file", deck.parent / "run.log")
     assert code == 2
     level, message = read(deck.parent / "run.log")[-1]
@@ -354,7 +358,7 @@ def test_an_interrupted_run_says_so_in_its_log(deck: Path) -> None:
 
 
 def test_a_study_logs_its_cases(tmp_path: Path) -> None:
-    (tmp_path / "deck.toml").write_text(DECK.replace("nodes_in_radius = 6", "nodes_in_radius = 4"))
+    (tmp_path / "deck.toml").write_text(DECK.replace("nodes_in_radius = 12", "nodes_in_radius = 4"))
     (tmp_path / "study.toml").write_text(
         'deck = "deck.toml"\n[[parameter]]\nkey = "friction.coefficient"\nvalues = [0.2, 0.01]\n'
     )

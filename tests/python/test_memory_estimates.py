@@ -4,6 +4,8 @@ import pytest
 from bench.memory import deck, measured
 
 DIRECT = '[solver]\nmethod = "direct"\n'
+BOX = "[[stress]]\ndepths = [1e-5, 2e-5, 3e-5, 4e-5, 5e-5, 6e-5, 7e-5, 8e-5]\n"
+INTERFACE = "[interface]\ncoefficient = 1e15\nexponent = 1\n"
 MOVED = '[output]\nfields = ["displacement_1_z"]\n'
 
 
@@ -24,6 +26,8 @@ def check(text: str, bound: float) -> None:
         ("frictionless", 256, {"more": MOVED}),
         ("frictionless", 256, {"steps": 16}),
         ("frictionless", 64, {"more": DIRECT}),
+        ("frictionless", 256, {"more": BOX}),
+        ("frictionless", 256, {"more": INTERFACE}),
         ("friction, alike", 128, {}),
         ("friction, alike", 256, {"steps": 4}),
         ("friction, alike", 256, {"steps": 16}),
@@ -31,6 +35,8 @@ def check(text: str, bound: float) -> None:
         ("friction, unlike", 256, {"share": 0.4}),
         ("friction, unlike", 256, {}),
         ("friction, unlike", 256, {"steps": 8}),
+        ("wear", 128, {}),
+        ("wear", 128, {"steps": 6}),
     ],
 )
 def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, options: dict[str, object]) -> None:
@@ -38,7 +44,15 @@ def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, option
     check(deck(problem, side, **options), 0.1)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("problem", ["friction, alike", "friction, unlike"])
-def test_the_estimate_of_matrices_with_friction(problem: str) -> None:
-    """How many nodes stick at once while the zones are found is not known, nor what buffers BLAS takes."""
-    check(deck(problem, 44, more=DIRECT), 0.12)
+@pytest.mark.parametrize(
+    ("problem", "side", "share"),
+    [
+        ("friction, alike", 44, 0.8),
+        ("friction, unlike", 44, 0.8),
+        ("friction, unlike", 80, 0.8),
+        ("friction, alike", 121, 0.15),
+    ],
+)
+def test_the_estimate_of_matrices_with_friction(problem: str, side: int, share: float) -> None:
+    """The matrix is as large as the contact, whatever the window."""
+    check(deck(problem, side, share=share, more=DIRECT), 0.1)

@@ -21,7 +21,7 @@ sys.path.insert(0, str(DOCS / "site"))
 import links  # noqa: E402
 import played  # noqa: E402
 
-SAME = 5e-4  # of a picture: a node whose zone is decided by rounding, on another machine
+SAME = 2e-3  # of a picture: a node whose zone, or a digit of a legend that rounding decides
 CHANGED = "\n(if that is right: python docs/site/played.py --write)"
 
 
@@ -37,20 +37,36 @@ def test_page_prints_and_draws_what_it_shows(
     commands = [block for language, block in played.BLOCK.findall(page) if language == "console"]
     assert sum(block.count("\n$ ") + block.startswith("$ ") for block in commands) >= len(commands) > 0
     pictures = played.PICTURE.findall(page)
-    assert len(pictures) == {"tutorial": 6, "surfaces": 2}.get(name, 0)
+    assert len(pictures) == {"tutorial": 6, "surfaces": 2, "fatigue": 1}.get(name, 0)
     for target, picture in pictures:
         played.keep_picture(tmp_path / picture, tmp_path / f"kept_{picture}")
         found = drawn.pixels(tmp_path / f"kept_{picture}")
         assert drawn.apart(found, drawn.pixels(DOCS / target)) < SAME, target
 
 
-IMAGES = runpy.run_path(str(DOCS / "images/make.py"))["FIGURES"]
+MAKE = runpy.run_path(str(DOCS / "images/make.py"))
+IMAGES = MAKE["FIGURES"]
 
 
 @pytest.mark.parametrize("name", IMAGES)
 def test_pictures_of_the_pages_are_those_that_the_program_draws(name: str) -> None:
     found = drawn.pixels(IMAGES[name](), dpi=150)
     assert drawn.apart(found, drawn.pixels(DOCS / f"images/{name}.png")) < SAME
+
+
+def test_gallery_shows_every_deck() -> None:
+    decks = {path.stem for path in (ROOT / "cases").glob("*.toml") if not path.stem.startswith("study_")}
+    assert MAKE["decks"]().keys() == decks, "cases/README.md"
+    assert (DOCS / "gallery.md").read_text(encoding="utf-8") == MAKE["gallery"](), "docs/images/make.py"
+
+
+@pytest.mark.parametrize("name", MAKE["decks"]())
+def test_pictures_of_the_gallery_are_those_that_the_commands_draw(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    MAKE["draw_deck"](name, picture := tmp_path / "drawn.png")
+    assert drawn.apart(drawn.pixels(picture), drawn.pixels(DOCS / f"images/cases/{name}.png")) < SAME
 
 
 def test_every_picture_of_the_pages_is_drawn_by_a_test() -> None:
@@ -94,7 +110,7 @@ def test_excerpt_of_the_tutorial_is_the_starter_deck(tmp_path: Path) -> None:
     [excerpt] = [text for text in excerpts if not played.NAME.match(text)]
     list(played.differences(f"```console\n$ hexcontact new fretting -o {tmp_path}/new.toml\n```\n", tmp_path))
     deck = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
-    assert {key: deck[key] for key in ("friction", "load")} == tomllib.loads(excerpt)
+    assert {key: deck[key] for key in ("friction", "solver", "load")} == tomllib.loads(excerpt)
 
 
 def test_log_of_a_page_is_that_of_its_case(tmp_path: Path) -> None:
@@ -143,7 +159,8 @@ def test_equations_of_the_theory_have_the_letter_of_their_page_and_their_order()
     contents = (DOCS / "theory.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\w?) ?\| \[.*?\]\(theory/(\w+)\.md\)", contents, re.MULTILINE)
     letters = {page: letter for letter, page in rows}
-    assert len(set(letters.values())) == len(letters)
+    with_equations = [letter for letter in letters.values() if letter]
+    assert len(set(with_equations)) == len(with_equations) > 10
     for page, numbers in equations().items():
         assert numbers == [f"{letters[page]}{n}" for n in range(1, len(numbers) + 1)], page
 

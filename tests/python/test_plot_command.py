@@ -18,10 +18,12 @@ from hexcontact.cli import options
 from hexcontact.cli import plot as plot_command
 from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
+from hexcontact.files import MADE_BY
 from hexcontact.plotting import registry
 from hexcontact.plotting.registry import entries
 from hexcontact.variables import MAPS
 
+CASE = Path(__file__).parents[2] / "cases" / "hertz_spheres.toml"
 BODY = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 
 
@@ -91,7 +93,8 @@ def test_pictures_for_a_paper(
     picture, expected = tmp_path / f"loop.{kind}", io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "names"}):
         assert plot(folder / "sheared.nc", "-w", "loop", "-o", picture)[0] == 0
-        plotting.loop(open_result(folder / "sheared.nc")).savefig(expected, format=kind, dpi=200)
+        figure = plotting.loop(open_result(folder / "sheared.nc"))
+        figure.savefig(expected, format=kind, dpi=200, metadata={"Creator": MADE_BY})
     assert picture.read_bytes() == expected.getvalue()
 
 
@@ -133,7 +136,7 @@ REFUSED = [
     (
         "sheared",
         ["-w", "zones", "-s", "2,x"],
-        "--step 2,x: expected a number of a load step, or several as 10,20,30",
+        "--step 2,x: expected a number of a load step, several as 10,20,30 or 10-30 or all",
     ),
     (
         "sheared",
@@ -177,15 +180,23 @@ def test_all_draws_what_there_is(folder: Path, tmp_path: Path) -> None:
     code, out, _ = plot(folder / "pressed.nc", "-w", "all", "-o", tmp_path / "p.pdf")
     assert code == 0
     written = {path.stem for path in tmp_path.iterdir()}
-    assert written == {"p_overview", "p_pressure", "p_section", "p_boundary", "p_history"}
+    assert written == {
+        "p_overview",
+        "p_pressure",
+        "p_section",
+        "p_boundary",
+        "p_history",
+        "p_stress",
+        "p_trailing_edge",
+    }
     assert all(drawn.strokes(path.read_bytes(), "pdf") > 100 for path in tmp_path.iterdir())
     assert "left out: zones (a contact without friction has no stick and slip zones)" in out
     code, out, _ = plot(folder / "sheared.nc", "-w", "all", "--step", "3", "-o", tmp_path / "s.png")
     assert code == 0
     left_out = re.findall(r"left out: (\w+)", out)
-    assert left_out == ["torsion"]
+    assert sorted(left_out) == ["fatigue", "torsion", "wear", "worn_depth"]
     written = {path.stem[2:] for path in tmp_path.glob("s_*")}
-    assert written == set(plotting.FIGURES) - {"torsion", "compliance"}
+    assert written == set(plotting.FIGURES) - {*left_out, "compliance"}
     result = open_result(folder / "sheared.nc")
     for name in ("pressure", "section", "zones"):
         found, expected = drawn.pixels(tmp_path / f"s_{name}.png"), plotting.FIGURES[name](result, 3)
@@ -205,7 +216,7 @@ def test_help_has_a_line_for_each_choice() -> None:
         k for k, line in enumerate(lines) if line.startswith("pyramid")
     )
     overall = CliRunner().invoke(app, ["--help"]).stdout
-    assert "Draw a result, or what" in overall and "Choices" not in overall
+    assert "Draw a result, or the" in overall and "Choices" not in overall
 
 
 def test_a_figure_is_a_decorated_function(
@@ -234,7 +245,17 @@ def test_every_option_belongs_to_some_picture() -> None:
 
 
 def test_options_are_read() -> None:
-    assert options.steps_of("3, 4,-1") == [3, 4, -1]
+    labels = ["press", "to, fro", "to, fro", "press", "press"]
+    assert options.steps_of("3, 4,-1", labels) == [3, 4, -1]
+    assert options.steps_of("2-4, -1", labels) == [2, 3, 4, -1]
+    assert options.steps_of("all", labels) == [1, 2, 3, 4, 5]
+    assert options.steps_of("press", labels) == [1, 5]  # the last step of each segment
+    assert options.steps_of("to, fro", labels) == [3]
+    assert options.steps_of("press,2", labels) == [1, 5, 2]
+    with pytest.raises(DeckError, match=r'--step shear: .* all or a label \("press" or "to, fro"\)'):
+        options.steps_of("shear", labels)
+    with pytest.raises(DeckError, match="--cycle first: expected a number of a cycle, several as .* or all"):
+        options.steps_of("first", [""], "cycle")
     assert plot_command.angle_of("30") == pytest.approx(np.pi / 6)
     assert plot_command.angle_of("0.5 rad") == 0.5
     assert plot_command.point_of("10 um, -1e-3") == pytest.approx((1e-5, -1e-3))
@@ -259,7 +280,7 @@ def test_kind_of_picture_by_option_and_by_name(folder: Path, tmp_path: Path, kin
 def test_all_pictures_have_the_kind_asked_for(folder: Path) -> None:
     code, out, _ = plot(folder / "pressed.nc", "--what", "all", "-f", "svg")
     names = re.findall(r"written: (.*)", out)
-    assert code == 0 and len(names) == 5 and all(name.endswith(".svg") for name in names)
+    assert code == 0 and len(names) == 7 and all(name.endswith(".svg") for name in names)
     assert all(drawn.strokes(Path(name).read_bytes(), "svg") > 100 for name in names)
 
 
@@ -272,3 +293,35 @@ def test_every_field_of_the_table_with_a_title_has_a_map() -> None:
     alone = {names[0] for names in MAPS.values() if len(names) == 1}
     assert alone >= {"pressure", "accumulated_slip"}
     assert alone <= set(plotting.FIGURES)
+
+
+@pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
+def test_only_own_pictures_are_replaced(folder: Path, tmp_path: Path, kind: str) -> None:
+    picture = tmp_path / f"mine.{kind}"
+    picture.touch()
+    for _ in range(2):  # an empty file, then an earlier picture
+        assert plot(folder / "pressed.nc", "-o", picture)[0] == 0
+    Figure().savefig(picture)
+    foreign = picture.read_bytes()
+    code, _, err = plot(folder / "pressed.nc", "-o", picture)
+    assert code == 2 and picture.read_bytes() == foreign
+    assert f"{picture} is there and was not made by hexcontact" in err
+
+
+def test_a_run_does_not_replace_a_foreign_picture_or_page(tmp_path: Path) -> None:
+    deck, picture, page = (tmp_path / name for name in ("hertz.toml", "hertz.png", "hertz.html"))
+    deck.write_text(CASE.read_text())
+    out = picture.with_suffix(".nc")
+    picture.write_text("a photograph")
+    words = ["run", str(deck), "-o", str(out), "--plot", "-q", "--overwrite"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 2 and "hertz.png is there and was not made by hexcontact" in done.stderr
+    assert not out.exists()  # it is said before the work, not after it
+    picture.unlink()
+    for _ in range(2):
+        assert CliRunner().invoke(app, words).exit_code == 0
+        assert CliRunner().invoke(app, ["report", str(out), "-o", str(page)]).exit_code == 0
+    page.write_text("<p>made by hand</p>")
+    done = CliRunner().invoke(app, ["report", str(out), "-o", str(page)])
+    assert done.exit_code == 2 and "hertz.html is there and was not made by hexcontact" in done.stderr
+    assert page.read_text() == "<p>made by hand</p>"

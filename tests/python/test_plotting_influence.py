@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hexcontact.core.influence import pyramid_functions
+from hexcontact.core.influence import displacement_errors, load_potential, pressure_errors, pyramid_functions
 from hexcontact.plotting import influence as plotting_influence
 
 HEIGHT = np.sqrt(0.75)
@@ -13,31 +13,30 @@ HEIGHT = np.sqrt(0.75)
 
 def test_load_shapes_hold_the_same_volume() -> None:
     x, y = np.array([300.0, 0.0, -40.0]), np.array([0.0, 200.0, 70.0])
-    for shape, _ in plotting_influence.SHAPES.values():
+    for shape in plotting_influence.LOOKS:
         # the far field is volume/distance, with a relative error of the order of 1/distance^2
-        np.testing.assert_allclose(shape(x, y) * np.hypot(x, y), HEIGHT, rtol=1e-4)
+        np.testing.assert_allclose(load_potential(shape, x, y) * np.hypot(x, y), HEIGHT, rtol=1e-4)
     # of the hexagon with the inner radius 1/2 about its middle: 6 * 1/2 * 2 ln(sqrt 3)
     origin = np.zeros(1)
-    assert plotting_influence.constant_cell(origin, origin)[0] == pytest.approx(3 * np.log(3), rel=1e-12)
-    assert plotting_influence.pyramid(origin, origin)[0] == pytest.approx(
+    assert load_potential("constant on the cell", origin, origin)[0] == pytest.approx(
+        3 * np.log(3), rel=1e-12
+    )
+    assert load_potential("pyramid", origin, origin)[0] == pytest.approx(
         1.5 * np.sqrt(3) * np.log(3), rel=1e-12
     )
 
 
 def test_order_of_the_load_shapes() -> None:
-    from hexcontact.plotting.influence import interpolation_error
-
-    coarse, fine = np.array(interpolation_error(10.0)), np.array(interpolation_error(40.0))
+    coarse, fine = np.array(pressure_errors(10.0)), np.array(pressure_errors(40.0))
     order = np.log(coarse / fine) / np.log(4.0)
     assert order == pytest.approx([1.0, 2.0], abs=0.15)
 
 
 def test_displacement_error_of_the_load_shapes() -> None:
-    from hexcontact.plotting.influence import SHAPES, hertz_error
-
     x = np.linspace(0.0, 8.0, 33)
     error = {
-        name: np.abs(hertz_error(shape, 10.0, x + 0.1, 0 * x)).max() for name, (shape, _) in SHAPES.items()
+        name: np.abs(displacement_errors(name, 10.0, x + 0.1, 0 * x)).max()
+        for name in plotting_influence.LOOKS
     }
     assert error["pyramid"] < 2e-3
     assert error["constant on the cell"] < 2e-3
@@ -74,31 +73,52 @@ def test_figure_of_the_load_shapes_shows_loads_pressures_and_errors() -> None:
     drawn.assert_painted(figure)
     one, pressure, error, convergence = drawn.visible(figure)
     assert [axes.get_title()[:3] for axes in figure.axes] == ["(a)", "(b)", "(c)", "(d)"]
-    shapes = plotting_influence.SHAPES
-    for line, (shape, look) in zip(one.lines, shapes.values(), strict=True):
+    shapes = plotting_influence.LOOKS
+    for line, (shape, look) in zip(one.lines, shapes.items(), strict=True):
         x, value = line.get_data()
         assert (len(x), line.get_color()) == (501, look["color"])
-        assert_allclose(value, shape(x, 0.0 * x))
+        assert_allclose(value, load_potential(shape, x, 0.0))
     exact, pyramids = pressure.lines
     x, p = exact.get_data()
     assert_allclose(p, np.sqrt(1.0 - x**2))
     nodes = np.arange(-8, 9) / 8
     assert_allclose(pyramids.get_data(), (nodes, np.sqrt(1.0 - nodes**2)))
-    for line, (shape, look) in zip(error.lines, shapes.values(), strict=False):
+    for line, (shape, look) in zip(error.lines, shapes.items(), strict=False):
         x, value = line.get_data()
         assert (len(x), line.get_color()) == (721, look["color"])
-        assert_allclose(
-            value[::90], 100.0 * plotting_influence.hertz_error(shape, 8, 8.0 * x[::90], 0.0 * x[::90])
-        )
+        assert_allclose(value[::90], 100.0 * displacement_errors(shape, 8, 8.0 * x[::90], 0.0 * x[::90]))
     assert len(error.lines) == len(shapes) + 1  # and the axis
     for column, line in enumerate(convergence.lines):
         meshes, values = line.get_data()
         assert meshes.tolist() == [5, 10, 20, 40]
         assert_allclose(
             values,
-            [
-                100.0 * plotting_influence.interpolation_error(mesh)[column]
-                for mesh in (5.0, 10.0, 20.0, 40.0)
-            ],
+            [100.0 * pressure_errors(mesh)[column] for mesh in (5.0, 10.0, 20.0, 40.0)],
         )
     assert len(convergence.lines) == 2
+
+
+def test_figure_of_the_elements_shows_solids_and_displacements() -> None:
+    figure = plotting_influence.load_elements(0.2)
+    drawn.assert_painted(figure)
+    panels = [axes for axes in figure.axes if axes.get_title().startswith("(")]
+    assert [axes.get_title()[1] for axes in panels] == list("abcdefgh")
+    faces = [len(panels[k].collections) for k in (0, 2, 3)]
+    assert faces == [2, 12, 12]  # a face and an arrow of each element
+    tops = [np.asarray(axes.collections[0].levels)[-1] for axes in panels[4:]]
+    # mirror images: the largest displacement of element 2 is that of element 6
+    assert tops[2] == pytest.approx(tops[3])
+    # the largest displacement by an element is above that at its corner, a sixth of the pyramid's
+    normal, shear = pyramid_functions(0.0, 0.0, 0.2).C / 6, pyramid_functions(0.0, 0.0, 0.2).G / 6
+    assert normal < tops[0] < 3 * normal
+    assert shear < tops[1] < 3 * shear
+
+
+def test_figure_of_load_models_adds_triangles() -> None:
+    panels = plotting_influence.load_models(5).axes
+    *triangles, total = panels[3].lines[1:]
+    assert len(triangles) == 5
+    place, height = total.get_data()
+    added = sum(np.interp(place, *line.get_data(), 0.0, 0.0) for line in triangles)
+    assert_allclose(added, height, atol=1e-12)
+    assert_allclose(panels[1].patches[0].get_data().values, height[1:-1])

@@ -10,7 +10,9 @@ import xarray
 from numpy.testing import assert_array_equal
 
 from hexcontact.core.lattice import Lattice
-from hexcontact.result.result import Layout, Metadata, Result, Step, assemble, window_of
+from hexcontact.result.layout import Layout, Metadata, assemble, window_of
+from hexcontact.result.result import Result
+from hexcontact.result.step import Step
 from hexcontact.variables import ESTIMATED, VARIABLES
 
 SMALL = Lattice(spacing=1e-4, row_first=-2, col_first=-3, n_row=5, n_col=6, origin=(1e-5, 0.0))

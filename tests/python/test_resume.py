@@ -17,11 +17,12 @@ import xarray
 
 import hexcontact
 from hexcontact import Case, ConvergenceError, DeckError, ResourceError
-from hexcontact.core import contact as native
+from hexcontact.core import contact
 from hexcontact.result import store as store_module
-from hexcontact.result.journal import read_record, write_record
-from hexcontact.result.result import Metadata, Step
-from hexcontact.result.store import Journal, Store, journal_of, open_result
+from hexcontact.result.journal import Journal, journal_of, read_record, write_record
+from hexcontact.result.layout import Metadata
+from hexcontact.result.step import Step
+from hexcontact.result.store import Store, open_result
 
 RECORD_KB = 100
 SPHERE = {"young_modulus": 432e9, "poisson_ratio": 0.32, "surface": {"shape": "sphere", "radius": 1e-3}}
@@ -197,7 +198,7 @@ def test_a_gap_given_in_python_is_given_again(tmp_path: Path) -> None:
     out = tmp_path / "cut.nc"
     case().run(tmp_path / "whole.nc")
     stopped(case(), out, 2)
-    with pytest.raises(DeckError, match=r"given in Python; go on there: hexcontact\.resume\(.*, case=case\)"):
+    with pytest.raises(DeckError, match=r"in Python; resume there: hexcontact\.resume\(.*, case=case\)"):
         hexcontact.resume(out)
     with pytest.raises(DeckError, match="decks differ"):
         hexcontact.resume(out, case=made())
@@ -209,22 +210,22 @@ def test_a_gap_given_in_python_is_given_again(tmp_path: Path) -> None:
 
 def test_further_steps_may_be_solved_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out.nc"
-    original = native.NormalContact.solve
+    original = contact.NormalContact.solve
 
-    def solve(self: native.NormalContact, **arguments: Any) -> native.NormalSolution:
+    def solve(self: contact.NormalContact, **arguments: Any) -> contact.NormalSolution:
         missed = arguments.get("normal_load") == 20.0 and arguments["tolerance"] < 1e-7
         return dataclasses.replace(original(self, **arguments), converged=not missed)
 
-    monkeypatch.setattr(native.NormalContact, "solve", solve)
+    monkeypatch.setattr(contact.NormalContact, "solve", solve)
     with pytest.raises(ConvergenceError) as caught:
         made(**KINDS["frictionless"]).run(out)
     assert re.search(
-        r"2 of 3 load steps .* to go on: hexcontact resume \S*out\.nc$", caught.value.__notes__[0]
+        r"2 of 3 load steps .* to resume: hexcontact resume \S*out\.nc$", caught.value.__notes__[0]
     )
     with pytest.raises(ConvergenceError, match="step 3 of 3 did not converge"):
         hexcontact.resume(out)
     for key in ("friction.coefficient", "solver.coupling", "solver", "load.1.steps"):
-        with pytest.raises(DeckError, match=rf"{key}: a run that goes on may only change how it is solved"):
+        with pytest.raises(DeckError, match=rf"{key}: a resumed run may only change how it is solved"):
             hexcontact.resume(out, overrides={key: 1})
     assert "did not converge" in open_result(out).dataset.attrs["stopped"]
 
@@ -341,7 +342,7 @@ def test_another_version_is_warned_of(tmp_path: Path) -> None:
     out = tmp_path / "out.nc"
     stopped(made(), out, 2)
     rewritten(out, lambda metadata, step: (dataclasses.replace(metadata, version="0.1.9"), step))
-    with pytest.warns(UserWarning, match=r"started by hexcontact 0\.1\.9 and goes on with"):
+    with pytest.warns(UserWarning, match=r"started by hexcontact 0\.1\.9 and is resumed by"):
         result = hexcontact.resume(out)
     assert "started by hexcontact 0.1.9" in result.dataset.attrs["history"]
 
@@ -438,16 +439,27 @@ def test_after_a_full_disk_the_run_goes_on(
 # --- killed -----------------------------------------------------------------------------------------
 
 
-def test_runs_killed_at_random_moments_go_on(tmp_path: Path) -> None:
-    """50 runs, each killed up to three times, in the course of its time or of what it does to the disk."""
-    command = [sys.executable, str(Path(__file__).with_name("killed_runs.py")), str(tmp_path), "50", "7"]
+@pytest.mark.parametrize(("seed", "words"), [*((seed, []) for seed in range(7, 12)), (3, ["wear"])])
+def test_runs_killed_at_random_moments_go_on(tmp_path: Path, seed: int, words: list[str]) -> None:
+    """10 runs, each killed up to three times, in the course of its time or of what it does to the disk.
+
+    Each of some 40 processes has a minute, however busy the machine is; all together have half an hour.
+    """
+    command = [
+        sys.executable,
+        str(Path(__file__).with_name("killed_runs.py")),
+        str(tmp_path),
+        "10",
+        str(seed),
+        *words,
+    ]
     environ = {**environment(), "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, env=environ, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, env=environ, timeout=1800)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     *runs, kills = done.stdout.splitlines()
-    assert len(runs) == 50
-    assert int(kills.removeprefix("kills ")) > 25  # about 75, fewer on a busy machine
-    for number in range(50):
+    assert len(runs) == 10
+    assert int(kills.removeprefix("kills ")) > 5  # about 15, fewer on a busy machine
+    for number in range(10):
         same(tmp_path / f"{number}.nc", tmp_path / "whole.nc")
         assert not journal_of(tmp_path / f"{number}.nc").exists()
 
@@ -501,15 +513,14 @@ def test_a_signal_ends_the_run_and_resume_goes_on(tmp_path: Path, sent: signal.S
         command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=environment()
     ) as process:
         assert process.stderr
-        for _ in range(4):
-            process.stderr.readline()
+        assert any(re.match("step +3/", line) for line in process.stderr)  # after title and doubts
         process.send_signal(sent)
         told = process.stderr.read()
     assert process.returncode == code
     assert "Traceback" not in told
     match = re.search(
-        r"interrupted; (\d+) of 60 load steps are finished and kept in .*a sphere\.nc\.d; "
-        r"to go on: hexcontact resume '.*a sphere\.nc'\n$",
+        r"interrupted; (\d+) of 60 load steps are finished and recorded in .*a sphere\.nc\.d; "
+        r"to resume: hexcontact resume '.*a sphere\.nc'\n$",
         told,
     )
     assert match
@@ -542,7 +553,7 @@ def test_files_that_may_not_grow_stop_a_run_that_can_go_on(tmp_path: Path) -> No
     assert failed.returncode == 4, failed.stderr
     assert re.search(r"cannot write the output of .*sphere\.nc: ", failed.stderr)
     assert re.search(
-        r"4 of 4 load steps are finished and kept in .*; to go on: hexcontact resume", failed.stderr
+        r"4 of 4 load steps are finished and recorded in .*; to resume: hexcontact resume", failed.stderr
     )
     assert len(open_result(tmp_path / "sphere.nc")) == 4
     assert hexcontact_(tmp_path, "resume", "sphere.nc", "-q", limit=RECORD_KB).returncode == 4

@@ -101,7 +101,7 @@ def test_run_that_finds_no_memory_any_more_goes_on_later(tmp_path: Path) -> None
     )
     assert done.returncode == 4, done
     assert "memory" in done.stdout
-    assert "2 of 3 load steps are finished and kept" in done.stdout
+    assert "2 of 3 load steps are finished and recorded" in done.stdout
     for command in (["resume", "starved.nc"], ["run", "deck.toml", "-o", "fed.nc"]):
         subprocess.run([sys.executable, "-m", "hexcontact", *command], cwd=tmp_path, env=ENV, check=True)
     starved, fed = (open_result(tmp_path / f"{name}.nc") for name in ("starved", "fed"))

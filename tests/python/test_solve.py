@@ -16,13 +16,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
-from hexcontact.core import contact as native
-from hexcontact.core import memory
+from hexcontact.core import contact, memory
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
 from hexcontact.errors import ConvergenceError, DeckError, ResourceError, StopRun
-from hexcontact.result.result import Step
-from hexcontact.result.store import journal_of, open_result
+from hexcontact.result.journal import journal_of
+from hexcontact.result.step import Step
+from hexcontact.result.store import open_result
 from hexcontact.solve.events import Callback, Listener, Stopped
 from hexcontact.solve.progress import Lines, reporter
 from hexcontact.solve.steps import steps
@@ -209,7 +209,7 @@ def test_a_rigid_body_is_not_displaced() -> None:
 def test_memory_is_refused_before_it_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     case = sphere()
     monkeypatch.setattr(memory, "available", lambda: 1000)
-    monkeypatch.setattr(native, "NormalContact", None)  # must not be reached
+    monkeypatch.setattr(contact, "NormalContact", None)  # must not be reached
     rows, cols = case.lattice.shape
     message = rf"a window of {rows} x {cols} nodes \(method \w+\) needs .* GB of memory and 1e-06 GB are av"
     with pytest.raises(ResourceError, match=message):
@@ -219,17 +219,17 @@ def test_memory_is_refused_before_it_is_taken(monkeypatch: pytest.MonkeyPatch) -
 @pytest.fixture
 def stubborn(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Make the third solution of a case miss its tolerance."""
-    original = native.NormalContact.solve
+    original = contact.NormalContact.solve
     count = 0
 
-    def solved(self: native.NormalContact, **arguments: Any) -> native.NormalSolution:
+    def solved(self: contact.NormalContact, **arguments: Any) -> contact.NormalSolution:
         nonlocal count
         count += 1
         solution = original(self, **arguments)
         return replace(solution, converged=False, residual_normal=3e-5) if count == 3 else solution
 
     case = sphere(loads=[{"normal_load": 100.0, "steps": 5}])  # before: sizing the window solves too
-    monkeypatch.setattr(native.NormalContact, "solve", solved)
+    monkeypatch.setattr(contact.NormalContact, "solve", solved)
     yield case  # type: ignore[misc]
 
 
@@ -255,7 +255,7 @@ def test_an_output_in_the_way_is_refused_before_solving(
 ) -> None:
     case = sphere()
     (tmp_path / "out.nc").write_text("precious")
-    monkeypatch.setattr(native, "NormalContact", None)
+    monkeypatch.setattr(contact, "NormalContact", None)
     with pytest.raises(DeckError, match="exists already"):
         case.run(tmp_path / "out.nc")
     assert (tmp_path / "out.nc").read_text() == "precious"

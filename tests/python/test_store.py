@@ -28,9 +28,10 @@ from hexcontact.errors import DeckError, ResourceError
 from hexcontact.lock import Lock
 from hexcontact.result import journal as journal_module
 from hexcontact.result import store as store_module
-from hexcontact.result.journal import read_record
-from hexcontact.result.result import Metadata, Step, assemble
-from hexcontact.result.store import Journal, Store, journal_of, open_result
+from hexcontact.result.journal import Journal, journal_of, read_record
+from hexcontact.result.layout import Metadata, assemble
+from hexcontact.result.step import Step
+from hexcontact.result.store import Store, open_result
 
 
 def content(path: Path) -> dict[str, bytes]:
@@ -130,7 +131,7 @@ def test_a_file_can_be_open_many_times(out: Path) -> None:
 def test_what_xarray_writes_can_be_opened(out: Path) -> None:
     data = assemble(Metadata(planned_steps=2), [made_step(0), made_step(1)])
     data.to_netcdf(out)
-    assert_array_equal(open_result(out).pressure, data["pressure"])
+    assert open_result(out).dataset.identical(data)
 
 
 def test_an_unfinished_run_is_read_from_its_journal(out: Path) -> None:
@@ -166,10 +167,10 @@ def test_interim_outputs_cost_linear_time(out: Path, monkeypatch: pytest.MonkeyP
     reads = 0
     original = journal_module.read_record
 
-    def counted(path: Path) -> tuple[Metadata, Step]:
+    def counted(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
         nonlocal reads
         reads += 1
-        return original(path)
+        return original(path, companion)
 
     monkeypatch.setattr(journal_module, "read_record", counted)
     written(out, count=33, planned=34)
@@ -382,7 +383,7 @@ def test_a_step_that_cannot_be_committed_leaves_those_before(
     monkeypatch.undo()
     [note] = caught.value.__notes__
     assert note.startswith(
-        f"2 of 9 load steps are finished and kept in {journal_of(out)}; to go on: hexcontact "
+        f"2 of 9 load steps are finished and recorded in {journal_of(out)}; to resume: hexcontact "
     )
     assert sorted(p.name for p in journal_of(out).iterdir()) == ["000001.npz", "000002.npz", "stopped.txt"]
     assert_array_equal(open_result(out).pressure.sel(step=2), made_step(1).fields["pressure"])
@@ -419,7 +420,7 @@ def test_a_full_disk_is_told_apart_from_wrong_input(out: Path) -> None:
         sys.path[:0] = {[str(Path(__file__).parent), *sys.path]!r}
         from dataclasses import replace
         from test_store import WINDOW, made_step
-        from hexcontact.result.result import Metadata
+        from hexcontact.result.layout import Metadata
         from hexcontact.result.store import Store
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         with Store({str(out)!r}, Metadata(planned_steps=9), overwrite=True) as store:
@@ -452,7 +453,7 @@ WRITER = """
     sys.path[:0] = {path!r}
     from test_store import made_step
     from hexcontact.result import store
-    from hexcontact.result.result import Metadata
+    from hexcontact.result.layout import Metadata
     store.PUBLISH_INTERVAL = 0.0
     with store.Store({out!r}, Metadata(title="killed", planned_steps=40), overwrite={overwrite!r}) as running:
         for index in range(40):
@@ -514,7 +515,7 @@ def other_run(out: Path) -> Iterator[subprocess.Popen[str]]:
     program = f"""
         import sys
         sys.path[:0] = {sys.path!r}
-        from hexcontact.result.result import Metadata
+        from hexcontact.result.layout import Metadata
         from hexcontact.result.store import Store
         with Store({str(out)!r}, Metadata()):
             print("ready", flush=True)

@@ -26,10 +26,10 @@ from typer.testing import CliRunner
 import hexcontact
 from hexcontact import Case, DeckError
 from hexcontact.cli.app import app
-from hexcontact.deck import starters
 from hexcontact.deck.kinds import Whole
 from hexcontact.deck.model import extended, meaning
 from hexcontact.deck.toml import with_overrides
+from hexcontact.deck.write import starter
 from hexcontact.result.store import Store
 from hexcontact.solve.events import Callback, Listener
 from hexcontact.solve.run import metadata_of, run_into
@@ -199,6 +199,11 @@ WRONG = [
         r"ratio = \[0.1, -0.2\]: a logarithmic scale needs bounds above 0",
     ),
     ("word", {"solver.method": {"range": ["fft", "direct"], "count": 2}}, "needs a key that is a number"),
+    (
+        "shares",
+        {"load.1.tangential_load_x": {"range": ["0.2 mu P", "0.8 mu P"], "count": 2}},
+        "expected values instead",
+    ),
     ("twice", {"load.1.normal_load": ["1 N", 1.0]}, "has the value 1.0 twice"),
     ("empty", {"": [1]}, "expected a dotted key of the deck"),
     (
@@ -231,6 +236,18 @@ def test_one_invalid_case_stops_the_study_with_one_sentence(folder: Path) -> Non
     assert "load.2.tangential_load_x" in lines[1]
     assert "(in case 4: friction.coefficient = 0.05, body.1.poisson_ratio = 0.2)" in lines[1]
     assert not (folder / "study").exists()
+
+
+def test_a_fault_of_several_segments_is_one_sentence(folder: Path) -> None:
+    Path("deck.toml").write_text(starter("fretting"))  # a path of three segments with a tangential load
+    values = {"friction.coefficient": [0.3, 0.0], "body.1.poisson_ratio": [0.2, 0.3]}
+    with pytest.raises(DeckError) as refused:
+        Study("deck.toml", values)
+    [line] = str(refused.value).splitlines()
+    assert "path.1.tangential_load_x = 24.0: expected 0, or a [friction] table" in line
+    assert "(likewise in 2 more segments) (in case 3: friction.coefficient = 0.0" in line
+    invalid = Study("deck.toml", values, skip_invalid=True).invalid
+    assert [case.fault for case in invalid] == [line.partition(" (in case")[0]] * 2
 
 
 @pytest.mark.parametrize(
@@ -272,7 +289,7 @@ def test_study_in_processes_gives_what_single_runs_give(folder: Path) -> None:
         assert dataset.load_1_normal_load.attrs["units"] == "N"
         assert dataset.load_1_normal_load.attrs["deck_key"] == "load.1.normal_load"
         assert (dataset.status == 0).all()
-        assert dataset.status.attrs["flag_meanings"] == "done failed missing"
+        assert dataset.status.attrs["flag_meanings"] == "done failed missing invalid"
         alone = Case.from_toml("deck.toml", {"load.1.normal_load": 50.0, "body.1.surface.radius": 0.02}).run()
         there = dataset.sel(load_1_normal_load=50.0, radius=0.02)
         for name in ("approach", "max_pressure", "elastic_energy"):
@@ -472,7 +489,7 @@ def test_a_task_of_a_job_array_heeds_what_slurm_sends(folder: Path) -> None:
     _, told = process.communicate(timeout=30)
     assert process.returncode == 128 + signal.SIGUSR1
     assert re.search(r"^\S* *1/400 ", told, re.MULTILINE), told
-    assert "hexcontact: interrupted; the finished load steps of case 1 are kept" in told
+    assert "hexcontact: interrupted; the finished load steps of case 1 are recorded" in told
     assert Case.from_text(LONG, "deck.toml").title == hexcontact.open_result("study/0001.nc").case_title
 
 
@@ -523,7 +540,7 @@ def test_a_study_that_is_stopped_goes_on_where_it_was(
     if number != signal.SIGKILL:
         assert "leaked" not in told
         assert process.returncode == 128 + number
-        assert "interrupted; 1 of 2 cases are finished and kept in study/" in told
+        assert "interrupted; 1 of 2 cases are finished and recorded in study/" in told
     psutil.wait_procs([worker], timeout=10)
     assert not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE
     assert not Path("study/0002.json").exists()
@@ -806,21 +823,33 @@ def test_example_is_a_good_study(folder: Path) -> None:
 
 def test_page_about_studies_runs_as_it_stands(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = (CASES.parent / "docs/studies.md").read_text()
-    first, *_ = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    first, together, *_ = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     (folder / "study.toml").write_text(first)
-    coarse = starters.text("fretting").replace("nodes_in_radius = 20", "nodes_in_radius = 6")
+    (folder / "together.toml").write_text(together)
+    (folder / "more_friction.toml").write_text(first.replace("[0.3, 0.45, 0.6]", "[0.7]"))
+    coarse = starter("fretting").replace("nodes_in_radius = 20", "nodes_in_radius = 6")
     coarse = re.sub(r"steps = \d+", "steps = 2", coarse)
     (folder / "fretting.toml").write_text(coarse)
     solved = at_once(monkeypatch)
     assert command("study.toml").returncode == 0
     assert len(solved) == 12
-    reading, script = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    done = command("together.toml", "--plan")
+    assert done.returncode == 0
+    assert "together: 4 cases, 4 missing" in done.stdout
+    assert command("more_friction.toml").returncode == 0
+    solved.clear()
+    reading, combined, script, tied = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     names: dict[str, Any] = {"__name__": "__main__"}
     exec(reading, names)
     names["study"].close()
+    exec(combined, names)
+    assert names["whole"].friction_coefficient.values.tolist() == [0.3, 0.45, 0.6, 0.7]
+    names["whole"].close()
     exec(script.replace('"study.nc"', '"again.nc"'), names)
-    assert len(solved) == 18
+    assert len(solved) == 6
     assert (names["data"].status == 0).all()
+    exec(tied, names)
+    assert names["study"].states() == ["missing", "invalid", "missing"] * 2
 
 
 def test_outcome_of_whatever_goes_wrong_is_told_not_raised(

@@ -2,11 +2,13 @@
 
 import math
 import pickle
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pytest
 
+from hexcontact.case import Case
 from hexcontact.deck.kinds import Quantity
 from hexcontact.deck.model import meaning
 from hexcontact.deck.schema import deck_schema
@@ -15,6 +17,7 @@ from hexcontact.deck.surfaces import (
     Cone,
     Cylinder,
     Flat,
+    FormulaSurface,
     Paraboloid,
     Power,
     Punch,
@@ -29,6 +32,7 @@ from hexcontact.deck.tables import Body
 from hexcontact.deck.units import NUMBER
 from hexcontact.errors import DeckError
 
+ROOT = Path(__file__).parents[2]
 SOME = [
     Flat(),
     Sphere(radius=2.0),
@@ -39,6 +43,7 @@ SOME = [
     Power(exponent=3, coefficient=2.0),
     Punch(radius=1.5),
     RoundedPunch(flat_radius=0.6, edge_radius=10.0),
+    FormulaSurface(expression="min(x**2, (x + 1)**2 + 0.1)/4 + y**2"),
 ]
 
 
@@ -57,6 +62,8 @@ SOME = [
         # axis 1 along y: x is now across it
         (Paraboloid(radius_x=4.0, radius_y=1.0, angle="90 deg"), 2.0, 3.0, 9 / 8 + 4 / 2),
         (Cylinder(radius=0.5), 7.0, 3.0, 9.0),
+        (FormulaSurface(expression="min((x - 1)**2, (x + 1)**2 + 0.1)/4 + y**2"), -1.0, 3.0, 9.025),
+        (FormulaSurface(expression="0.5", offset=(1.0, 2.0)), -1.0, 3.0, 0.5),
         (Cylinder(radius=0.5, angle="90 deg"), 7.0, 3.0, 49.0),
         # distance of (1, 0) from a line at 30 degrees is 1/2
         (Cylinder(radius=0.5, angle="30 deg"), 1.0, 0.0, 0.25),
@@ -131,6 +138,7 @@ def test_all_shapes_of_the_deck_are_there() -> None:
         "power",
         "punch",
         "rounded_punch",
+        "formula",
     }
     assert set(SHAPES.values()) == {type(surface) for surface in SOME}
 
@@ -287,3 +295,43 @@ def test_a_new_shape_needs_its_class_and_a_word() -> None:
         del SHAPES["wedge"]
     with pytest.raises(ValueError, match=r"slope"):
         Wedge(slope=-1.0)
+
+
+def test_pads_of_a_deck_are_those_of_a_function() -> None:
+    """The deck of two pads, on a coarse lattice, against the same gap from Python."""
+    deck = Case.from_toml(ROOT / "cases/two_pads.toml", {"grid.spacing": 15e-6})
+    from_deck = deck.run().dataset
+
+    def gap(x: Any, y: Any) -> Any:
+        return np.minimum((x + 0.25e-3) ** 2, (x - 0.25e-3) ** 2 + 3e-9) / 2e-2 + y**2 / 2e-2
+
+    steel = {"young_modulus": 210e9, "poisson_ratio": 0}
+    loads = [{"normal_load": 40.0}, {"tangential_load_x": "0.9 mu P", "steps": 3}]
+    extent = (1e-3, 0.5e-3)
+    same = Case(
+        body_1=steel,
+        body_2=steel,
+        gap=gap,
+        friction_coefficient=0.4,
+        spacing=15e-6,
+        extent=extent,
+        loads=loads,
+    )
+    other = same.run().dataset
+    for name in ("pressure", "traction_x", "gap"):
+        np.testing.assert_allclose(from_deck[name].values, other[name].values, rtol=1e-9, atol=1e-12)
+    pressure = from_deck["pressure"][-1]
+    left, right = (float(pressure.where(side).sum()) for side in (from_deck.x < 0, from_deck.x > 0))
+    assert left > 1.1 * right > 0
+
+
+@pytest.mark.parametrize("bad", ["x + z", "import os", "min(x)", "", 3.0, "x.y"])
+def test_bad_formula(bad: Any) -> None:
+    with pytest.raises(DeckError, match=r"expression.*expected a formula of x and y in m") as caught:
+        FormulaSurface(expression=bad)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_formula_without_a_value() -> None:
+    with pytest.raises(DeckError, match="NaN"):
+        Case.from_toml(ROOT / "cases/two_pads.toml", {"body.1.surface.expression": "sqrt(x)"}).run()

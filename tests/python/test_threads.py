@@ -27,8 +27,7 @@ from hexcontact import (
     Step,
     open_result,
 )
-from hexcontact.core import contact as native
-from hexcontact.core import friction as native_friction
+from hexcontact.core import contact, friction
 from hexcontact.core.contact import ElasticPair, Method
 from hexcontact.deck.surfaces import Sphere
 
@@ -169,7 +168,7 @@ def test_python_goes_on_while_the_core_works(
 ) -> None:
     """Were the interpreter locked, there would be no tick for as long as a call takes at the least."""
     call = work()
-    module = native_friction if work is shear else native
+    module = friction if work is shear else contact
     core = Timed(module._api)
     monkeypatch.setattr(module, "_api", core)
     least = math.inf

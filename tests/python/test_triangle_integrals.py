@@ -223,7 +223,7 @@ def test_wrong_points_and_vertices(vertices, x, y, words):
     ("change", "words"),
     [
         ({"load": "cubic"}, "load = 'cubic'.*'bilinear'"),
-        ({"load": ["constant"]}, "load = .*expected one of"),
+        ({"load": ["constant"]}, "load = .*expected 'constant' or"),
         ({"direction": "z"}, "direction = 'z'.*'normal'"),
         ({"shear_modulus": 0.0}, "shear modulus.*positive"),
         ({"shear_modulus": np.nan}, "shear_modulus = nan: expected a number"),

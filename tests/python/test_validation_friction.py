@@ -1,6 +1,7 @@
 """The checks of tests/validation with friction, at sizes that are quick, and that they can fail."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,13 +16,18 @@ from validation import (
     no_slip,
     plane,
     runs,
+    second_solutions,
+    superposition,
     tangential,
     unloading,
 )
 from validation.reference import Comparison, reference
 
+from hexcontact import Case
 from hexcontact.analytic.friction import PlaneCattaneo, goodman_stick_ratio_plane
 from hexcontact.deck.surfaces import Sphere
+
+CASES = Path(__file__).parents[2] / "cases"
 
 
 def failures(comparison: Comparison) -> list[str]:
@@ -142,10 +148,75 @@ def test_prescribed_shift_and_torsion() -> None:
     assert judged(comparison) == 4 * 3
 
 
+def test_superposed_contacts() -> None:
+    comparison = superposition.superposition(mesh=12)
+    assert failures(comparison) == []
+    assert judged(comparison) == 3 * 7 + 5 + 4 + 2
+
+
+def test_superposition_needs_equal_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a Poisson's ratio of 0.3 a transverse traction appears, and the superposition is off."""
+    monkeypatch.setattr(superposition, "bodies", lambda beta, _, surface: runs.bodies(beta, 0.43, surface))
+    failed = failures(superposition.superposition(mesh=12))
+    assert sum("μ(p - p*)" in each for each in failed) == 4
+
+
+def test_search_for_second_solutions() -> None:
+    """Random starts, which the solver leaves by different ways, end in one solution."""
+    found = second_solutions.search(0.5, 1.0, 0.5, starts=4)
+    assert found.converged == found.starts == 8
+    assert len(found.solutions) == 1
+    assert len(found.sweeps) > 1
+    # other loads are other solutions
+    other = second_solutions.search(0.5, 1.0, 0.4, starts=1)
+    assert second_solutions.difference(found.solutions[0], other.solutions[0]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("load", "share", "same"), [(66.0, 0.65, True), (54.0, 0.5, True), (84.0, 0.5, False)]
+)
+def test_static_answers_hold_above_the_line_of_friction(load: float, share: float, same: bool) -> None:
+    """From (60 N, 9 N), mu = 0.3: with dQ >= mu dP slip only goes on, below it the stick zone grows."""
+    changes = {
+        "load.3.normal_load": load,
+        "load.3.tangential_load_x": f"{share} mu P",
+        "grid.nodes_in_radius": 8,
+    }
+    case = Case.from_toml(CASES / "path_dependence.toml", overrides=changes)
+    incremental, static = (
+        case.changed({"solver.algorithm": algorithm}).run().step(-1)
+        for algorithm in ("incremental", "static")
+    )
+    scale = 0.3 * float(incremental.max_pressure)
+    apart = float(abs(incremental.traction_x - static.traction_x).max()) / scale
+    assert apart < 1e-6 if same else apart > 0.1
+
+
 def test_long_contact() -> None:
     comparison = plane.cattaneo((0.33,), (0.5,))
     assert failures(comparison) == []
-    assert judged(comparison) == 2
+    assert judged(comparison) == 3
+
+
+def test_plane_problem_of_the_long_contact() -> None:
+    """Without mismatch it is Cattaneo's; pressed, its stick strip is that of Spence's formula."""
+    [state] = plane.sheared_strips(0.0, 0.3, [0.5], steps=1)
+    exact = PlaneCattaneo(0.3, 0.5 * math.pi, 1.0).traction(state.y, 0.15 * 0.5 * math.pi)
+    assert state.stick == pytest.approx((-math.sqrt(0.5), math.sqrt(0.5)), abs=0.01)
+    assert state.traction == pytest.approx(exact / 0.3, abs=0.05)  # in single strips at the kinks
+    assert np.abs(state.traction - exact / 0.3).mean() < 2e-3
+    for beta in (-0.189, -0.3):
+        [state] = plane.sheared_strips(beta, 0.2, [1e-4])
+        assert -state.stick[0] == pytest.approx(goodman_stick_ratio_plane(beta, 0.2), abs=0.02)
+
+
+def test_long_contact_of_dissimilar_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
+    comparison = plane.dissimilar(((-0.3, 0.2),), steps=10)
+    assert failures(comparison) == []
+    assert judged(comparison) == 1 + 3 * 3
+    strips = plane.sheared_strips
+    monkeypatch.setattr(plane, "sheared_strips", lambda beta, mu, shares: strips(0.5 * beta, mu, shares))
+    assert len(failures(plane.dissimilar(((-0.3, 0.2),), steps=10))) >= 3
 
 
 def test_fretting() -> None:

@@ -5,8 +5,9 @@ import math
 import tomllib
 from importlib import resources
 
+import numpy as np
 import pytest
-from validation import checks, normal, runs
+from validation import checks, fatigue, normal, runs
 from validation import reference as table_of_references
 from validation.reference import TABLE, Comparison, reference
 from validation.run import markdown
@@ -135,7 +136,7 @@ def test_an_installation_is_tested_by_known_solutions() -> None:
         comparison = check.run()
         assert failures(comparison) == []
         assert all(row.passed for row in comparison.rows)
-    assert list(verify.self_test()) == ["spheres", "spheres-direct", "shear", "fretting"]
+    assert list(verify.self_test()) == ["spheres", "spheres-direct", "shear", "fretting", "interface"]
 
 
 def test_values_of_the_self_test_are_those_of_the_references() -> None:
@@ -144,8 +145,10 @@ def test_values_of_the_self_test_are_those_of_the_references() -> None:
     with TABLE.open(newline="", encoding="utf-8") as stream:
         rows = [row for row in csv.DictReader(stream) if row["unit"] in verify.UNITS]
     known = [reference(row["case"], row["quantity"]).reference for row in rows] + [1000.0]  # N, given
+    layers = np.loadtxt(TABLE.with_name("interface.csv"), delimiter=",", skiprows=2, usecols=(2, 3))
+    known += [number for approach, peak in layers for number in (approach, peak * 2 / math.pi)]
     found = [value["value"] for value in values if value["source"] == "reference"]
-    assert len(found) == 10
+    assert len(found) == 12
     assert all(any(math.isclose(value, row, rel_tol=1e-12) for row in known) for value in found)
     pair = ElasticPair.from_materials(71.1e9, 0.0, 71.1e9, 0.0)
     hertz = runs.hertz_of(pair, 4000.0, 12.5e-3)
@@ -158,8 +161,8 @@ def test_values_of_the_self_test_are_those_of_the_references() -> None:
 # ----------------------------------------------------------------------------------- the checks
 
 
-def test_kernels_and_materials() -> None:
-    for check in (checks.kernels, checks.materials):
+def test_kernels_materials_and_fatigue() -> None:
+    for check in (checks.kernels, checks.materials, fatigue.parameters):
         comparison = check()
         assert failures(comparison) == []
         assert all(row.passed for row in comparison.rows)

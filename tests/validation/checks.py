@@ -62,10 +62,18 @@ _ALL = (
         "Influence functions of the pyramid",
         "The five kernels at lattice points. Pictures, made by `make pictures`: "
         "[displacements of the pyramid](images/pyramid.png), as in Figure 5.6; "
-        "[the pyramid beside other load shapes](images/load_shapes.png), as in Figure 7.3.",
+        "[its elements](images/elements.png), as in Figures 4.5, 5.2 and 5.5; "
+        "[the pyramid beside other load shapes](images/load_shapes.png), as in Figure 7.3; "
+        "[a load in two dimensions](images/load_models.png), as in Figures 7.3 and 7.4.",
         kernels,
     ),
     Check("materials", "Pairs of materials", "Constants of the pairs of sections 9.2 and 9.3.", materials),
+    Check(
+        "fatigue",
+        "Fatigue parameters",
+        "Tension, torsion and both out of phase, about axes turned at random, against closed forms.",
+        _of("fatigue", "parameters"),
+    ),
     Check(
         "table-9.2",
         "Two spheres on five meshes (Tables 9.1 and 9.2)",
@@ -91,10 +99,71 @@ _ALL = (
         _of("error_bars", "error_bars"),
     ),
     Check(
+        "hard-error-bars",
+        "Estimated discretization errors of problems without a closed-form solution",
+        "How many errors of every load step lie within the estimated ones, against one fine lattice.",
+        _of("hard_problems", "hard_error_bars"),
+    ),
+    Check(
+        "step-bounds",
+        "Bounds on the errors of adaptive load steps",
+        "How many errors of stick area and tractions lie within the recorded bounds, in every load step.",
+        _of("hard_problems", "step_bounds"),
+    ),
+    Check(
         "profiles",
         "Cone, powers and punches",
-        "Axisymmetric contacts with closed solutions.",
+        "Axisymmetric contacts with closed-form solutions.",
         _of("normal", "profiles"),
+    ),
+    Check(
+        "superposition",
+        "Cone, power, punches and an own surface with friction (chapter 10)",
+        "Alike bodies with ν = 0 sheared: differences of frictionless contacts, exact on every lattice "
+        "(Jaeger, Ciavarella).",
+        _of("superposition", "superposition"),
+    ),
+    Check(
+        "interface",
+        "Compliant interface (chapter 11)",
+        "A sphere on layers p = c ψ^m, with E* = R = 1 and P = 4/3, extrapolated from two lattices; stiff "
+        "layers against (C6), which adds (m/(m+1)) (p0/c)^(1/m) to Hertz's approach. "
+        "[Convergence to contact without a layer](images/interface.png).",
+        _of("interface", "spheres"),
+    ),
+    Check(
+        "interface-flats",
+        "Rigid flats on a layer (chapter 11)",
+        "P = A c ψ^m, and in full slip Q = A c_t ψ^m_t by the interface's own limit (11.29); exact.",
+        _of("interface", "flats"),
+    ),
+    Check(
+        "interface-stiff",
+        "Compliant interface as it stiffens",
+        "Differences from contact without a layer, μ = 0.3, Q = 0.4 μP, a/l_e = 20, each within a multiple "
+        "of (C6); and the interface's own limit with c_t = μ c against μp. "
+        "[Convergence](images/interface.png).",
+        _of("interface", "stiff_limit"),
+    ),
+    Check(
+        "friction-by-radius",
+        "Friction that varies with the radius",
+        "Full slip by a shift and by a twist, against integrals of μ(r) times Hertz's pressure.",
+        _of("friction_laws", "by_radius"),
+    ),
+    Check(
+        "friction-direction",
+        "Friction with a direction",
+        "Full slip with two coefficients, and the limit of equal ones.",
+        _of("friction_laws", "direction"),
+    ),
+    Check(
+        "wear",
+        "Wear by cycles",
+        "Volume of the dissipated work (V2); a sphere in partial slip at a constant approach, worn until "
+        "only the disc that sticks carries, (V5); the flat of a sphere in gross slip, constant load, (V6), "
+        "which holds where the surface wears by more than it deforms.",
+        _of("wear", "wear"),
     ),
     Check(
         "control",
@@ -190,9 +259,53 @@ _ALL = (
     ),
     Check(
         "long-contact-dissimilar",
-        "Middle of a long contact of dissimilar bodies, pressed, then sheared",
-        "Stick in the mid-plane against the plane solution.",
+        "Middle of a long contact of dissimilar bodies, pressed, then sheared (Figure 13.3)",
+        "Stick and tractions in the mid-plane against plane solutions.",
         _of("plane", "dissimilar"),
+    ),
+    Check(
+        "below",
+        "Stress below Hertz's contact and a sliding sphere",
+        "Largest error of the six stresses, 40 spacings in the radius, of both sources of tractions.",
+        _of("subsurface", "closed_forms"),
+    ),
+    Check(
+        "pyramids-below",
+        "Influence functions below the surface",
+        "Displacement and stress of the unit pyramid, near creases and vertices and out to 1e5 spacings.",
+        _of("subsurface", "influence_functions"),
+    ),
+    Check(
+        "bulk-plane",
+        "Bulk stress: the shifted stick strip (Nowell and Hills)",
+        "Long contact under tangential load and bulk stress across it, with slip of one sign and of both; "
+        "the mid-plane against plane solutions.",
+        _of("bulk", "plane"),
+    ),
+    Check(
+        "bulk-plane-cycle",
+        "Bulk stress and tangential load in phase (Nowell and Hills)",
+        "A cycle of the long contact: the strips of loading, unloading and loading again.",
+        _of("bulk", "cycle_in_plane"),
+    ),
+    Check(
+        "bulk",
+        "Bulk stress: the shifted stick disc",
+        "Sphere under tangential load and bulk stress, exact for ν = 0, driven by force and by displacement.",
+        _of("bulk", "disc"),
+    ),
+    Check(
+        "bulk-large",
+        "Large bulk stress, slip of both signs",
+        "Spheres strained in one step, ν = 0 and 0.3, against values of another program.",
+        _of("bulk", "single_steps"),
+    ),
+    Check(
+        "bulk-cycles",
+        "Cyclic bulk stress in phase, in quadrature and in counter-phase",
+        "Spheres with ν = 0: shift, stick disc and energy of a cycle against (C10) and (C11), balance of "
+        "work, symmetry of the half cycles.",
+        _of("bulk", "cycles"),
     ),
     Check(
         "fretting",

@@ -1,0 +1,279 @@
+!> Displacement and stress below the surface against 20-digit values and against each other. Errors are relative to
+!> the envelopes 1/(4 pi max(1, R)) of the displacement and 1/(2 pi max(1, R)^2) of the stress.
+module test_interior
+  use hc_precision, only: wp, pi
+  use hc_error, only: error_t
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
+  use hc_interior_triangle, only: triangle_fields, mesh_fields
+  use hc_interior_points, only: fields_at_points
+  use hc_interior_planes, only: interior_planes_t, new_interior_planes
+  use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
+  use hc_stress_invariants, only: principal_stresses, von_mises
+  use testing, only: test_t, new_test, check, check_true, open_table
+  implicit none
+  private
+
+  public :: collect_interior
+
+  !> Better than what is promised (1e-12)
+  real(wp), parameter :: thr = 1.0e-13_wp
+
+contains
+
+  subroutine collect_interior(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('pyramid', test_pyramid), &
+      new_test('single triangles', test_triangles), &
+      new_test('creases and vertices', test_creases), &
+      new_test('oblique lattices', test_oblique), &
+      new_test('planes', test_planes), &
+      new_test('second body', test_second_body), &
+      new_test('principal stresses', test_principal), &
+      new_test('bad arguments', test_arguments) &
+    ]
+  end subroutine collect_interior
+
+  !> Displacements and stresses by the three loads in one row, as the tables have them, over the envelopes.
+  pure function in_a_row(displacement, stress, radius) result(row)
+    real(wp), intent(in) :: displacement(3, 3), stress(6, 3), radius
+    real(wp) :: row(27)
+    integer :: load
+
+    associate (envelope => max(1.0_wp, radius))
+      row = [(4.0_wp*pi*envelope*displacement(:, load), 2.0_wp*pi*envelope**2*stress(:, load), load=1, 3)]
+    end associate
+  end function in_a_row
+
+  !> Every row of pyramid_stress.csv.
+  subroutine test_pyramid(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    type(interior_pyramid_t) :: pyramid
+    type(error_t), allocatable :: raised
+    character(len=8) :: kind
+    real(wp) :: i, j, at(3), nu, expected(9, 3), u(3, 3, 1), s(6, 3, 1), radius
+    integer :: unit, stat, id, n_row
+
+    call open_table('pyramid_stress.csv', unit, error)
+    if (allocated(error)) return
+    call new_interior_pyramid(pyramid, equilateral_basis(1.0_wp))
+    n_row = 0
+    do
+      ! i and j are empty in some rows
+      i = 0.0_wp
+      j = 0.0_wp
+      read (unit, *, iostat=stat) id, kind, i, j, at, nu, expected
+      if (stat /= 0) exit
+      n_row = n_row + 1
+      call pyramid%fields(at(1:1), at(2:2), at(3:3), nu, u, s, raised)
+      radius = norm2(at)
+      call check(error, in_a_row(u(:, :, 1), s(:, :, 1), radius), in_a_row(expected(1:3, :), expected(4:9, :), radius), &
+                 thr, trim(kind)//' point')
+      if (allocated(error)) exit
+    end do
+    close (unit)
+    if (.not. allocated(error)) call check(error, n_row, 188, 'rows of pyramid_stress.csv')
+  end subroutine test_pyramid
+
+  !> Every row of triangle_stress.csv.
+  subroutine test_triangles(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    type(error_t), allocatable :: raised
+    real(wp) :: corner(2, 3), load(3), at(3), nu, expected(9, 3), u(3, 3, 1), s(6, 3, 1), value(3), volume, radius
+    integer :: unit, stat, id, n_row
+
+    call open_table('triangle_stress.csv', unit, error)
+    if (allocated(error)) return
+    n_row = 0
+    do
+      read (unit, *, iostat=stat) id, corner, load, at, nu, expected
+      if (stat /= 0) exit
+      n_row = n_row + 1
+      value = load(1) + load(2)*corner(1, :) + load(3)*corner(2, :)
+      call triangle_fields(corner, value, at(1:1), at(2:2), at(3:3), nu, u, s, raised)
+      radius = norm2(at - [sum(corner, dim=2)/3.0_wp, 0.0_wp])
+      volume = 0.5_wp*abs((corner(1, 2) - corner(1, 1))*(corner(2, 3) - corner(2, 1)) &
+                          - (corner(1, 3) - corner(1, 1))*(corner(2, 2) - corner(2, 1)))*maxval(abs(value))
+      call check(error, in_a_row(u(:, :, 1), s(:, :, 1), radius)/volume, &
+                 in_a_row(expected(1:3, :), expected(4:9, :), radius)/volume, 1.0e-12_wp, 'triangle')
+      if (allocated(error)) exit
+    end do
+    close (unit)
+    if (.not. allocated(error)) call check(error, n_row, 32, 'rows of triangle_stress.csv')
+  end subroutine test_triangles
+
+  !> Beside creases and vertices, on the surface and next to it: the six triangles of the pyramid, another route.
+  subroutine test_creases(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), parameter :: offset(6) = [0.0_wp, 1.0e-17_wp, 1.0e-12_wp, 1.0e-7_wp, 1.0e-3_wp, 1.0_wp]
+    real(wp), parameter :: depth(6) = [0.0_wp, 1.0e-300_wp, 1.0e-17_wp, 1.0e-9_wp, 1.0e-4_wp, 1.0_wp]
+    type(interior_pyramid_t) :: pyramid
+    type(error_t), allocatable :: raised
+    real(wp) :: corner(2, 3, 6), traction(3, 3, 6), at(2), u(3, 3, 1), s(6, 3, 1), u_sum(3, 1), s_sum(6, 1), c
+    integer :: k, i, j, load, place
+
+    call new_interior_pyramid(pyramid, equilateral_basis(1.0_wp))
+    do k = 1, 6
+      corner(:, 1, k) = 0.0_wp
+      corner(:, 2, k) = [cos((k - 1)*pi/3.0_wp), sin((k - 1)*pi/3.0_wp)]
+    end do
+    corner(:, 3, :) = cshift(corner(:, 2, :), 1, dim=2)
+    do place = 1, 4
+      do i = 1, size(offset)
+        do j = 1, size(depth)
+          c = offset(i)
+          ! the apex, a spoke, a rim and the end of a spoke
+          select case (place)
+          case (1)
+            at = [c, 0.0_wp]
+          case (2)
+            at = [0.4_wp, c]
+          case (3)
+            at = [0.85_wp - c, 0.3_wp*sqrt(0.75_wp)]
+          case default
+            at = [1.0_wp, c]
+          end select
+          call pyramid%fields(at(1:1), at(2:2), depth(j:j), 0.3_wp, u, s, raised)
+          do load = 1, 3
+            traction = 0.0_wp
+            traction(load, 1, :) = 1.0_wp
+            call mesh_fields(corner, traction, at(1:1), at(2:2), depth(j:j), 0.3_wp, u_sum, s_sum, raised)
+            call check(error, [u(:, load, 1), s(:, load, 1)], [u_sum(:, 1), s_sum(:, 1)], 1.0e-12_wp, 'sum of triangles')
+            if (allocated(error)) return
+          end do
+        end do
+      end do
+    end do
+  end subroutine test_creases
+
+  !> Where the creases end and the moments begin, on any lattice.
+  subroutine test_oblique(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), parameter :: basis(2, 2, 3) = reshape( &
+      [1.0_wp, 0.0_wp, 0.2_wp, 0.6_wp, 0.8_wp, 0.6_wp, -0.6_wp, 0.8_wp, 0.6_wp, 0.8_wp, -0.4_wp, 0.9_wp], [2, 2, 3])
+    type(interior_pyramid_t) :: pyramid
+    type(error_t), allocatable :: raised
+    real(wp) :: way(3), inside(3), outside(3), u(3, 3, 2), s(6, 3, 2)
+    integer :: b, k
+
+    do b = 1, 3
+      call new_interior_pyramid(pyramid, basis(:, :, b))
+      do k = 1, 40
+        way = [cos(0.7_wp*k), sin(0.7_wp*k), 0.05_wp*(k - 1)]
+        way = way/norm2(way)
+        inside = 3.0_wp*(1.0_wp - 1.0e-13_wp)*pyramid%spacing*way
+        outside = 3.0_wp*(1.0_wp + 1.0e-13_wp)*pyramid%spacing*way
+        call pyramid%fields([inside(1), outside(1)], [inside(2), outside(2)], [inside(3), outside(3)], 0.3_wp, u, s, raised)
+        call check(error, in_a_row(u(:, :, 1), s(:, :, 1), 3.0_wp), in_a_row(u(:, :, 2), s(:, :, 2), 3.0_wp), &
+                   1.0e-12_wp, 'creases and moments')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_oblique
+
+  !> Planes by convolution are the sums at their nodes.
+  subroutine test_planes(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    type(lattice_t) :: lattice
+    type(interior_planes_t) :: planes
+    type(error_t), allocatable :: raised
+    real(wp) :: traction(9, 6, 3, 1), plane(9, 6, 6), x(9, 6), y(9, 6), u(3, 54, 1), s(6, 54, 1), depth(54)
+    real(wp) :: bases(2, 2, 2)
+    integer :: b, k, body
+
+    bases(:, :, 1) = equilateral_basis(0.2_wp)
+    bases(:, :, 2) = reshape([0.2_wp, 0.03_wp, 0.05_wp, 0.15_wp], [2, 2])
+    call random_number(traction)
+    do b = 1, 2
+      call new_lattice(lattice, bases(:, :, b), [-3, 2], [9, 6], raised, [0.3_wp, 0.1_wp])
+      call lattice%coordinates(x, y)
+      do body = 1, 2
+        call new_interior_planes(planes, lattice, body, 0.25_wp, raised)
+        do k = 0, 2
+          depth = 0.15_wp*k
+          call planes%set_depth(depth(1), raised)
+          call planes%apply(traction(:, :, :, 1), plane, raised)
+          call fields_at_points(lattice, traction, body, 0.25_wp, reshape(x, [54]), reshape(y, [54]), depth, u, s, raised)
+          call check(error, reshape(plane, [54*6]), reshape(transpose(s(:, :, 1)), [54*6]), 1.0e-13_wp, 'stress on a plane')
+          if (allocated(error)) return
+        end do
+      end do
+    end do
+  end subroutine test_planes
+
+  !> On the surface of both bodies the stress is the traction: sigma_zz = -p, sigma_az = -q_a.
+  subroutine test_second_body(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    type(lattice_t) :: lattice
+    type(error_t), allocatable :: raised
+    real(wp) :: traction(4, 4, 3, 2), u(3, 1, 2), s(6, 1, 2), at(2)
+    integer :: body
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [4, 4], raised)
+    call random_number(traction)
+    at = matmul(lattice%basis, [2.0_wp, 1.0_wp])
+    do body = 1, 2
+      call fields_at_points(lattice, traction, body, 0.2_wp, at(1:1), at(2:2), [0.0_wp], u, s, raised)
+      call check(error, reshape(s([zz, xz, yz], 1, :), [6]), reshape(-traction(3, 2, :, :), [6]), thr, 'surface')
+      if (allocated(error)) return
+    end do
+  end subroutine test_second_body
+
+  !> Known principal stresses, turned; von Mises from them.
+  subroutine test_principal(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    real(wp), parameter :: known(3, 4) = reshape([3.0_wp, 1.0_wp, -2.0_wp, 1.0_wp, 1.0_wp, -4.0_wp, 2.0_wp, 2.0_wp, 2.0_wp, &
+                                                  1.0_wp, 1.0e-9_wp, 0.0_wp], [3, 4])
+    real(wp) :: turn(3, 3), tensor(3, 3), s(6), a
+    integer :: k, i
+
+    do k = 1, 4
+      a = 0.4_wp*k
+      turn = matmul(reshape([cos(a), sin(a), 0.0_wp, -sin(a), cos(a), 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3]), &
+                    reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, cos(2*a), sin(2*a), 0.0_wp, -sin(2*a), cos(2*a)], [3, 3]))
+      tensor = 0.0_wp
+      do i = 1, 3
+        tensor(i, i) = known(i, k)
+      end do
+      tensor = matmul(turn, matmul(tensor, transpose(turn)))
+      s([xx, yy, zz, xy, yz, xz]) = [tensor(1, 1), tensor(2, 2), tensor(3, 3), tensor(1, 2), tensor(2, 3), tensor(1, 3)]
+      call check(error, principal_stresses(s), known(:, k), 1.0e-14_wp, 'principal stresses')
+      if (allocated(error)) return
+      call check(error, von_mises(s), von_mises([known(:, k), 0.0_wp, 0.0_wp, 0.0_wp]), 1.0e-14_wp, 'von Mises')
+      if (allocated(error)) return
+    end do
+  end subroutine test_principal
+
+  !> Points above the surface, materials and bodies that there are not.
+  subroutine test_arguments(error)
+    type(error_t), allocatable, intent(out) :: error
+
+    type(interior_pyramid_t) :: pyramid
+    type(interior_planes_t) :: planes
+    type(lattice_t) :: lattice
+    type(error_t), allocatable :: raised
+    real(wp) :: u(3, 3, 1), s(6, 3, 1)
+
+    call new_interior_pyramid(pyramid, equilateral_basis(1.0_wp))
+    call pyramid%fields([0.0_wp], [0.0_wp], [-1.0e-300_wp], 0.3_wp, u, s, raised)
+    call check_true(error, allocated(raised), 'a point above the surface is refused')
+    if (allocated(error)) return
+    call pyramid%fields([0.0_wp], [0.0_wp], [0.0_wp], 0.6_wp, u, s, raised)
+    call check_true(error, allocated(raised), 'a ratio of Poisson of 0.6 is refused')
+    if (allocated(error)) return
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [4, 4], raised)
+    call new_interior_planes(planes, lattice, 3, 0.3_wp, raised)
+    call check_true(error, allocated(raised), 'a third body is refused')
+  end subroutine test_arguments
+
+end module test_interior

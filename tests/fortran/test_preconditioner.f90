@@ -1,0 +1,164 @@
+!> Solvers with another operator and another preconditioner than the usual ones.
+module test_preconditioner
+  use hc_precision, only: wp
+  use hc_error, only: error_t
+  use hc_field_space, only: field_space_t
+  use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
+  use hc_preconditioner, only: preconditioner_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control
+  use hc_contact_problem, only: friction_problem_t
+  use hc_coulomb, only: coulomb_t
+  use hc_elastic_operators, only: operators_t, new_operators
+  use hc_frictional_contact, only: frictional_contact_t
+  use hc_lattice_solver, only: solve_on_lattice
+  use hc_normal_iterate, only: normal_iterate_t
+  use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_lattice_solver, only: solve_on_normal_lattice
+  use hc_pressure_kernel, only: normal_kernel_t
+  use test_friction, only: new_sphere
+  use testing, only: test_t, new_test, check, check_true
+  implicit none
+  private
+
+  public :: collect_preconditioner
+
+  !> Inverse of the diagonal of operator and springs.
+  type, extends(preconditioner_t) :: diagonal_preconditioner_t
+    !> Self-compliance of a node [m/Pa]
+    real(wp) :: own = 1.0_wp
+    !> Compliance of the springs along the first component [m/Pa]
+    real(wp), allocatable :: spring(:)
+    integer :: applications = 0
+  contains
+    procedure :: set_active
+    procedure :: apply
+  end type diagonal_preconditioner_t
+
+contains
+
+  subroutine collect_preconditioner(tests)
+    !> Tests of this suite
+    type(test_t), allocatable, intent(out) :: tests(:)
+
+    tests = [ &
+      new_test('diagonal', test_diagonal), &
+      new_test('diagonal_coupled', test_diagonal_coupled), &
+      new_test('diagonal_frictionless', test_diagonal_frictionless) &
+    ]
+  end subroutine collect_preconditioner
+
+  subroutine set_active(self, active, compliance, direction)
+    class(diagonal_preconditioner_t), intent(inout) :: self
+    logical, intent(in), contiguous :: active(:)
+    real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
+
+    self%spring = spread(0.0_wp, 1, size(active))
+    if (present(direction)) self%spring = [compliance, self%spring]
+  end subroutine set_active
+
+  subroutine apply(self, displacement, traction, work)
+    class(diagonal_preconditioner_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: displacement(:)
+    real(wp), intent(out), contiguous, target :: traction(:)
+    real(wp), intent(inout) :: work
+
+    traction = displacement/(self%own + self%spring)
+    work = work + 0.0_wp
+    self%applications = self%applications + 1
+  end subroutine apply
+
+  subroutine test_diagonal(error)
+    type(error_t), allocatable, intent(out) :: error
+    call compare(0.0_wp, 0.3_wp, error)
+  end subroutine test_diagonal
+
+  subroutine test_diagonal_coupled(error)
+    type(error_t), allocatable, intent(out) :: error
+    call compare(0.3_wp, 0.8_wp, error)
+  end subroutine test_diagonal_coupled
+
+  !> A step in partial slip with the explicit matrix and its diagonal is that with FFTs and the inverse symbol.
+  subroutine compare(beta, mu, error)
+    !> Coupling of pressure and shear, coefficient of friction
+    real(wp), intent(in) :: beta, mu
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(operators_t) :: usual, other
+    type(dense_flexibility_t), allocatable :: dense
+    type(diagonal_preconditioner_t), allocatable :: diagonal
+    type(contact_state_t) :: start, expected, found
+    type(load_target_t) :: target
+
+    call new_sphere(contact, 10, 0.2_wp, beta, coulomb_t(mu), error, n_threads=1)
+    if (allocated(error)) return
+    associate (problem => contact%problem)
+      call new_operators(usual, problem%lattice, problem%pair, field_space_t(), error)
+      if (allocated(error)) return
+      allocate (dense)
+      call new_dense_flexibility(dense, problem%lattice, problem%pair, error)
+      if (allocated(error)) return
+      call move_alloc(dense, other%flexibility)
+      allocate (diagonal)
+      diagonal%own = problem%normal_compliance
+      call move_alloc(diagonal, other%normal)
+      allocate (diagonal)
+      diagonal%own = problem%tangential_compliance
+      call move_alloc(diagonal, other%tangential)
+      target = load_target_t(spread(force_control, 1, 4), [1.0_wp, 0.15_wp*mu, 0.1_wp*mu, 0.05_wp*mu])
+      call new_friction_state(start, problem%lattice)
+      call solve_on_lattice(problem, usual, start, start%relative_displacement, target, 1.0e-10_wp, 60, expected, error)
+      if (allocated(error)) return
+      call solve_on_lattice(problem, other, start, start%relative_displacement, target, 1.0e-10_wp, 60, found, error)
+      if (allocated(error)) return
+    end associate
+    call check_true(error, expected%converged .and. found%converged, 'both converge')
+    if (allocated(error)) return
+    call check_true(error, all(expected%zone == found%zone), 'the same zones')
+    if (allocated(error)) return
+    call check(error, [found%pressure, found%traction], [expected%pressure, expected%traction], 1.0e-8_wp, 'tractions')
+    if (allocated(error)) return
+    select type (preconditioner => other%tangential)
+    type is (diagonal_preconditioner_t)
+      call check_true(error, preconditioner%applications > 0, 'the diagonal was taken')
+    end select
+  end subroutine compare
+
+  !> The frictionless solver, which works in single precision, takes the diagonal likewise.
+  subroutine test_diagonal_frictionless(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(normal_lattice_t) :: level(2)
+    type(normal_iterate_t) :: now(2)
+    type(normal_kernel_t) :: kernel
+    type(diagonal_preconditioner_t), allocatable :: diagonal
+    type(contact_state_t) :: state(2)
+    integer :: k
+
+    call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(0.0_wp), error, n_threads=1)
+    if (allocated(error)) return
+    do k = 1, 2
+      level(k)%lattice = contact%problem%lattice
+      level(k)%initial_gap = contact%problem%initial_gap
+      level(k)%candidate = contact%problem%candidate
+      allocate (level(k)%law, source=contact%problem%normal_law)
+      level(k)%pair = contact%problem%pair
+      call level(k)%prepare(kernel, .true., .true., field_space_t(), error)
+      if (allocated(error)) return
+      if (k == 2) then
+        allocate (diagonal)
+        diagonal%unit = level(k)%preconditioner%unit
+        ! a projected step takes M for nearly the inverse: the compliance of the whole contact
+        diagonal%own = 10.0_wp*contact%problem%normal_compliance
+        call move_alloc(diagonal, level(k)%preconditioner)
+      end if
+      allocate (state(k)%pressure, mold=level(k)%initial_gap)
+      state(k)%pressure = merge(1.0_wp, 0.0_wp, level(k)%candidate)
+      call solve_on_normal_lattice(level(k), now(k), force_control, 1.0_wp, 1.0e-10_wp, 400, state(k), error)
+      if (allocated(error)) return
+      call check_true(error, state(k)%converged, 'converged')
+      if (allocated(error)) return
+    end do
+    call check(error, [state(2)%pressure], [state(1)%pressure], 1.0e-8_wp, 'pressure')
+  end subroutine test_diagonal_frictionless
+
+end module test_preconditioner

@@ -1,0 +1,369 @@
+"""Fatigue quantities through Python: shapes, closed forms, what is refused."""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import threading
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+from hexcontact import DeckError, fatigue, open_result
+from hexcontact.cli.app import app
+from hexcontact.deck.below import cycle_of
+from hexcontact.interior import stress as stress_below
+
+PHASE = np.linspace(0.0, 2.0 * np.pi, 41)
+E, NU = 200e9, 0.3
+
+
+def torsion(amplitude: float) -> np.ndarray:
+    history = np.zeros((len(PHASE), 6))
+    history[:, 4] = amplitude * np.sin(PHASE)
+    return history
+
+
+def test_points_of_any_shape_are_those_one_by_one() -> None:
+    rng = np.random.default_rng(3)
+    histories = rng.normal(size=(2, 3, 12, 6)) * 1e8
+    plane = fatigue.findley(histories, 0.3)
+    assert plane.value.shape == (2, 3)
+    assert plane.normal.shape == (2, 3, 3)
+    single = fatigue.findley(histories[1, 2], 0.3)
+    assert single.value == plane.value[1, 2]
+    assert np.array_equal(single.normal, plane.normal[1, 2])
+    assert fatigue.crossland(histories, 0.2)[1, 0] == fatigue.crossland(histories[1, 0], 0.2)
+    transposed = np.moveaxis(np.ascontiguousarray(np.moveaxis(histories, 2, -1)), -1, 2)
+    assert np.array_equal(fatigue.dang_van(transposed, 0.2), fatigue.dang_van(histories, 0.2))
+
+
+def test_pure_torsion_has_closed_forms() -> None:
+    tau = 100e6
+    assert fatigue.crossland(torsion(tau), 0.4) == pytest.approx(tau, rel=1e-12)  # no hydrostatic stress
+    assert fatigue.dang_van(torsion(tau), 0.4) == pytest.approx(tau, rel=1e-12)
+    # Findley: tau cos 2a + k tau sin 2a on planes at a to the axis
+    assert fatigue.findley(torsion(tau), 0.4).value == pytest.approx(tau * np.hypot(1.0, 0.4), rel=2e-5)
+    # Smith, Watson & Topper: planes at 45 degrees, eps_n = (1 + nu) tau/E
+    plane = fatigue.smith_watson_topper(torsion(tau), E, NU)
+    assert plane.value == pytest.approx(tau**2 * (1.0 + NU) / E, rel=2e-5)
+    assert np.abs(plane.normal) == pytest.approx([0.0, 0.5**0.5, 0.5**0.5], abs=5e-3)
+
+
+def test_crossland_meets_both_limits_of_its_material() -> None:
+    t, b = 170e6, 260e6  # limits in torsion and in bending
+    slope = (t - b / np.sqrt(3.0)) / (b / 3.0)
+    bending = np.zeros((len(PHASE), 6))
+    bending[:, 0] = b * np.sin(PHASE)
+    assert fatigue.crossland(bending, slope) == pytest.approx(t, rel=1e-12)
+    assert fatigue.crossland(torsion(t), slope) == pytest.approx(t, rel=1e-12)
+
+
+def test_a_mean_stress_changes_what_it_should() -> None:
+    history = torsion(80e6)
+    raised = history + np.array([0, 60e6, 0, 0, 0, 0])
+    assert fatigue.crossland(raised, 0.0) == pytest.approx(float(fatigue.crossland(history, 0.0)), rel=1e-12)
+    assert fatigue.crossland(raised, 0.3) == pytest.approx(80e6 + 0.3 * 20e6, rel=1e-12)
+    assert (
+        fatigue.smith_watson_topper(raised, E, NU).value > fatigue.smith_watson_topper(history, E, NU).value
+    )
+
+
+def test_life_inverts_the_parameter() -> None:
+    constants = {"strength": 1015e6, "b": -0.11, "ductility": 0.21, "c": -0.52}
+    cycles = np.array([1e3, 1e5, 1e7])
+    values = 1015e6**2 / 72e9 * (2 * cycles) ** -0.22 + 1015e6 * 0.21 * (2 * cycles) ** -0.63
+    assert fatigue.life(values, 72e9, **constants) == pytest.approx(cycles, rel=1e-9)
+    assert fatigue.life(0.0, 72e9, **constants) == np.inf
+    with pytest.raises(DeckError, match="exponents b and c below 0"):
+        fatigue.life(1.0, 72e9, **(constants | {"b": 0.1}))
+
+
+def test_ruiz_takes_values_of_one_node() -> None:
+    slip = np.stack([2e-6 * np.cos(PHASE), 0 * PHASE], axis=-1)
+    traction = np.stack([30e6 * np.sin(PHASE), 0 * PHASE], axis=-1)
+    stress = np.zeros((len(PHASE), 6))
+    stress[:, 0] = 100e6 * np.sin(PHASE)
+    found = fatigue.ruiz(traction, slip, stress)
+    assert found.slip_amplitude == pytest.approx(2e-6, rel=1e-12)
+    assert found.f1 == pytest.approx(60.0, rel=1e-12)
+    assert found.f2 == pytest.approx(6e9, rel=1e-12)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_threads_at_once_get_the_same_bits(threads: int) -> None:
+    histories = np.random.default_rng(1).normal(size=(200, 20, 6))
+    expected = fatigue.findley(histories, 0.3)
+    found = []
+    workers = [
+        threading.Thread(target=lambda: found.append(fatigue.findley(histories, 0.3))) for _ in range(threads)
+    ]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert len(found) == threads
+    for one in found:
+        assert np.array_equal(one.value, expected.value)
+        assert np.array_equal(one.normal, expected.normal)
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: fatigue.findley(np.zeros(6), 0.3), r"expected \(..., times, 6\)"),
+        (lambda: fatigue.findley(np.zeros((4, 5)), 0.3), r"expected \(..., times, 6\)"),
+        (lambda: fatigue.findley(np.zeros((0, 6)), 0.3), "a time or more"),
+        (lambda: fatigue.crossland(np.full((4, 6), np.nan), 0.3), "finite numbers"),
+        (lambda: fatigue.crossland(np.full((4, 6), 1.0), np.nan), "slope"),
+        (lambda: fatigue.findley(np.full((4, 6), 1.0), np.inf), "slope = inf: expected a finite number"),
+        (lambda: fatigue.findley(np.full((4, 6), 1e160), 0.3), "at most 1e100"),
+        (lambda: fatigue.smith_watson_topper(np.zeros((4, 6)), -1.0, 0.3), "a positive number"),
+        (lambda: fatigue.smith_watson_topper(np.zeros((4, 6)), 1.0, 0.7), "at most 0.5"),
+        (lambda: fatigue.ruiz(np.zeros((4, 2)), np.zeros((5, 2)), np.zeros((4, 6))), "same points and times"),
+    ],
+)
+def test_what_is_no_history_is_refused(call: object, sentence: str) -> None:
+    with pytest.raises(DeckError, match=sentence):
+        call()  # type: ignore[operator]
+
+
+def test_life_without_a_parameter_is_none() -> None:
+    """A NaN, as outside of a contact, counted as a failure in the first cycle."""
+    found = fatigue.life([np.nan, np.inf, 0.0], 2e11, 1e9, -0.1, 0.5, -0.6)
+    np.testing.assert_equal(found, [np.nan, 0.0, np.inf])
+
+
+def test_the_example_of_the_module_holds() -> None:
+    assert doctest.testmod(fatigue).attempted > 0
+    assert doctest.testmod(fatigue).failed == 0
+
+
+# --- results ------------------------------------------------------------------------------------------------
+
+DECK = """
+[body.1]
+young_modulus = "72 GPa"
+poisson_ratio = 0.33
+[body.2]
+{pad}
+surface = {{ shape = "sphere", radius = "25 mm" }}
+[grid]
+nodes_in_radius = 5
+[friction]
+coefficient = 0.6
+[bulk]
+body = 1
+[[load]]
+normal_load = "200 N"
+label = "press"
+[[load]]
+repeat = 2
+path = [
+  {{ tangential_load_x = "0.4 mu P", bulk_stress_xx = "80 MPa", steps = 2, label = "pull" }},
+  {{ tangential_load_x = "-0.4 mu P", bulk_stress_xx = "-80 MPa", steps = 2, label = "push" }},
+]
+"""
+PAD = 'young_modulus = "72 GPa"\npoisson_ratio = 0.33'
+TABLES = """
+[[fatigue]]
+segment = ["pull", "push"]
+parameters = ["ruiz", "life", "smith_watson_topper"]
+strength = "714 MPa"
+strength_exponent = -0.08
+ductility = 0.17
+ductility_exponent = -0.54
+[[fatigue]]
+name = "line"
+steps = [6, 7, 8, 9]
+parameters = ["findley"]
+findley_slope = 0.3
+line = [[-0.4e-3, 0, 0], [-0.4e-3, 0, 0.2e-3]]
+count = [3]
+"""
+CYCLE = {"segment": ["pull", "push"]}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("fatigue")
+    (folder / "deck.toml").write_text(DECK.format(pad=PAD) + TABLES)
+    code, text = command(folder, "run", "deck.toml", "--quiet")
+    assert code == 0, text
+    return folder
+
+
+def command(folder: Path, *words: str) -> tuple[int, str]:
+    with contextlib.chdir(folder):
+        done = CliRunner().invoke(app, list(words))
+    return done.exit_code, done.output
+
+
+def test_far_from_the_contact_there_is_the_bulk_stress_alone(finished: Path) -> None:
+    result = open_result(finished / "deck.nc")
+    far = {"points": [[0.0, 0.0, 1.0]], **CYCLE}
+    assert result.cycle_steps(**CYCLE) == [6, 7, 8, 9]
+    found = result.fatigue(
+        *("smith_watson_topper", "findley", "crossland", "dang_van"),
+        **({"findley_slope": 0.3, "crossland_slope": 0.3, "dang_van_slope": 0.3} | far),
+    )
+    # +-80 MPa along x; tractions of 200 N at a distance of 1 m are some 1e-4 Pa
+    assert float(found["smith_watson_topper"][0]) == pytest.approx(80e6**2 / 72e9, rel=2e-5)
+    assert float(found["smith_watson_topper_polar"][0]) == pytest.approx(np.pi / 2, abs=5e-3)
+    assert float(found["smith_watson_topper_azimuth"][0]) == pytest.approx(0.0, abs=5e-3)
+    assert float(found["findley"][0]) == pytest.approx(40e6 * (0.3 + np.hypot(1, 0.3)), rel=2e-5)
+    assert float(found["crossland"][0]) == pytest.approx(80e6 * (3**-0.5 + 0.1), rel=1e-6)
+    assert float(found["dang_van"][0]) == pytest.approx(80e6 * (0.5 + 0.1), rel=1e-6)
+    assert found.attrs["steps"].tolist() == [6, 7, 8, 9]
+    assert found["findley"].attrs["findley_slope"] == 0.3
+    pad = result.fatigue("crossland", crossland_slope=0.3, body=2, **far)
+    assert abs(float(pad["crossland"][0])) < 1e3  # the pad carries no bulk stress
+
+
+def test_parameters_are_those_of_the_stresses_block_by_block(
+    finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = open_result(finished / "deck.nc")
+    steps = result.cycle_steps(**CYCLE)
+    names = ("smith_watson_topper", "ruiz")
+    surface = result.fatigue(*names, **CYCLE)
+    plane = {"plane": [[-5e-4, 0, 0], [5e-4, 0, 0], [-5e-4, 0, 1e-4]], "count": (5, 3)}
+    section = result.fatigue("findley", findley_slope=0.3, **CYCLE, **plane)
+    components = [f"stress_{ab}" for ab in ("xx", "yy", "zz", "xy", "yz", "xz")]
+    for found, where, value in (
+        (surface, {"depths": [0.0]}, lambda h: fatigue.smith_watson_topper(h, 72e9, 0.33).value),
+        (section, plane, lambda h: fatigue.findley(h, 0.3).value),
+    ):
+        stress = result.stress(*components, step=steps, **where)
+        history = np.moveaxis(np.stack([stress[name].values for name in components], -1), 0, -2)
+        own = found["findley" if "findley" in found else "smith_watson_topper"]
+        assert own.values == pytest.approx(value(history), rel=1e-9)
+        assert found.attrs["tractions"] == stress.attrs["tractions"] == "edges"
+    monkeypatch.setattr("hexcontact.interior.fatigue._BLOCK", 1)
+    monkeypatch.setattr("hexcontact.interior.fatigue._AT_ONCE", 3)
+    monkeypatch.setattr("hexcontact.interior.fatigue.tractions", _light)
+    assert result.fatigue(*names, **CYCLE).equals(surface)
+    assert result.fatigue("findley", findley_slope=0.3, **CYCLE, **plane).equals(section)
+
+
+class _Light(np.ndarray):
+    """Tractions that say they take no memory, so that blocks are as small as they can be."""
+
+    nbytes = 0  # type: ignore[assignment]
+
+
+def _light(*given: object) -> tuple[np.ndarray, str]:
+    loads, source = stress_below.tractions(*given)
+    return loads.view(_Light), source
+
+
+def test_ruiz_is_zero_where_nothing_slips(finished: Path) -> None:
+    result = open_result(finished / "deck.nc")
+    found = result.fatigue("ruiz", **CYCLE)
+    steps = result.cycle_steps(**CYCLE)
+    slip = np.array([[result.step(n)[f"slip_increment_{c}"].values for c in "xy"] for n in steps])
+    path = slip.cumsum(axis=0)[:, 0]  # along x, but for a part in some 1e3
+    assert found["slip_amplitude"].values[0] == pytest.approx(np.ptp(path, axis=0) / 2, rel=0.02, abs=1e-10)
+    still = (slip == 0).all(axis=(0, 1))
+    assert 0 < still.sum() < still.size
+    assert (found["ruiz_f1"].values[0][still] == 0).all()
+    assert found["ruiz_f1"].values.max() > 1
+
+
+def test_histories_are_as_other_programs_take_them(finished: Path) -> None:
+    """pyLife looks for S11 ... S13 by node_id and load_step; docs/fatigue.md has the example that runs."""
+    result = open_result(finished / "deck.nc")
+    points = [[-4e-4, 0, 0], [0, 1e-4, 2e-5]]
+    [table] = result.stress_histories(**CYCLE, points=points)
+    assert table.index.names == ["node_id", "load_step"]
+    assert list(table.columns) == ["x", "y", "depth", "S11", "S22", "S33", "S12", "S23", "S13"]
+    assert table.loc[2, ["x", "y", "depth"]].to_numpy().tolist() == [points[1]] * 4
+    stress = result.stress(points=points, step=7)
+    for name, column in (("stress_xx", "S11"), ("stress_xz", "S13"), ("stress_yz", "S23")):
+        assert table.xs(7, level="load_step")[column].to_numpy() == pytest.approx(stress[name].values / 1e6)
+    code, text = command(finished, "export", "deck.nc", "--histories", "--vtk")
+    assert code == 0, text
+    table = pandas.read_csv(finished / "deck_export/deck_line_histories.csv", index_col=[0, 1])
+    assert table.index.names == ["node_id", "load_step"]
+    assert len(table) == 3 * 4
+    assert (finished / "deck_export/deck_fatigue_1.pvd").is_file()
+    assert (finished / "deck_export/deck_line_0009.vts").is_file()
+
+
+def test_files_of_a_deck_say_what_they_hold(finished: Path) -> None:
+    with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:
+        assert found["life"].attrs["units"] == "1"
+        assert found["life"].attrs["strength"] == 714e6
+        assert "Smith" in found["smith_watson_topper"].attrs["references"]
+        energy = found["smith_watson_topper"].values
+        expected = fatigue.life(energy, 72e9, 714e6, -0.08, 0.17, -0.54)
+        assert found["life"].values == pytest.approx(expected, rel=1e-9)
+    code, text = command(finished, "info", "deck_line.nc")
+    assert code == 0
+    assert "fatigue parameters of body 1, steps 6 to 9, 3 points" in text
+    code, text = command(finished, "plot", "deck_line.nc")
+    assert code == 2
+    assert "holds fatigue parameters, not load steps" in text
+
+
+@pytest.mark.parametrize(
+    ("lines", "sentence"),
+    [
+        (
+            'segment = ["pul", "push"]\nparameters = ["ruiz"]',
+            'no segment has the label "pul"; did you mean pull',
+        ),
+        (
+            'segment = ["push"]\nparameters = ["ruiz"]',
+            "tangential_load_x is 48 at the begin and -48 at the end",
+        ),
+        ('segment = ["press"]\nparameters = ["ruiz"]', "normal_load is 0 at the begin and 200 at the end"),
+        ('segment = ["press", "push"]\nparameters = ["ruiz"]', "do not follow each other"),
+        ('parameters = ["ruiz"]', "expected either segment or steps"),
+        ('steps = [6, 10]\nparameters = ["ruiz"]', "there are no fields of step 10"),
+        ('steps = [6, 7]\nparameters = ["findley"]', "findley_slope: missing; expected k of Findley"),
+        ('steps = [6, 7]\nparameters = ["findlay"]', "did you mean findley"),
+        (
+            'steps = [6, 7]\nparameters = ["ruiz"]\npoints = [[0, 0, 0]]',
+            "ruiz: expected a contact with friction",
+        ),
+        ('steps = [6, 7]\nparameters = ["ruiz"]\nbody = 2', "body 2 is rigid"),
+    ],
+)
+def test_bad_tables_are_one_sentence(tmp_path: Path, lines: str, sentence: str) -> None:
+    (tmp_path / "deck.toml").write_text(DECK.format(pad="rigid = true") + "[[fatigue]]\n" + lines)
+    code, text = command(tmp_path, "check", "deck.toml")
+    assert code == 2
+    assert sentence in text
+    assert len(text.splitlines()) == 1
+
+
+def test_a_cycle_may_have_one_name_or_start_from_nothing(finished: Path) -> None:
+    def stages(*ends: tuple[str, float]) -> list:
+        return [(number, label, {"normal_load": load}) for number, (label, load) in enumerate(ends)]
+
+    one = stages(("press", 1.0), ("go", 2.0), ("go", 1.0), ("go", 2.0), ("go", 1.0))
+    assert cycle_of(one, ["go"]) == (3, 4)  # the last cycle, not both
+    assert cycle_of(stages(("a", 1.0), ("b", 0.0)), ["a", "b"]) == (0, 1)
+    with pytest.raises(ValueError, match="no load changes"):
+        cycle_of(stages(("press", 1.0), ("hold", 1.0)), ["hold"])
+    result = open_result(finished / "deck.nc")
+    with pytest.raises(DeckError, match="either segment or steps"):
+        result.fatigue("ruiz")
+    with pytest.raises(DeckError, match="dang_van_slope: missing"):
+        result.fatigue("dang_van", **CYCLE)
+    with pytest.raises(DeckError, match="ruiz: expected the nodes of the surface"):
+        result.fatigue("ruiz", points=[[0, 0, 0]], **CYCLE)
+
+
+def test_the_page_shows_the_case() -> None:
+    root = Path(__file__).parents[2]
+    page = (root / "docs/fatigue.md").read_text(encoding="utf-8")
+    shown = tomllib.loads(page.partition("```toml\n")[2].partition("```")[0])
+    shown["grid"]["nodes_in_radius"] = 20
+    assert shown == tomllib.loads((root / "cases/fretting_fatigue.toml").read_text(encoding="utf-8"))

@@ -1,0 +1,310 @@
+"""Typical mistakes get the sentence that ends them; what a command prints looks well where it is read."""
+
+from __future__ import annotations
+
+import fcntl
+import math
+import os
+import pty
+import re
+import struct
+import subprocess
+import sys
+import termios
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pint
+import pytest
+from typer.testing import CliRunner, Result
+
+import hexcontact
+from hexcontact import Case
+from hexcontact.case import Body
+from hexcontact.cli.app import app
+from hexcontact.deck.write import starter
+from hexcontact.surfaces import Sphere
+from hexcontact.text import cut
+
+DECK = starter("fretting")
+STUDY = 'deck = "deck.toml"\n[[parameter]]\nkey = "friction.coefficient"\nname = "mu"\nvalues = [0.3, 0.4]\n'
+STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+COARSE = DECK.replace("nodes_in_radius = 20", "nodes_in_radius = 6")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "deck.toml").write_text(COARSE, encoding="utf-8")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    return tmp_path
+
+
+def command(*words: str) -> Result:
+    return CliRunner().invoke(app, list(words))
+
+
+def refused(*words: str) -> list[str]:
+    done = command(*words)
+    assert done.exit_code == 2, done.output
+    assert done.stdout == ""
+    return done.stderr.splitlines()
+
+
+QUOTES = "a value with a unit stands in quotes: "
+WRONG = [  # what stands in the deck, what is written instead, the only lines of the answer
+    ('normal_load = "100 N"', "normal_load = 40 N", [rf"\d+:18: is not TOML: .*; {QUOTES}\"40 N\""]),
+    ('radius = "10 mm"', "radius = 10 mm", [f"9:.*; {QUOTES}\"10 mm\""]),
+    ("coefficient = 0.3", "coefficient = 30 %", [f".*; {QUOTES}\"30 %\""]),
+    ("poisson_ratio = 0.3\n", "poisson_ratio = 0,3\n", [r"8:18: .*; a number has a decimal point: 0\.3"]),
+    ("nodes_in_radius = 20", "nodes_in_radius = 20\nmu = 1", [r".*grid\.mu: .* friction\.coefficient\?"]),
+    ('young_modulus = "210 GPa"', 'E = "210 GPa"', [r"7:1: body\.1\.E: .* did you mean young_modulus\?"]),
+    ("poisson_ratio = 0.3\n", "nu = 0.3\n", [r"8:1: body\.1\.nu: unknown key; did you mean poisson_ratio\?"]),
+    ("coefficient = 0.3", "mu = 0.3", [r".*friction\.mu: unknown key; did you mean coefficient\?"]),
+    ('normal_load = "100 N"', 'P = "100 N"', [r".*load\.1\.P: unknown key; did you mean normal_load\?"]),
+    ("radius = ", "R = ", [r".*body\.1\.surface\.R: unknown key; did you mean radius\?"]),
+    ("nodes_in_radius = 20", 'h = "1 um"', [r".*grid\.h: unknown key; did you mean spacing\?"]),
+    ("[friction]", "[frction]", [r".*frction: unknown key; did you mean friction\?"]),
+    ("[grid]", "[grd]", [r".*grd: unknown key; did you mean grid\?"]),
+    ("nodes_in_radius = 20", 'spacing = "1 mm"', [r'.* half-width of about 0\.234 mm, such as "11\.7 um"']),
+    ("nodes_in_radius = 20", 'spacing = "1 nm"', [r".* not \d+: a spacing of 5\.\d+ nm or more"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("before", "after", "expected"), WRONG, ids=[after for _, after, _ in WRONG])
+def test_a_mistake_gets_the_sentence_that_ends_it(
+    folder: Path, before: str, after: str, expected: list[str]
+) -> None:
+    assert before in DECK
+    (folder / "wrong.toml").write_text(DECK.replace(before, after, 1), encoding="utf-8")
+    lines = refused("run", "wrong.toml")
+    assert len(lines) == len(expected), lines
+    for line, pattern in zip(lines, expected, strict=True):
+        assert re.fullmatch(rf"hexcontact: wrong\.toml:{pattern}", line), line
+
+
+@pytest.mark.parametrize(
+    ("setting", "meant"),
+    [
+        ("nodes_in_radius=5", "grid.nodes_in_radius"),
+        ("mu=0.5", "friction.coefficient"),
+        ("coefficient=0.5", "friction.coefficient"),
+        ("grid.h=1e-6", "spacing"),
+    ],
+)
+def test_a_key_without_its_table_is_found(folder: Path, setting: str, meant: str) -> None:
+    assert refused("run", "deck.toml", "--set", setting)[0].endswith(f"did you mean {meant}?")
+
+
+def test_the_friction_of_an_interface_is_that_of_the_friction_table(folder: Path) -> None:
+    (folder / "wrong.toml").write_text(
+        f'{DECK}\n[interface]\ncoefficient = "1e14 Pa/m"\nmu = 0.3\n', encoding="utf-8"
+    )
+    [line] = refused("run", "wrong.toml")
+    assert line.endswith("interface.mu: unknown key; did you mean friction.coefficient?")
+
+
+@pytest.mark.parametrize(
+    ("setting", "answer"),
+    [
+        ("load.normal_load=5", "not normal_load (entries of arrays count from 1: load.1.normal_load)"),
+        (
+            "load[0].normal_load=5",
+            "expected the number of an entry between points, from 1: load.1.normal_load",
+        ),
+        ("load.9.normal_load=5", "expected an entry from 1 to 2, not 9"),
+    ],
+)
+def test_entries_of_arrays_are_numbers(folder: Path, setting: str, answer: str) -> None:
+    [line] = refused("run", "deck.toml", "--set", setting)
+    assert line.endswith(answer)
+
+
+def test_a_load_above_friction_is_one_mistake_until_friction_carries_it_again(folder: Path) -> None:
+    shear = "".join(f"\n[[load]]\ntangential_load_x = {load}\nsteps = 4\n" for load in (60, 10, 70))
+    (folder / "wrong.toml").write_text(DECK + shear, encoding="utf-8")
+    first, second = refused("check", "wrong.toml")
+    assert "load.3.tangential_load_x = 60.0: gross sliding" in first
+    assert "load.5.tangential_load_x = 70.0: gross sliding" in second
+
+
+def test_a_required_key_that_stands_elsewhere_is_one_mistake(folder: Path) -> None:
+    empty = {"grid.spacing": DECK.replace("nodes_in_radius", "#"), "accuracy.target": f"{DECK}\n[accuracy]\n"}
+    for path, deck in empty.items():
+        key = path.partition(".")[2]
+        (folder / "wrong.toml").write_text(f"{key} = 0.02\n{deck}", encoding="utf-8")
+        [line] = refused("run", "wrong.toml")
+        assert line.endswith(f"wrong.toml:1:1: {key}: unknown key; did you mean {path}?")
+    (folder / "wrong.toml").write_text(f'{STUDY}\n"" = 1\n', encoding="utf-8")
+    [line] = refused("study", "wrong.toml")
+    assert "parameter.1.: unknown key; known here: count" in line
+
+
+def test_the_other_kind_of_file_is_named(folder: Path) -> None:
+    for verb in ("run", "check"):
+        [line] = refused(verb, "study.toml")
+        assert (
+            line
+            == "hexcontact: study.toml is a study and no deck; hexcontact study study.toml runs its cases"
+        )
+    [line] = refused("study", "deck.toml")
+    assert line == "hexcontact: deck.toml is a deck and no study; hexcontact run deck.toml solves it"
+    [line] = refused("info", "deck.toml")
+    assert "deck.toml is a TOML file; expected a netCDF file, which hexcontact run or study writes" in line
+    (folder / "other.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
+    [line] = refused("run", "other.nc")
+    assert "other.nc: is a netCDF file, such as a result; hexcontact info shows it; expected a deck" in line
+
+
+def test_quantities_of_pint_are_refused_in_a_sentence() -> None:
+    unit = pint.UnitRegistry()
+    words = "in Python a quantity with a unit is given as text"
+    with pytest.raises(hexcontact.DeckError, match=f"radius = 10 millimeter: expected a length.*; {words}$"):
+        Sphere(radius=10 * unit.mm)  # type: ignore[arg-type]
+    ball = {**STEEL, "surface": Sphere(radius=1e-2)}
+    with pytest.raises(hexcontact.DeckError, match=f"normal_load = 100 newton: .*; {words}$"):
+        Case(body_1=ball, body_2=STEEL, nodes_in_radius=8, normal_load=100 * unit.N)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("mu", "did you mean friction_coefficient?"),
+        ("E", "did you mean body_1.young_modulus?"),
+        ("Q", "did you mean loads.tangential_load_x?"),
+        ("max_nodes", "did you mean accuracy.max_nodes?"),
+        ("normal_laod", "did you mean normal_load?"),
+        ("radius", "known here: body_1, body_2, gap, "),
+    ],
+)
+def test_an_unknown_argument_is_named_with_the_nearest(name: str, hint: str) -> None:
+    with pytest.raises(TypeError) as caught:
+        Case(body_1=STEEL, body_2=STEEL, gap=lambda x, y: x**2 + y**2, nodes_in_radius=8, **{name: 1.0})
+    assert str(caught.value).startswith(f"{name}: unknown argument of Case; {hint}")
+
+
+def test_an_unknown_argument_of_a_body_or_a_load_is_named_with_the_nearest() -> None:
+    with pytest.raises(TypeError, match=r"^nu: unknown argument of Body; did you mean poisson_ratio\?$"):
+        Body(young_modulus=1e9, nu=0.3)  # type: ignore[call-arg]
+    ball = {**STEEL, "surface": Sphere(radius=1e-2)}
+    session = Case(body_1=ball, body_2=STEEL, nodes_in_radius=8, normal_load=1.0).start()
+    with pytest.raises(
+        TypeError, match=r"^P: unknown argument of Session.advance; did you mean normal_load\?$"
+    ):
+        session.advance(P=1.0)  # type: ignore[call-arg]
+
+
+def test_a_gap_function_of_numbers_is_refused_in_a_sentence() -> None:
+    def case(gap: Any) -> Case:
+        return Case(body_1=STEEL, body_2=STEEL, gap=gap, nodes_in_radius=8, normal_load=10.0)
+
+    for gap in (lambda x, y: math.hypot(x, y) ** 2, lambda x, y: max(x, 0.0) ** 2 + y * y + min(x, 0.0) ** 2):
+        with pytest.raises(
+            hexcontact.DeckError, match=r"^gap: expected a function of two arrays, .*numpy\.vectorize"
+        ):
+            case(gap)
+        assert case(np.vectorize(gap)).lattice.size > 100
+    with pytest.raises(TypeError, match="positional argument"):  # a mistake of another kind stays
+        case(lambda r: r)
+
+
+# --- on a terminal, in a pipe -------------------------------------------------------------------------------
+
+
+def on_a_terminal(folder: Path, columns: int, *words: str) -> str:
+    """Run the command on a terminal of some columns and return what it writes, without colors."""
+    master, slave = pty.openpty()
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    there = str(Path(hexcontact.__file__).parents[1])
+    environment = {
+        key: value for key, value in os.environ.items() if key not in ("COLUMNS", "LINES", "NO_COLOR")
+    }
+    environment |= {
+        "TERM": "xterm",
+        "PYTHONPATH": os.pathsep.join([there, *sys.path]),
+        "OMP_NUM_THREADS": "1",
+    }
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hexcontact", *words], cwd=folder, env=environment, stdin=slave, stdout=slave,
+        stderr=slave,
+    )  # fmt: skip
+    os.close(slave)
+    written = b""
+    while True:
+        try:
+            part = os.read(master, 65536)
+        except OSError:  # Linux says so at the end
+            break
+        if not part:
+            break
+        written += part
+    os.close(master)
+    assert process.wait() == 0, written.decode()
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", written.decode())  # colors; what moves the cursor begins a line
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "\n", plain).replace("\r", "\n")
+
+
+@pytest.mark.alone
+def test_progress_fits_on_eighty_columns(folder: Path) -> None:
+    title = "Stiff sphere on aluminum flat, pressed and sheared to and fro in the laboratory of Twente"
+    (folder / "long.toml").write_text(re.sub('title = ".*"', f'title = "{title}"', COARSE), encoding="utf-8")
+    shown = on_a_terminal(folder, 80, "run", "long.toml")
+    lines = [line.rstrip() for line in shown.split("\n")]
+    assert max(map(len, lines)) <= 80
+    assert "…" not in shown
+    assert any(re.search(r"\d+/37 0:00:\d\d left: (0:00:\d\d|-:--:--)", line) for line in lines), shown
+    # Between two drawings of the bar many steps may pass: which are shown is chance, but for the last.
+    steps = {line.strip() for line in lines if re.match("  (press|to|fro|back)  P ", line)}
+    assert any(line.startswith("back  P 100.0 N  Qx 24.00 N") for line in steps), shown
+    whole = re.compile(
+        r"\w+  P [\d.]+ m?N(  Qx -?[\d.]+ m?N)?(  approach [\d.]+ .m)?(  shift x -?[\d.]+ .?m)?"
+        r"(  stick [\d.]+ %)?(  R [\d.e-]+)?"
+    )
+    for line in steps:
+        assert whole.fullmatch(line), line
+
+
+def test_a_line_is_cut_between_its_parts() -> None:
+    line = "to  P 100.0 N  Qx 24.00 N  approach 5.467 µm"
+    assert cut(line, 100) == line
+    assert cut(line, len(line) - 1) == "to  P 100.0 N  Qx 24.00 N"
+    assert cut("case 3 (mu = 0.3): done", 20) == "case 3 (mu = 0.3):"
+    assert cut("unbreakable", 4) == "unbr"
+
+
+def test_piped_tables_end_without_blanks(folder: Path) -> None:
+    for words in (["check", "deck.toml"], ["run", "deck.toml"], ["info", "deck.nc"]):
+        lines = command(*words).stdout.splitlines()
+        assert len(lines) > 10
+        assert [line for line in lines if line != line.rstrip()] == []
+
+
+def test_written_files_have_the_names_that_were_given(folder: Path) -> None:
+    (folder / "sub").mkdir()
+    for given in ("sub/out.nc", str(folder / "sub/out.nc")):
+        shown = command("run", "deck.toml", "-o", given, "--overwrite", "--plot").stdout.splitlines()[-1]
+        assert shown == f"written: {given}, {given.replace('.nc', '.png')}"
+    assert command("plot", "sub/out.nc").stdout == "written: sub/out_overview.png\n"
+    assert command("report", "sub/out.nc").stdout == "written: sub/out.html\n"
+
+
+def test_a_study_names_its_parameters_and_has_no_empty_job(folder: Path) -> None:
+    done = command("study", "study.toml", "--jobs", "1")
+    assert done.exit_code == 0, done.output
+    assert "case 1 (mu = 0.3): done in" in done.stderr
+    script = command("study", "study.toml", "--slurm").stdout
+    assert script == "#!/bin/sh\n# no case is missing\n"
+    assert subprocess.run(["sh", "-c", script], check=False).returncode == 0
+
+
+def test_a_result_shows_its_warnings_and_where_pictures_are() -> None:
+    body = {"young_modulus": 210.0, "poisson_ratio": 0.3}  # GPa were meant
+    sphere = {**body, "surface": {"shape": "sphere", "radius": 0.01}}
+    result = Case(body_1=sphere, body_2=body, nodes_in_radius=4, normal_load=50.0).run()
+    assert "warning: the surfaces slope by" in repr(result)
+    assert "warning: the largest pressure is" in result._repr_html_()
+    with pytest.raises(AttributeError, match=r"hexcontact\.plotting\.overview\(result\)"):
+        _ = result.plot
+    with pytest.raises(AttributeError, match=r'case\.run\("name\.nc"\)'):
+        _ = result.save

@@ -1,0 +1,173 @@
+"""What is to be expected of a case before it is solved, and what is worth a warning."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from hexcontact import Case, open_result
+from hexcontact.analytic import hertz_sphere
+from hexcontact.cli.app import app
+from hexcontact.core.estimators import expected_entry_error, expected_lattice_errors
+from hexcontact.deck.write import STARTERS, starter
+from hexcontact.problem import plausibility
+
+ROOT = Path(__file__).parents[2]
+DECK = starter("fretting")
+
+
+def case(**changes: Any) -> Case:
+    return Case.from_text(DECK, overrides={key.replace("__", "."): value for key, value in changes.items()})
+
+
+def warned(**changes: Any) -> list[str]:
+    return plausibility.warnings(case(**changes))
+
+
+def test_the_estimate_is_that_of_hertz() -> None:
+    found, pressed = plausibility.expected(case()), case()
+    hertz = hertz_sphere(pressed.pair.effective_modulus, 10e-3, normal_load=100.0)
+    assert found["contact_radius"] == pytest.approx(hertz.contact_radius, rel=0.02)
+    assert found["half_width"] == pytest.approx(hertz.contact_radius, rel=0.02)
+    assert found["max_pressure"] == pytest.approx(hertz.max_pressure, rel=0.02)
+    assert found["pressure_ratio"] == found["max_pressure"] / pressed.pair.effective_modulus
+    assert found["slope"] == pytest.approx(hertz.contact_radius / 10e-3, rel=0.15)
+    assert found["spacings"] == pytest.approx(20.0, rel=0.02)
+
+
+@pytest.mark.parametrize("name", STARTERS)
+def test_starter_decks_need_no_warning(name: str) -> None:
+    assert plausibility.warnings(Case.from_text(starter(name))) == []
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "cases").glob("*.toml")), ids=lambda path: path.stem)
+def test_cases_need_no_warning(path: Path) -> None:
+    if "study" not in path.stem:
+        assert plausibility.warnings(Case.from_toml(path)) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentences"),
+    [
+        (
+            {"body__1__young_modulus": "113.8 Pa"},
+            ["the surfaces slope by 17 ", "the largest pressure is 12 E*"],
+        ),
+        ({"body__1__surface__radius": "25 m"}, ["the largest pressure is only 8.1e-05 E*"]),
+        (
+            {"load__1__normal_load": "40 kN"},
+            ["the surfaces slope by 0.16 ", "the largest pressure is 0.11 E*"],
+        ),
+        ({"friction__coefficient": 55}, ["friction.coefficient = 55, expected at most 3"]),
+        ({"friction__coefficient": float("inf")}, []),
+        ({"friction__coefficient": "0.3 + 0*x", "solver__entry": "interpolated"}, []),
+        (
+            {"friction__coefficient": 55, "friction__shear_limit": "90 MPa", "solver__entry": "interpolated"},
+            ["friction.coefficient = 55, expected at most 3"],
+        ),
+        ({"grid__nodes_in_radius": 2}, ["2 spacings in the contact radius may leave errors of 65 % in the"]),
+        (
+            {"solver__entry": "implicit"},
+            ["the contact grows in 4.9 even steps, which leaves an error of about 41 %"],
+        ),
+        ({"solver__entry": "implicit", "load__1__steps": 40}, []),
+        ({"solver__entry": "implicit", "load__1__steps": "auto"}, []),
+    ],
+)
+def test_a_warning_for_each_limit_that_is_passed(changes: dict[str, Any], sentences: list[str]) -> None:
+    found = warned(**changes)
+    assert len(found) == len(sentences)
+    for sentence, begin in zip(found, sentences, strict=True):
+        assert sentence.startswith(begin)
+        assert "\n" not in sentence
+
+
+def test_loads_that_grow_together_are_warned_of_with_alike_bodies() -> None:
+    alike = {"body__2__young_modulus": "210 GPa", "body__2__poisson_ratio": 0.3, "solver__entry": "implicit"}
+    load = {"normal_load": "100 N", "tangential_load_x": "6 N", "steps": 5}
+    [sentence] = warned(**alike, load=[load])
+    assert "about 32 % in the shear tractions" in sentence
+    assert warned(**alike, load=[load | {"steps": 60}]) == []
+    assert warned(**alike) == []  # pressed, then sheared
+
+
+def test_a_refined_lattice_is_judged_by_its_error_bars() -> None:
+    assert warned(grid__nodes_in_radius=3, accuracy__target=0.05, solver__entry="interpolated") == []
+
+
+def test_steps_leave_the_error_that_is_expected() -> None:
+    """Measured against twenty steps with interpolated entry, as in docs/theory/expected_errors.md."""
+
+    def tractions(steps: int, entry: str) -> np.ndarray:
+        pressed = {"normal_load": 100.0, "steps": steps, "ramp": "cubic"}
+        last = case(grid__nodes_in_radius=10, solver__entry=entry, load=[pressed]).run().step(-1)
+        return np.stack([last.traction_x.values, last.traction_y.values])
+
+    exact = tractions(10, "interpolated")
+    for steps in (1, 5):
+        error = np.hypot(*(tractions(steps, "implicit") - exact)).sum() / np.hypot(*exact).sum()
+        radii = np.arange(steps + 1.0) / steps
+        expected, counted, _ = expected_entry_error(radii[:-1], radii[1:], 0.3 / 0.1167, None, 0.1)
+        assert counted == pytest.approx(steps)
+        assert expected == pytest.approx(error, rel=0.35)
+    better = np.hypot(*(tractions(5, "interpolated") - exact)).sum() / np.hypot(*exact).sum()
+    assert better < 0.06
+
+
+def test_rules_and_their_inverses_agree() -> None:
+    errors, needed = expected_lattice_errors(8.0, 0.5, 0.05)
+    assert np.all(errors < 0.05)
+    assert expected_lattice_errors(needed, 0.5, 0.05)[0].max() == pytest.approx(0.05, rel=1e-12)
+    assert np.all(expected_lattice_errors(2.0, 0.0, 0.05)[0][2:] == 0.0)  # nothing slips
+    linear = np.cbrt(np.arange(6.0) / 5.0)
+    for stick, ratio in ((2.0, None), (0.0, 0.3)):
+        _, counted, needed = expected_entry_error(linear[:-1], linear[1:], stick, ratio, 0.1)
+        assert counted == pytest.approx(5.0)
+        radii = np.linspace(0.0, 1.0, 1 + round(needed))
+        assert expected_entry_error(radii[:-1], radii[1:], stick, ratio, 0.1)[0] == pytest.approx(
+            0.1, rel=0.1
+        )
+
+
+def test_a_warning_is_said_by_all_that_speak_of_a_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("deck.toml").write_text(DECK, encoding="utf-8")
+    coarse = ["--set", "grid.nodes_in_radius=3"]
+
+    def ran(*words: str) -> Any:
+        done = CliRunner().invoke(app, list(words))
+        assert done.exit_code == 0, done.output
+        return done
+
+    sentence = "3 spacings in the contact radius may leave errors of "
+    checked = ran("check", "deck.toml", *coarse)
+    assert f"hexcontact: warning: {sentence}" in checked.stderr
+    assert "deck.toml is ready to run" in checked.stdout
+    told = json.loads(ran("check", "deck.toml", *coarse, "--json").stdout)
+    [warning] = told["warnings"]
+    assert warning.startswith(sentence)
+    assert told["expected"]["lattice_error"] > 0.05
+    assert {limit["quantity"] for limit in told["limits"]} == {
+        limit.quantity for limit in plausibility.LIMITS
+    }
+    done = ran("run", "deck.toml", *coarse, "--log-file", "log")
+    assert done.stderr.splitlines()[1] == f"warning: {warning}"
+    assert sentence not in done.stdout
+    assert f'doubtful warning="{warning}"' in Path("log").read_text(encoding="utf-8")
+    assert open_result("deck.nc").dataset.attrs["warnings"] == warning
+    assert f"note: {warning}" in ran("info", "deck.nc").stdout
+    assert json.loads(ran("info", "deck.nc", "--json").stdout)["warnings"] == [warning]
+    ran("report", "deck.nc")
+    assert warning in Path("deck.html").read_text(encoding="utf-8")
+    quiet = ran("run", "deck.toml", *coarse, "--quiet", "--overwrite")
+    assert quiet.output == ""
+    fine = ran("check", "deck.toml")
+    assert fine.stderr == ""
+    assert "contact " in fine.stdout

@@ -1,0 +1,169 @@
+"""Wear by cycles: volume and dissipated work, the limiting shape, jumps, restart, what is refused."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hexcontact
+from hexcontact import Case, DeckError
+from hexcontact.deck.write import starter
+
+MODULUS, RADIUS, CONTACT, MU, WEAR = 1e11, 1e-2, 1e-4, 0.5, 1e-14
+EFFECTIVE = MODULUS / 2  # E* of two bodies with nu = 0, and the same number for shear, 2 G / 2
+APPROACH = CONTACT**2 / RADIUS
+STICK = 0.6 * CONTACT
+SHIFT = MU * (APPROACH - STICK**2 / RADIUS)  # of which this disc sticks (Cattaneo, Mindlin)
+CYCLE = [{"shift_x": SHIFT, "steps": 3}, {"shift_x": -SHIFT, "steps": 6}, {"shift_x": 0.0, "steps": 3}]
+
+
+def fretting(**changes: Any) -> Case:
+    """A sphere of nu = 0 at a fixed approach, shifted to and fro in partial slip."""
+    body = {"young_modulus": MODULUS, "poisson_ratio": 0.0}
+    wear = {"coefficient_1": WEAR, "cycle": "fretting", "cycles": 400_000} | changes.pop("wear", {})
+    given: dict[str, Any] = {
+        "body_1": body | {"surface": {"shape": "sphere", "radius": RADIUS}},
+        "body_2": body,
+        "nodes_in_radius": 6,
+        "friction_coefficient": MU,
+        "loads": [{"approach": APPROACH, "shift_x": 0.0}, {"label": "fretting", "path": CYCLE}],
+    }
+    return Case(**(given | changes), wear=wear)
+
+
+def worn(result: hexcontact.Result) -> Any:
+    """Return the cycles of a result that wore the surfaces."""
+    return result.dataset.isel(step=result.dataset["wear_cycles"].values >= 0)
+
+
+@pytest.mark.parametrize("mu", [MU, "0.4 + 0.2*tanh(x/1e-4)"])
+def test_worn_volume_is_that_of_the_dissipated_work(mu: float | str) -> None:
+    found = worn(fretting(friction_coefficient=mu, wear={"cycles": 20_000}).run())
+    spent = found["dissipation_density"].values - found["dissipation_density"].values[0]
+    at = mu if isinstance(mu, float) else 0.4 + 0.2 * np.tanh(found["x"].values / 1e-4)
+    assert np.abs(WEAR / at * spent - found["worn_depth"].values).max() < 1e-13 * found["worn_depth"].max()
+    if isinstance(mu, float):  # a sum of the same numbers in another order
+        energy = found["dissipated_energy"].values - found["dissipated_energy"].values[0]
+        assert WEAR / mu * energy == pytest.approx(found["wear_volume"].values, rel=1e-13)
+    assert (np.diff(found["wear_volume"]) > 0).all()
+    assert found["wear_cycles"].values[-1] == 20_000
+    for name in ("residual_normal", "residual_tangential"):
+        assert (found[name] <= found.attrs["cycle_tolerance"]).all()
+
+
+def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
+    # V. L. Popov, Sci. Rep. 4 (2014) 3749: P = 2 E* (d c - c^3/(3 R)) on the disc that sticks
+    found = worn(fretting(nodes_in_radius=10, wear={"cycles": 10**7, "tolerance": 0.3}).run())
+    last = found.isel(step=-1)
+    limit = 2 * EFFECTIVE * (APPROACH * STICK - STICK**3 / (3 * RADIUS))
+    # the edge of the disc is known to 0.3 spacings, 5 % of its radius; validation/wear.py has finer lattices
+    assert float(last["normal_load"]) == pytest.approx(limit, rel=0.04)
+    r = np.hypot(last["x"], last["y"]).values
+    spacing = float(found.attrs["lattice_spacing"])
+    assert not last["pressure"].values[r > STICK + spacing].any()
+    assert not last["worn_depth"].values[r < STICK - spacing].any()
+    assert float(found["normal_load"][0]) > 1.2 * limit
+
+
+def test_halved_jumps_change_the_depth_as_stated() -> None:
+    fine = worn(fretting(wear={"cycles": 100_000, "jump": 2000}).run()).isel(step=-1)
+    coarse = worn(fretting(wear={"cycles": 100_000}).run()).isel(step=-1)
+    off = np.abs(coarse["worn_depth"] - fine["worn_depth"]).max()
+    assert 0.0 < off <= coarse["worn_depth_step_error"]
+    assert coarse["worn_depth_step_error"] < 0.15 * coarse["max_worn_depth"]
+    assert coarse["worn_depth_step_error"] == np.abs(coarse["worn_depth_step_change"]).max()
+
+
+@pytest.mark.parametrize("last", [5, 14, 15, 16, 17])
+def test_resumed_run_has_the_same_bits(tmp_path: Path, last: int) -> None:
+    # a window of 13 rows, which grows on the way; the first cycle of wear is step 14
+    case = fretting(wear={"cycles": 300_000})
+    whole = case.run()
+    case.run(tmp_path / "out.nc", on_step=lambda step: step.number == last)
+    assert len(hexcontact.open_result(tmp_path / "out.nc")) == last
+    again = hexcontact.resume(tmp_path / "out.nc")
+    for name in sorted(set(whole.dataset.variables) - {"seconds"}):
+        np.testing.assert_array_equal(whole.dataset[name], again.dataset[name], name)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"friction_coefficient": None}, "wear: nothing wears without friction"),
+        ({"friction_coefficient": 0.0}, "wear: nothing wears without friction"),
+        ({"friction_coefficient": np.inf}, "wear: nothing wears without slip"),
+        (
+            {"wear": {"coefficient_1": -1.0}},
+            "wear.coefficient_1 = -1.0: expected a coefficient of wear of at",
+        ),
+        ({"wear": {"coefficient_1": 0.0}}, "expected a coefficient above 0 of one body at least"),
+        ({"wear": {"coefficient_1": "1 mm"}}, '"mm" is a length'),
+        (
+            {"wear": {"cycle": "freting"}},
+            'wear.cycle = "freting": expected the label .*did you mean fretting',
+        ),
+        ({"wear": {"cycles": 0}}, "wear.cycles = 0: expected a whole number"),
+        ({"wear": {"jump": 0}}, "wear.jump = 0: expected"),
+        ({"wear": {"jump": 5, "tolerance": 0.1}}, "wear.tolerance = 0.1: expected nothing"),
+        ({"shear_limit": 1e8}, "friction.shear_limit = .*expected nothing beside"),
+        (
+            {"friction_coefficient": {"along": 0.3, "across": 0.2}},
+            "friction.coefficient: expected one coefficient",
+        ),
+        ({"algorithm": "static"}, 'solver.algorithm = "static": expected incremental with'),
+        ({"accuracy": 0.1}, "accuracy: expected nothing beside"),
+        ({"loads": [{"label": "fretting", "path": [{"approach": APPROACH}]}]}, "expected an entry of"),
+        ({"loads": [{"approach": APPROACH}, {"label": "fretting", "path": CYCLE, "repeat": 2}]}, "no repeat"),
+        (
+            {"loads": [{"approach": APPROACH, "steps": "auto"}, {"label": "fretting", "path": CYCLE}]},
+            "number",
+        ),
+    ],
+)
+def test_what_cannot_wear_is_refused(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(DeckError, match=sentence):
+        fretting(**changes)
+
+
+def test_cycle_without_slip_is_refused_when_it_is_known() -> None:
+    press = {"approach": APPROACH, "shift_x": 0.0}
+    with pytest.raises(DeckError, match=r"no node slips in this cycle, so that nothing wears"):
+        fretting(loads=[press, {"label": "fretting", "approach": APPROACH}]).run()
+
+
+def test_cycle_that_is_computed_afterwards_is_the_one_that_wears() -> None:
+    press, cycle = {"approach": APPROACH, "shift_x": 0.0}, {"label": "fretting", "path": CYCLE}
+    twice = fretting(wear={"cycles": 1000, "jump": 1000}).deck_text
+    twice = twice[: twice.index("[wear]")] + "[output]" + twice.partition("[output]")[2]
+    found = Case.from_text(twice, overrides={"load": [press, cycle, cycle]}).run().wear(WEAR, "fretting")
+    last = worn(fretting(wear={"cycles": 1000, "jump": 1000}).run()).isel(step=-1)
+    # that cycle is solved to 3e-4 only: what this leaves in the depth
+    for name, times in (("worn_depth", 1000), ("wear_volume", 1000)):
+        off = np.abs(times * found[name] - last[name]).max() / np.abs(last[name]).max()
+        assert off < 1e-4
+    # |q| = mu p, opposed to the slip
+    assert np.abs(WEAR / MU * found["cycle_dissipation_density"] - found["worn_depth"]).max() < 1e-6 * float(
+        found["worn_depth"].max()
+    )
+    with pytest.raises(DeckError, match="coefficient"):
+        worn_twice = hexcontact.Result(last.expand_dims("step"))
+        worn_twice.wear(-1.0, steps=[1])
+
+
+def test_cycles_start_where_the_cycle_before_ended() -> None:
+    work = worn(fretting(wear={"cycles": 100_000, "jump": 10_000}).run())["operator_applications"].values
+    assert (work[3:] < 0.6 * work[0]).all()
+
+
+def test_session_goes_through_the_cycles_as_a_run_does() -> None:
+    case = fretting(wear={"cycles": 60_000, "jump": 20_000})
+    session = case.start()
+    stepped = [step.history.get("wear_volume") for step in session]
+    np.testing.assert_array_equal(session.result()["worn_depth"], case.run()["worn_depth"])
+    assert stepped[-1] == session.result()["wear_volume"].values[-1]
+
+
+def test_fields_of_wear_need_a_table_of_wear() -> None:
+    with pytest.raises(DeckError, match=r"a run without \[wear\] has no worn_depth"):
+        Case.from_text(starter("fretting"), overrides={"output.fields": ["worn_depth"]})

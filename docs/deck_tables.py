@@ -5,31 +5,38 @@ Run it after a change of the deck format: ``python docs/deck_tables.py``.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from hexcontact.deck import series, surfaces, tables
-from hexcontact.deck.kinds import Flag, Kind, Quantity, Several, Text, Whole, Word, WordOr
+from hexcontact.deck.kinds import Flag, Kind, PowerCoefficient, Quantity, Several, Text, Whole, Word, WordOr
 from hexcontact.deck.model import Table, expectation, kind_of
+from hexcontact.problem import plausibility
 from hexcontact.study.backends.dask import Dask
 from hexcontact.study.tables import Parameter, StudyFile
 from hexcontact.text import shown
 
 PAGE = Path(__file__).with_name("deck.md")
-PAGES = (PAGE, PAGE.with_name("studies.md"))
+PAGES = (PAGE, PAGE.with_name("studies.md"), PAGE.with_name("theory") / "expected_errors.md")
 TABLES: dict[str, type[Table]] = {
     "deck": tables.Deck,
     "body": tables.Body,
+    "interface": tables.Interface,
     "friction": tables.Friction,
+    "bulk": tables.Bulk,
     "grid": tables.Grid,
     "solver": tables.Solver,
     "load": tables.Load,
     "series": series.Series,
     "columns": series.Columns,
     "accuracy": tables.Accuracy,
+    "wear": tables.Wear,
     "output": tables.Output,
+    "stress": tables.Stress,
+    "fatigue": tables.Fatigue,
     "study": StudyFile,
     "parameter": Parameter,
     "dask": Dask,
@@ -61,8 +68,8 @@ def innermost(kind: Kind | None) -> Kind | None:
 def unit_of(info: Any) -> str:
     """The unit of a bare number."""
     kind = innermost(kind_of(info))
-    if isinstance(kind, surfaces.CoefficientKind):
-        return "m^(1-n)"
+    if isinstance(kind, PowerCoefficient):
+        return kind.unit
     if not isinstance(kind, Quantity):
         return ""
     return (kind.dimension.unit or "1") if kind.dimension.bare else "must be given"
@@ -121,12 +128,20 @@ def shapes() -> str:
     return "\n".join(lines) + "\n"
 
 
+def limits() -> str:
+    lines = [row(("expected", "limit", "reason")), "|---|---|---|"]
+    for limit in plausibility.LIMITS:
+        bound = f"at most {limit.most:g}" if limit.most < math.inf else f"at least {limit.least:g}"
+        lines.append(row((f"`{limit.quantity}`", bound, limit.reason)))
+    return "\n".join(lines) + "\n"
+
+
 def filled(text: str) -> str:
     """Return the page with its tables as the models have them now."""
 
     def fill(block: re.Match[str]) -> str:
-        table = shapes() if block[2] == "shapes" else keys_of(TABLES[block[2]])
-        return block[1] + table + block[3]
+        other = {"shapes": shapes, "limits": limits}.get(block[2])
+        return block[1] + (other() if other else keys_of(TABLES[block[2]])) + block[3]
 
     return BLOCK.sub(fill, text)
 

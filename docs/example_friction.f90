@@ -26,7 +26,7 @@ program press_and_shear
   if (.not. allocated(error)) call new_frictional_contact(contact, problem, error)
   if (allocated(error)) error stop error%message
   call new_friction_state(state, lattice)
-  call path%begin(state, pi*(0.13e-3_wp)**2)            ! the contact will be about that large
+  call path%initialize(state, pi*(0.13e-3_wp)**2)       ! the contact will be about that large
   do segment = 1, 2
     target%value(normal) = 15.0_wp                      ! first up to 15 N,
     if (segment == 2) target%value(along_x) = 3.0_wp    ! then up to 3 N along x
@@ -46,5 +46,5 @@ program press_and_shear
       ' % of the contact area, within', 100*path%stick_area_error/contact_area%area, ' %'
   end do
   print '(a, f6.4, a)', 'shift  ', state%motion(along_x)/1.0e-6_wp, ' um'
-  print '(a, f6.2, a)', 'energy ', state%dissipated_energy/1.0e-9_wp, ' nJ taken by friction'
+  print '(a, f6.2, a)', 'energy ', state%dissipated_energy/1.0e-9_wp, ' nJ dissipated'
 end program press_and_shear

@@ -1,17 +1,29 @@
-"""Make the pictures of the README and the documentation: ``python docs/images/make.py``."""
+"""Make the pictures of README and documentation, and docs/gallery.md: ``python docs/images/make.py``."""
 
+import contextlib
 import functools
+import os
+import re
+import shlex
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
+import numpy as np
+import xarray
 from matplotlib.figure import Figure
+from PIL import Image
+from typer.testing import CliRunner
 
 from hexcontact import Case, Result, plotting
+from hexcontact.cli.app import app
 from hexcontact.plotting.registry import entries
 
 HERE = Path(__file__).parent
 CASES = HERE.parents[1] / "cases"
+GALLERY = HERE.parent / "gallery.md"
 
 
 @functools.cache
@@ -26,6 +38,88 @@ def fretting() -> Result:
     return solved("dissimilar_fretting", grid__spacing="1.75 um")
 
 
+def stiffening_interface() -> Figure:
+    """Draw how a compliant interface goes over into unilateral contact with friction as it stiffens."""
+    spheres = {
+        "body": {
+            "1": {"young_modulus": 1.0, "poisson_ratio": 0.0, "surface": {"shape": "sphere", "radius": 1.0}},
+            "2": {"rigid": True},
+        },
+        "friction": {"coefficient": 0.3},
+        "grid": {"spacing": 0.05},
+        "load": [{"normal_load": 4 / 3}, {"tangential_load_x": "0.4 mu P", "steps": 2}],
+    }
+    quantities = {
+        "approach": "approach",
+        "max_pressure": "largest pressure",
+        "contact_area": "contact area",
+        "shift_x": "shift",
+        "stick_area": "stick area",
+    }
+
+    def last(**interface: float) -> dict[str, float]:
+        layer = {"interface": interface} if interface else {}
+        history = Case.from_dict(spheres | layer).run().dataset
+        return {name: float(history[name][-1]) for name in quantities}
+
+    rigid = last()
+    stiffness = 10.0 ** np.arange(0, 4.6, 0.5)
+    figure, parts = plt.subplots(1, 2, figsize=(10, 4), sharey=True, layout="constrained")
+    for exponent, axes in zip((1, 2), parts, strict=True):
+        found = [last(coefficient=c, exponent=exponent) for c in stiffness]
+        for name, words in quantities.items():
+            errors = [abs(values[name] / rigid[name] - 1) or np.nan for values in found]
+            axes.loglog(stiffness, errors, "o-", ms=3, label=words)
+        first = exponent / (exponent + 1) * (2 / np.pi / stiffness) ** (1 / exponent)
+        axes.loglog(stiffness, first, "k--", lw=1, label="approach, first order (C6)")
+        axes.set(title=f"m = {exponent}", xlabel="coefficient c (E* = R = 1)")
+    parts[0].set_ylabel("difference from c = ∞, relative")
+    parts[0].legend()
+    return figure
+
+
+def path_dependence() -> Figure:
+    """Draw where incremental and static answers differ in the P-Q plane: cases/study_path.toml."""
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "study_path.nc"
+        done = CliRunner().invoke(app, ["study", str(CASES / "study_path.toml"), "-o", str(target)])
+        assert done.exit_code == 0, done.output
+        with xarray.open_dataset(target) as study:
+            return ends_of_paths(study.load())
+
+
+def ends_of_paths(study: xarray.Dataset) -> Figure:
+    """Draw the differences at the ends of the paths of the study."""
+    normal, sliding = 60.0, 18.0  # P1 and mu P1, N
+    last = study[["shift_x", "stick_area", "contact_area", "tangential_load_x"]]
+    incremental, static = (last.sel(algorithm=name) for name in ("incremental", "static"))
+    share = incremental.tangential_load_x / sliding
+    load = (study.normal_load_2 / normal).broadcast_like(share)
+    quantities = (
+        ("shift: difference / largest shift", (incremental.shift_x - static.shift_x) / static.shift_x.max()),
+        (
+            "stick area: difference / contact area",
+            (incremental.stick_area - static.stick_area) / static.contact_area,
+        ),
+    )
+    figure, panels = plt.subplots(1, 2, figsize=(10, 4.4), sharey=True, layout="constrained")
+    line = np.array([0.0, 2.0])
+    for axes, (title, values) in zip(panels, quantities, strict=True):
+        axes.fill_between(line, 0.5 + line - 1.0, 2.0, color="0.93", lw=0, zorder=0)
+        drawn = axes.scatter(
+            load, share, c=abs(values), s=70, cmap="viridis", edgecolor="0.3", lw=0.5, zorder=3
+        )
+        figure.colorbar(drawn, ax=axes)
+        for sign in (1.0, -1.0):
+            axes.plot(line, sign * line, color="0.5", lw=1)
+        axes.plot(line, 0.5 + line - 1.0, color="#d55e00", lw=1.2, ls="--")
+        axes.plot([0.0, 1.0, 1.0], [0.0, 0.0, 0.5], color="k", lw=1)
+        axes.plot(1.0, 0.5, "k+", ms=12, zorder=4)
+        axes.set(title=title, xlabel="$P/P_1$", xlim=(0.5, 1.7), ylim=(-0.7, 1.5))
+    panels[0].set_ylabel(r"$Q/\mu P_1$")
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "hertz_spheres": lambda: plotting.overview(solved("hertz_spheres")),
     "contact_boundary": lambda: plotting.contact_boundary(solved("hertz_spheres", grid__spacing="0.1 mm")),
@@ -36,13 +130,83 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "fretting_zones": lambda: plotting.zones(fretting(), [10, 11, 12, 15, 20, 25, 30, 35]),
     "fretting_tractions": lambda: plotting.tractions(fretting(), [10, 11, 15, 20, 25, 30, 35, 40]),
     "cattaneo_mindlin": lambda: plotting.tractions(solved("cattaneo_mindlin"), [13, 19, 25, 31, 37]),
+    "interface": stiffening_interface,
+    "path_dependence": path_dependence,
     "mindlin_loop": lambda: plotting.loop(solved("mindlin_loop")),
     **{name.replace("-", "_"): figure.draw for name, figure in entries().items() if not figure.of_a_result},
 }
 
 
+# --- gallery --------------------------------------------------------------------------------------
+
+# Decks that take long: a lattice, or an accuracy, that is enough for a small picture.
+COARSER = {
+    "friction_table_9_3": "grid.spacing='3.5 um'",
+    "cattaneo_mindlin": "grid.nodes_in_radius=20",
+    "error_bars": "accuracy.target=0.05 --set title='Stiff sphere on aluminum to 5 %'",
+    "mindlin_loop": "grid.nodes_in_radius=20",
+    "adaptive_fretting": "solver.step_tolerance=0.05",
+    "rigid_plane": "grid.nodes_in_radius=20",
+    "subsurface_stress": "grid.nodes_in_radius=12",
+    "fretting_fatigue": "grid.nodes_in_radius=12",
+}
+HEADER = """\
+# Gallery
+
+The decks of `cases/`, each with its picture; [a table](cases.md) lists what they are compared with.
+"""
+DECK = re.compile(r"^\| `(\w+)\.toml` \| (.+?) \| .* \| `(\w+\.nc.*)` \|$")
+
+
+def decks() -> dict[str, tuple[str, str]]:
+    """Return what each deck of the tables of cases/README.md shows, and the arguments that draw it."""
+    rows = map(DECK.match, (CASES / "README.md").read_text(encoding="utf-8").splitlines())
+    return {row[1]: (row[2], row[3]) for row in rows if row}
+
+
+def commands(name: str) -> list[str]:
+    """Return the commands that run and draw a deck."""
+    coarser = f" --set {COARSER[name]}" if name in COARSER else ""
+    return [f"hexcontact run cases/{name}.toml{coarser}", f"hexcontact plot {decks()[name][1]}"]
+
+
+def gallery() -> str:
+    """Return the page."""
+    text = HEADER
+    for line in (CASES / "README.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("## W"):
+            text += f"\n{line}\n"
+        elif row := DECK.match(line):
+            name, shown = row[1], row[2]
+            block = "\n".join(["```sh", *commands(name), "```"])
+            text += f"\n### {name}\n\n{shown[0].upper()}{shown[1:]}.\n\n{block}\n"
+            text += f"\n![{shown}](images/cases/{name}.png)\n"
+    return text
+
+
+def draw_deck(name: str, picture: Path) -> None:
+    """Run and draw a deck by its commands; the picture has half their size and few colors."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        Path("cases").symlink_to(CASES)
+        for line in commands(name):
+            quiet = ["--quiet"] if line.startswith("hexcontact run") else []
+            done = CliRunner().invoke(app, [*shlex.split(line)[1:], *quiet])
+            assert done.exit_code == 0, f"{line}\n{done.output}"
+        [drawn] = Path().glob("*.png")
+        with Image.open(drawn) as image:
+            half = image.convert("RGB").reduce(2)
+    half.quantize(64, dither=Image.Dither.NONE).save(picture, optimize=True)
+
+
 def main() -> None:
     """Solve the cases and draw them."""
+    os.environ.setdefault("MPLBACKEND", "agg")
+    GALLERY.write_text(gallery(), encoding="utf-8")
+    print(f"written: {GALLERY}")
+    for name in decks():
+        picture = HERE / f"cases/{name}.png"
+        draw_deck(name, picture)
+        print(f"written: {picture}")
     for name, draw in FIGURES.items():
         draw().savefig(HERE / f"{name}.png", dpi=150)
         print(f"written: {HERE / name}.png")

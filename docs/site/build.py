@@ -52,6 +52,8 @@ def ford() -> int:
         root = "../" * (len(page.relative_to(FORTRAN).parts) - 1)
         text = text.replace("  </head>", BOOTSTRAP.format(root=root) + "  </head>", 1)
         text = re.sub(r'(navbar-brand" href=)[^<]*', rf'\1"{root}../index.html">hexcontact documentation', text)
+        # FORD links the procedures of an interface to places that it does not write
+        text = re.sub(r"(interface/\w+\.html)#moduleprocedure-\w+", r"\1", text)
         page.write_text(text, encoding="utf-8")
     return 0
 

@@ -25,7 +25,7 @@ from typer.testing import CliRunner
 from hexcontact.cli.app import app
 
 DOCS = Path(__file__).parents[1]
-PAGES = ("tutorial", "lattice", "surfaces", "reading", "../README")
+PAGES = ("tutorial", "lattice", "surfaces", "reading", "fatigue", "../README")
 WIDTH = "88"
 # Files begin with a comment that names them; other blocks of these languages are there to be read.
 NAME = re.compile(r"# (\w+\.(?:toml|py))\n")
@@ -38,7 +38,7 @@ RESIDUAL = re.compile(r"\b\d\.\de[+-]\d\d\b")
 TOLERANCE = 1e-8
 # Operator applications: where an iteration ends may depend on rounding.
 WORK = re.compile(r"\b[\d.]+(?= (?:operator )?applications\b)")
-WORK_TOLERANCE = 0.03
+WORK_TOLERANCE = 0.08  # where transforms begin in memory decides about the last bits
 
 
 @dataclass

@@ -18,7 +18,7 @@ COVERAGE_BUILD := build/coverage
 COVERAGE_SITE := build/coverage-site
 
 # Least share of lines that tests must reach, percent.
-COVERED_FORTRAN := 98
+COVERED_FORTRAN := 97
 COVERED_PYTHON := 92
 
 export PYTHON APT
@@ -152,7 +152,7 @@ coverage: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test $(STAMP
 coverage-report:
 	@$(py) -m coverage combine --quiet
 	@$(py) -m coverage report --fail-under=$(COVERED_PYTHON); python=$$?; \
-	$(py) -m gcovr --root . --filter fortran/ --gcov-ignore-parse-errors=negative_hits.warn --fail-under-line $(COVERED_FORTRAN) $(COVERAGE_BUILD) && exit $$python
+	$(py) -m gcovr --root . --filter fortran/ --gcov-ignore-parse-errors=negative_hits.warn --gcov-suspicious-hits-threshold 0 --fail-under-line $(COVERED_FORTRAN) $(COVERAGE_BUILD) && exit $$python
 
 package: $(STAMPS)/build-tools  ## source archive, wheel, pip install .: build them and use them outside the checkout
 	@$(py) .ci/package.py

@@ -38,6 +38,8 @@ module hc_direct_contact
     real(wp) :: compliance = 0.0_wp
     !> Law of contact
     class(normal_law_t), allocatable :: law
+    !> Matrix of the contact area and its factor: as large as the largest area so far
+    real(wp), allocatable :: matrix(:, :)
     type(options_t) :: options
   contains
     procedure :: solve_step
@@ -285,7 +287,7 @@ contains
 
   !> Pressure that closes the gap on the active nodes, but for what their springs give way: (K + C) p = approach - h.
   subroutine solve_active(self, control, target, h, compliance, active, p, delta, error)
-    class(direct_contact_t), intent(in) :: self
+    class(direct_contact_t), intent(inout) :: self
     !> force_control or displacement_control
     integer, intent(in) :: control
     !> Normal load [N] or approach [m]
@@ -301,7 +303,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: matrix(:, :), rhs(:, :)
+    real(wp), allocatable :: rhs(:, :)
     integer, allocatable :: node(:)
     integer :: i, n, info, stat
 
@@ -309,20 +311,25 @@ contains
     p = 0.0_wp
     node = pack([(i, i=1, size(active))], active)
     n = size(node)
-    allocate (matrix(n, n), rhs(n, 2), stat=stat)
+    if (allocated(self%matrix)) then
+      if (size(self%matrix, 1) < n) deallocate (self%matrix)
+    end if
+    stat = 0
+    if (.not. allocated(self%matrix)) allocate (self%matrix(n, n), stat=stat)
+    if (stat == 0) allocate (rhs(n, 2), stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the matrix of the contact area: use method "fft"')
       return
     end if
     !$omp parallel do if (n > 1000)
     do i = 1, n
-      matrix(:i, i) = self%flexibility%normal_influence(node(:i), node(i))
-      matrix(i, i) = matrix(i, i) + compliance(node(i))
+      self%matrix(:i, i) = self%flexibility%normal_influence(node(:i), node(i))
+      self%matrix(i, i) = self%matrix(i, i) + compliance(node(i))
     end do
     !$omp end parallel do
     rhs(:, 1) = 1.0_wp
     rhs(:, 2) = h(node)
-    call dposv('U', n, 2, matrix, n, rhs, n, info)
+    call dposv('U', n, 2, self%matrix, size(self%matrix, 1), rhs, n, info)
     if (info /= 0) then
       call raise(error, status%no_convergence, 'the flexibility matrix of the contact area is not positive definite')
       return

@@ -108,12 +108,12 @@ contains
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
     !> Directions of GMRES that are enough as a rule
-    integer, parameter :: n_direction = 4
+    integer, parameter :: n_direction = 6
     integer(long) :: n, everywhere, building, iterating, inside
 
     n = int(extent(1), long)*extent(2)
     ! states before and after, tractions to start from
-    everywhere = 2*(9*field + half) + 3*field
+    everywhere = 2*(10*field + half) + 3*field
     ! iterate with traction estimates; shear system; weights and vectors of its preconditioner
     everywhere = everywhere + (10 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 5*field + half + 4*field + half
     if (coupled) then

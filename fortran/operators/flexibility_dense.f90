@@ -96,21 +96,18 @@ contains
     logical, intent(in), optional :: unlike
     integer, parameter :: long = selected_int_kind(18)
     !> What BLAS packs matrices into: 2 to 15 MB, as it was built and for what processor
-    integer(long), parameter :: buffers = 8500000
+    integer(long), parameter :: buffers = 5500000
     !> Vectors of a node in contact with friction: rows and columns of its unknowns, 2.5 as a rule, and ten directions of GMRES
-    integer(long), parameter :: vectors = 1200
+    integer(long), parameter :: vectors = 1800
     integer(long) :: n, n_window, n_first
 
     n = n_contact
     n_window = int(extent(1), long)*extent(2)
     dense_memory = buffers + 8*n_block*4*n_window
+    n_first = min(7*n/5, n_window) ! the first guess is larger than the contact
     if (normal_only) then
-      ! areas on the way are larger than the contact; half of the matrix is touched
-      n_first = min(7*n/4, n_window)
-      dense_memory = dense_memory + 8*n_first**2/2
+      dense_memory = dense_memory + 8*n_first**2/2 ! half of the matrix is touched
     else
-      ! the first guess is larger than the contact
-      n_first = min(7*n/5, n_window)
       ! in single precision; then the complement of the sliding nodes and its factor, often of half the nodes
       dense_memory = dense_memory + fft_memory(extent, .false., 1, unlike) + 4*n_first**2/2 + 2*n**2 + vectors*n
     end if

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 import hexcontact
 from hexcontact import plotting
-from hexcontact.cli.app import app
+from hexcontact.cli.app import MODULES, app
 from hexcontact.core import contact
 from hexcontact.result.journal import journal_of
 from hexcontact.result.store import open_result
@@ -450,6 +450,30 @@ def test_help_is_quick() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True)
     assert "Usage" in done.stdout
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
+
+
+def test_table_of_modules_names_every_command() -> None:
+    named = {(f"hexcontact.cli.{module}", name) for module, names in MODULES.items() for name in names}
+    registered = {(info.callback.__module__, info.callback.__name__) for info in app.registered_commands}
+    assert named == registered
+
+
+def test_check_imports_only_what_it_needs(deck: Path) -> None:
+    spared = {f"hexcontact.cli.{module}" for module in MODULES if module != "deck"}
+    spared |= {
+        "hexcontact.solve.run",
+        "hexcontact.study",
+        "hexcontact.plotting",
+        "hexcontact.analytic.compare",
+    }
+    spared |= {"jinja2", "yaml", "xarray", "pandas", "netCDF4", "scipy", "pint", "matplotlib"}
+    program = (
+        f"import sys\nfrom hexcontact.cli.app import main\nsys.argv = ['', 'check', {str(deck)!r}]\n"
+        f"try:\n    main()\nexcept SystemExit:\n    pass\nprint(sorted({spared} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], env=ENVIRONMENT, capture_output=True, text=True)
+    assert "is ready to run" in done.stdout
     assert done.stdout.splitlines()[-1] == "[]", done.stderr
 
 

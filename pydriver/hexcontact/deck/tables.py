@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, cast
@@ -190,7 +189,6 @@ class Solver(Table):
     )
 
 
-@dataclass(frozen=True)
 class Fractions(Several):
     """Fractions of a segment, rising to 1."""
 

@@ -29,12 +29,10 @@ def check(text: str, bound: float) -> None:
         ("frictionless", 256, {"more": BOX}),
         ("frictionless", 256, {"more": INTERFACE}),
         ("friction, alike", 128, {}),
-        ("friction, alike", 256, {"steps": 4}),
-        ("friction, alike", 256, {"steps": 16}),
+        ("friction, alike", 192, {"steps": 12}),
         ("friction, unlike", 128, {"share": 0.4}),
         ("friction, unlike", 256, {"share": 0.4}),
-        ("friction, unlike", 256, {}),
-        ("friction, unlike", 256, {"steps": 8}),
+        ("friction, unlike", 192, {"steps": 6}),
         ("wear", 128, {}),
         ("wear", 128, {"steps": 6}),
     ],
@@ -49,7 +47,7 @@ def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, option
     [
         ("friction, alike", 44, 0.8),
         ("friction, unlike", 44, 0.8),
-        ("friction, unlike", 80, 0.8),
+        ("friction, unlike", 64, 0.8),
         ("friction, alike", 121, 0.15),
     ],
 )

@@ -6,6 +6,7 @@ the tables together (load history, size of the window, limits of this version).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import pairwise
@@ -376,7 +377,13 @@ class Deck(Table):
         for name, info in cls.model_fields.items():
             if name in data and name not in faulty:
                 with suppress(ValidationError):  # an absent key of another table, which is reported
-                    tables[name] = TypeAdapter(cast(Any, info.annotation)).validate_python(data[name])
+                    tables[name] = _adapter(cls, name).validate_python(data[name])
             elif name not in faulty:
                 tables[name] = info.get_default(call_default_factory=True)
         return tables, problems
+
+
+@functools.cache
+def _adapter(deck: type[Deck], name: str) -> TypeAdapter[Any]:
+    """Return what checks one table of a deck alone."""
+    return TypeAdapter(cast(Any, deck.model_fields[name].annotation))

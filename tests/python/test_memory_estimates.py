@@ -47,7 +47,7 @@ def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, option
     [
         ("friction, alike", 44, 0.8),
         ("friction, unlike", 44, 0.8),
-        ("friction, unlike", 64, 0.8),
+        ("friction, unlike", 80, 0.8),
         ("friction, alike", 121, 0.15),
     ],
 )

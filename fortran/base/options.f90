@@ -61,8 +61,9 @@ module hc_options
     !> Compliance of a layer under the largest pressure, over that of a node, above which pressure and gap are smooth up to the
     !> edge; coarse tolerance there: what is interpolated deserves it
     real(wp) :: soft_layer = 2.0_wp, smooth_tolerance = 3.0e-3_wp
-    !> The preconditioner is given the springs of a compliant interface anew where the residual has fallen to this share
-    real(wp) :: spring_share = 0.03_wp
+    !> The preconditioner is given the springs of a compliant interface anew where the residual has fallen to this share, and after
+    !> steps below this length: it takes nodes for stiffer than they are
+    real(wp) :: spring_share = 0.03_wp, short_step = 0.3_wp
   end type normal_options_t
 
   !> Newton's method on FFTs (docs/theory/friction.md, "Staggered sweep", "Coupled sweep", "Globalisation").

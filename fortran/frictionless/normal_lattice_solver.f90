@@ -8,8 +8,9 @@
 !> conjugate gradients. Where a set changes without end (rough surfaces), it is fixed until
 !> the linear problem on it is solved well enough to trust the next one.
 !>
-!> A compliant layer between the bodies gives each active node a spring, which is linearised anew in every iteration, (N6): the next
-!> direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the springs.
+!> A compliant layer between the bodies gives each active node a spring, (N6). In the first iterations it is linearised anew in every
+!> one: the next direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the
+!> springs.
 !>
 !> What is added to the pressure is multiplied in single precision, and pressure and gap are
 !> summed up in double precision. The bound on the error that this leaves in the gap is summed up, too; before it matters
@@ -36,6 +37,11 @@ module hc_normal_lattice_solver
   private
 
   public :: solve_on_normal_lattice
+
+  !> Iterations in which the springs of a compliant law are linearised anew; beyond them (exponents of 3 and more, rough surfaces)
+  !> only where their linear problem is solved to this share of the whole residual: that does not stall
+  integer, parameter :: most_linearized = 10
+  real(wp), parameter :: linear_share = 0.3_wp
 
 contains
 
@@ -124,6 +130,7 @@ contains
     allocate (next, mold=candidate)
     compliant = level%law%is_compliant()
     sprung_residual = huge(1.0_wp)
+    share = 1.0_wp
     anew = .true.
     history = huge(1.0_wp)
     fixed = .false.
@@ -175,9 +182,15 @@ contains
       end if
       if (compliant) then
         ! linearising costs no product; the inverse symbol of the springs serves while they change little
-        settled = now%residual < options%spring_share*sprung_residual
+        settled = now%residual < options%spring_share*sprung_residual .or. share < options%short_step
+        if (sweeps > most_linearized) then
+          settled = now%residual_active < linear_share*now%residual
+          anew = anew .or. settled
+        end if
         if (changed .or. settled) sprung_residual = now%residual
-        call linearize_law(level, now, classification_parameter(level, now), changed .or. settled)
+        if (changed .or. settled .or. sweeps <= most_linearized) then
+          call linearize_law(level, now, classification_parameter(level, now), changed .or. settled)
+        end if
         if (by_load) call find_approach(level, now)
       end if
       if (by_load .and. .not. allocated(now%punch)) call find_punch_pressure(level, now)

@@ -8,8 +8,8 @@
 !> conjugate gradients. Where a set changes without end (rough surfaces), it is fixed until
 !> the linear problem on it is solved well enough to trust the next one.
 !>
-!> A compliant layer between the bodies gives each active node a spring, (N6). In the first iterations it is linearised anew in every
-!> one: the next direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the
+!> A compliant layer between the bodies gives each active node a spring, (N6). In the first iterations it is linearised anew in
+!> each: the next direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the
 !> springs.
 !>
 !> What is added to the pressure is multiplied in single precision, and pressure and gap are

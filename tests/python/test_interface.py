@@ -54,7 +54,9 @@ def test_step_costs_little_more_than_without_layer(exponent: float, share: float
     """`share`: compression under Hertz's largest pressure over the approach, 1 m."""
     works = []
     for c in (2 / np.pi / share**exponent, None):
-        given = deck(c or 1.0, exponent, grid={"spacing": 1 / 40}, solver={"tolerance": 1e-8, "method": "fft"})
+        given = deck(
+            c or 1.0, exponent, grid={"spacing": 1 / 40}, solver={"tolerance": 1e-8, "method": "fft"}
+        )
         if c is None:
             del given["interface"]
         works.append(float(hc.Case.from_dict(given).run()["operator_applications"][-1]))

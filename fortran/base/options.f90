@@ -58,8 +58,12 @@ module hc_options
     real(wp) :: part_tolerance = 0.8_wp
     !> Lattices with fewer nodes are left to one thread: the start of the others takes longer than each of the short passes
     integer :: worth_sharing = 150000
-    !> A compliant interface is linearised anew where the linear problem is solved to this share of the whole residual
-    real(wp) :: linear_share = 0.3_wp
+    !> Compliance of a layer under the largest pressure, over that of a node, above which pressure and gap are smooth up to the
+    !> edge; coarse tolerance there: what is interpolated deserves it
+    real(wp) :: soft_layer = 2.0_wp, smooth_tolerance = 3.0e-3_wp
+    !> The preconditioner is given the springs of a compliant interface anew where the residual has fallen to this share, and after
+    !> steps below this length: it takes nodes for stiffer than they are
+    real(wp) :: spring_share = 0.03_wp, short_step = 0.3_wp
   end type normal_options_t
 
   !> Newton's method on FFTs (docs/theory/friction.md, "Staggered sweep", "Coupled sweep", "Globalisation").

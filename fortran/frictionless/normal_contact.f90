@@ -25,7 +25,7 @@ module hc_normal_contact
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
   use hc_subwindow, only: next_part
-  use hc_transfer, only: prolong_edge
+  use hc_transfer, only: prolong, prolong_edge
   implicit none
   private
 
@@ -166,7 +166,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: coarse
-    real(wp) :: work
+    real(wp) :: work, coarse_tolerance
     integer :: l
 
     call check_target([control], [target], tolerance, max_sweeps, error)
@@ -176,17 +176,22 @@ contains
       associate (level => self%level(l))
         if (level%space%count(level%candidate) == 0) cycle
         allocate (state%pressure(level%lattice%extent(1), level%lattice%extent(2)), source=0.0_wp)
+        coarse_tolerance = self%options%normal%coarse_tolerance
         if (allocated(coarse%pressure)) then
-          call prolong_edge(self%level(l + 1)%lattice, coarse%pressure, level%lattice, state%pressure, level%space)
+          if (is_smooth(level, self%level(l + 1)%space%max(coarse%pressure))) then
+            coarse_tolerance = self%options%normal%smooth_tolerance
+          end if
+          call prolong_pressure(self%level(l + 1), coarse, level, state%pressure)
         else
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
           call solve_on_normal_lattice(level, self%iterate(l), control, target, &
-                                       max(tolerance, self%options%normal%coarse_tolerance), max_sweeps, state, error)
+                                       max(tolerance, coarse_tolerance), max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
+          call move_alloc(state%gap, coarse%gap)
         else
           call solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
           if (allocated(error)) return
@@ -195,6 +200,51 @@ contains
     end do
     state%operator_applications = work
   end subroutine solve
+
+  !> Return whether pressure and gap are smooth up to the edge of the contact: on a layer that is softer than a node.
+  pure logical function is_smooth(level, p_max)
+    class(normal_lattice_t), intent(in) :: level
+    !> Largest pressure [Pa]
+    real(wp), intent(in) :: p_max
+
+    is_smooth = level%law%compliance_under(p_max) > level%options%normal%soft_layer*level%compliance
+  end function is_smooth
+
+  !> Interpolate the pressure from the next coarser lattice.
+  !>
+  !> Between rigid surfaces and on a stiff layer it falls to zero like the root of the distance. On a layer that is softer than a
+  !> node, pressure and gap are smooth: t = p - r g is interpolated, of which p + r sigma(p) = t follows, (N6).
+  subroutine prolong_pressure(coarser, coarse, level, pressure)
+    !> Coarser lattice, and pressure and gap there
+    type(normal_lattice_t), intent(in) :: coarser
+    type(contact_state_t), intent(in) :: coarse
+    !> Finer lattice
+    type(normal_lattice_t), intent(in) :: level
+    !> Pressure there
+    real(wp), intent(inout) :: pressure(:, :)
+    real(wp), dimension(size(pressure, 1)) :: compliance, offset
+    real(wp), allocatable :: contact(:, :)
+    real(wp) :: r, softest, p_max
+    integer :: row
+
+    p_max = coarser%space%max(coarse%pressure)
+    if (.not. is_smooth(level, p_max)) then
+      call prolong_edge(coarser%lattice, coarse%pressure, level%lattice, pressure, level%space)
+      return
+    end if
+    r = 1.0_wp/coarser%compliance
+    allocate (contact, source=coarse%pressure - r*min(coarse%gap, coarser%compliance*p_max))
+    call prolong(coarser%lattice, contact, level%lattice, pressure, level%space)
+    softest = level%options%contact%softest_layer*(level%compliance + level%law%compliance_under(p_max))
+    !$omp parallel do schedule(static) num_threads(level%space%threads) private(compliance, offset)
+    do row = 1, size(pressure, 2)
+      ! the tangent at the solution p is that of p + r sigma(p) = t, too
+      call level%law%linearize((row - 1)*size(pressure, 1) + 1, r, softest, spread(0.0_wp, 1, size(pressure, 1)), &
+                               -pressure(:, row)/r, level%candidate(:, row) .and. pressure(:, row) > 0.0_wp, compliance, offset)
+      pressure(:, row) = max((pressure(:, row) - r*offset)/(1.0_wp + r*compliance), 0.0_wp)
+    end do
+    !$omp end parallel do
+  end subroutine prolong_pressure
 
   !> Return the space of a lattice: one thread where the start of the others takes longer than each of the short passes.
   type(field_space_t) function space_of(self, lattice)

@@ -1,6 +1,6 @@
 !> Steps of an iteration for frictionless contact: direction and length.
 !>
-!> Equations: docs/theory/normal_contact.md, (N3) to (N5).
+!> Equations: docs/theory/normal_contact.md, (N3) to (N5), (N7).
 module hc_normal_directions
   use hc_precision, only: wp, sp
   use hc_conjugate_gradient, only: conjugate_gradient_t
@@ -9,7 +9,7 @@ module hc_normal_directions
   implicit none
   private
 
-  public :: find_residual, projected_step, next_direction, find_step, multiply_direction
+  public :: find_residual, projected_step, next_direction, next_sprung_direction, find_step, find_sprung_step
 
 contains
 
@@ -149,24 +149,88 @@ contains
     !$omp end parallel do
   end subroutine next_direction
 
-  !> Compute K d, with the springs of a compliant law.
-  subroutine multiply_direction(level, now)
+  !> Compute the next direction of conjugate gradients on springs, which change from one direction to the next.
+  !>
+  !> It is conjugate to the last one by the springs as they are now, (N7), so that no step is lost where they change.
+  subroutine next_sprung_direction(level, now, by_load, anew)
     !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(inout) :: level
+    type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
+    !> The normal load is prescribed, not the approach; there is no last direction
+    logical, intent(in) :: by_load, anew
+    real(wp), dimension(size(now%p, 2)) :: part, sum_z
     real(wp) :: unit
+    real(sp) :: back, mean
     integer :: row
 
-    call level%multiply(now%d, now%kd)
-    if (.not. allocated(now%compliance)) return
+    mean = 0.0_sp
+    if (by_load) then
+      !$omp parallel do schedule(static) num_threads(level%space%threads)
+      do row = 1, size(now%p, 2)
+        sum_z(row) = sum(real(now%z(:, row, 1), wp), mask=now%active(:, row))
+      end do
+      !$omp end parallel do
+      mean = real(sum(sum_z)/now%punch_sum, sp)
+    end if
     unit = now%p_unit/now%w_unit
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      now%kd(:, row, 1) = now%kd(:, row, 1) + real(unit*now%compliance(:, row)*now%d(:, row, 1), sp)
+      now%z(:, row, 1) = merge(now%z(:, row, 1), 0.0_sp, now%active(:, row))
+      if (by_load) now%z(:, row, 1) = now%z(:, row, 1) - mean*now%punch(:, row)
+      part(row) = 0.0_wp
+      if (.not. anew) part(row) = sum(now%z(:, row, 1)*(now%kd(:, row, 1) + unit*now%compliance(:, row)*now%d(:, row, 1)))
     end do
     !$omp end parallel do
-  end subroutine multiply_direction
+    back = 0.0_sp
+    if (.not. anew) back = max(real(-sum(part)/curvature(level, now), sp), 0.0_sp)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      if (anew) now%d(:, row, 1) = 0.0_sp
+      now%d(:, row, 1) = now%z(:, row, 1) + back*now%d(:, row, 1)
+    end do
+    !$omp end parallel do
+  end subroutine next_sprung_direction
+
+  !> Compute d^T (K + C) d, C the springs of a compliant law.
+  real(wp) function curvature(level, now)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(in) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(in) :: now
+    real(wp) :: part(size(now%p, 2))
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        part(row) = sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))
+        if (allocated(now%compliance)) part(row) = part(row) + now%p_unit/now%w_unit &
+                                                   *sum(now%compliance(from:to, row)*real(now%d(from:to, row, 1), wp)**2)
+      end associate
+    end do
+    !$omp end parallel do
+    curvature = sum(part)
+  end function curvature
+
+  !> Compute the length of the step along a direction by the springs of a compliant law; 0 if there is no curvature.
+  real(wp) function find_sprung_step(level, now)
+    !> Problem on the lattice, with its operators
+    type(normal_lattice_t), intent(in) :: level
+    !> Iterate
+    type(normal_iterate_t), intent(in) :: now
+    real(wp) :: part(size(now%p, 2)), steepness
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
+    do row = 1, size(now%p, 2)
+      part(row) = sum(real(now%d(:, row, 1), wp)*now%r(:, row, 1), mask=now%active(:, row))
+    end do
+    !$omp end parallel do
+    steepness = curvature(level, now)
+    find_sprung_step = 0.0_wp
+    if (steepness > 0.0_wp) find_sprung_step = sum(part)/steepness
+  end function find_sprung_step
 
   !> Compute the length of a step of conjugate gradients; 0 if there is no curvature.
   real(wp) function find_step(level, now, recurrence)
@@ -176,17 +240,8 @@ contains
     type(normal_iterate_t), intent(in) :: now
     !> Recurrence of conjugate gradients
     type(conjugate_gradient_t), intent(in) :: recurrence
-    real(wp) :: part(size(now%p, 2))
-    integer :: row
 
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
-    do row = 1, size(now%p, 2)
-      associate (from => now%span(1, row), to => now%span(2, row))
-        part(row) = sum(real(now%d(from:to, row, 1), wp)*now%kd(from:to, row, 1))
-      end associate
-    end do
-    !$omp end parallel do
-    find_step = recurrence%step_length(sum(part))
+    find_step = recurrence%step_length(curvature(level, now))
   end function find_step
 
 end module hc_normal_directions

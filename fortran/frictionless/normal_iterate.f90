@@ -214,13 +214,15 @@ contains
   end subroutine classify_compliant_row
 
   !> Linearise a compliant law about the present pressure and gap.
-  subroutine linearize_law(level, now, r)
+  subroutine linearize_law(level, now, r, precondition)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Classification parameter; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
+    !> Give the preconditioner these springs, too; absent: it does
+    logical, intent(in), optional :: precondition
     real(wp) :: gap(size(now%p, 1)), softest, p_max
     integer :: row
 
@@ -235,6 +237,9 @@ contains
     end do
     !$omp end parallel do
     call add_springs(level, now)
+    if (present(precondition)) then
+      if (.not. precondition) return
+    end if
     associate (n => size(now%p))
       call level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
     end associate
@@ -342,7 +347,7 @@ contains
     now%punch_sum = level%space%sum(now%punch)
   end subroutine find_punch_pressure
 
-  !> Update p <- p + share d, w <- w + share K d.
+  !> Update p <- p + share d, w <- w + share (K + C) d, C the springs of a compliant law.
   subroutine advance(level, now, share)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
@@ -360,9 +365,14 @@ contains
     !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
+        ! springs may be many times softer than the bodies: theirs is computed in double precision
+        if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
+                                                             - now%compliance(from:to, row)*now%p(from:to, row)
         call add_row(to - from + 1, step, now%d(from:to, row, 1), now%p(from:to, row))
         ! nodes that left the set carry no pressure, not even what single precision would leave of it
         where (.not. now%active(from:to, row)) now%p(from:to, row) = 0.0_wp
+        if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
+                                                             + now%compliance(from:to, row)*now%p(from:to, row)
       end associate
       call add_row(size(now%p, 1), closing, now%kd(:, row, 1), now%w(:, row))
       largest = max(largest, largest_of(size(now%p, 1), now%kd(:, row, 1)))

@@ -8,8 +8,9 @@
 !> conjugate gradients. Where a set changes without end (rough surfaces), it is fixed until
 !> the linear problem on it is solved well enough to trust the next one.
 !>
-!> A compliant layer between the bodies gives each active node a spring, which is linearised anew with every change of the set,
-!> and where the linear problem is solved better than the whole one, (N6). The closing of the gap contains that of the springs.
+!> A compliant layer between the bodies gives each active node a spring, (N6). In the first iterations it is linearised anew in
+!> each: the next direction is conjugate to the last one by the springs as they are now. The closing of the gap contains that of the
+!> springs.
 !>
 !> What is added to the pressure is multiplied in single precision, and pressure and gap are
 !> summed up in double precision. The bound on the error that this leaves in the gap is summed up, too; before it matters
@@ -18,7 +19,7 @@
 !> I. A. Polonsky and L. M. Keer, Wear 231, 1999, 206-219; M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 2003,
 !> 865-888.
 !>
-!> Equations: docs/theory/normal_contact.md, (N2) to (N6).
+!> Equations: docs/theory/normal_contact.md, (N2) to (N7).
 module hc_normal_lattice_solver
   use hc_precision, only: wp
   use hc_error, only: error_t
@@ -30,11 +31,17 @@ module hc_normal_lattice_solver
   use hc_normal_iterate, only: normal_iterate_t, rescale, find_approach, classify, classification_parameter, set_active, &
     linearize_law, add_springs, subtract_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
   use hc_normal_start, only: set_start
-  use hc_normal_directions, only: find_residual, projected_step, next_direction, find_step, multiply_direction
+  use hc_normal_directions, only: find_residual, projected_step, next_direction, next_sprung_direction, find_step, &
+    find_sprung_step
   implicit none
   private
 
   public :: solve_on_normal_lattice
+
+  !> Iterations in which the springs of a compliant law are linearised anew; beyond them (exponents of 3 and more, rough surfaces)
+  !> only where their linear problem is solved to this share of the whole residual: that does not stall
+  integer, parameter :: most_linearized = 10
+  real(wp), parameter :: linear_share = 0.3_wp
 
 contains
 
@@ -107,9 +114,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     logical, allocatable :: candidate(:, :), next(:, :)
-    real(wp) :: history(3), fixed_start, pressures, share
+    real(wp) :: history(3), fixed_start, pressures, share, softness, sprung_residual
     type(conjugate_gradient_t) :: recurrence
-    logical :: changed, fixed, fresh, compliant, settled
+    logical :: changed, fixed, fresh, compliant, settled, anew
     integer :: fits
     type(normal_options_t) :: options
 
@@ -122,6 +129,9 @@ contains
     if (allocated(error)) return
     allocate (next, mold=candidate)
     compliant = level%law%is_compliant()
+    sprung_residual = huge(1.0_wp)
+    share = 1.0_wp
+    anew = .true.
     history = huge(1.0_wp)
     fixed = .false.
     fresh = .false.
@@ -132,7 +142,9 @@ contains
       if (by_load) call find_approach(level, now)
       call classify(level, now, candidate, next, changed, error)
       if (allocated(error)) return
-      if (level%exact .and. now%closing_error > level%compliance*now%p_max*max(options%residual_share*now%residual, &
+      ! what an error of the gap does to the pressure falls with the stiffness of the layer
+      softness = max(level%compliance, level%law%compliance_under(now%p_max))
+      if (level%exact .and. now%closing_error > softness*now%p_max*max(options%residual_share*now%residual, &
                                                                        options%tolerance_share*tolerance)) then
         if (by_load) call fit_load(level, now, pressures)
         call find_closing(level, now, error)
@@ -168,12 +180,18 @@ contains
         call set_active(level, now, next)
         call recurrence%restart()
       end if
-      ! the law is linearised anew where the linear problem is solved better than the whole one
-      settled = now%residual_active < options%linear_share*now%residual
-      if (compliant .and. (changed .or. settled)) then
-        call linearize_law(level, now, classification_parameter(level, now))
+      if (compliant) then
+        ! linearising costs no product; the inverse symbol of the springs serves while they change little
+        settled = now%residual < options%spring_share*sprung_residual .or. share < options%short_step
+        if (sweeps > most_linearized) then
+          settled = now%residual_active < linear_share*now%residual
+          anew = anew .or. settled
+        end if
+        if (changed .or. settled) sprung_residual = now%residual
+        if (changed .or. settled .or. sweeps <= most_linearized) then
+          call linearize_law(level, now, classification_parameter(level, now), changed .or. settled)
+        end if
         if (by_load) call find_approach(level, now)
-        call recurrence%restart()
       end if
       if (by_load .and. .not. allocated(now%punch)) call find_punch_pressure(level, now)
       if (.not. (changed .and. fixed)) then
@@ -184,12 +202,20 @@ contains
       if (changed) then
         call projected_step(level, now, fixed, by_load, pressures)
         share = 1.0_wp
+        anew = .true.
+      else if (compliant) then
+        call next_sprung_direction(level, now, by_load, anew)
+        anew = .false.
       else
         call next_direction(level, now, by_load, recurrence)
       end if
-      call multiply_direction(level, now)
+      call level%multiply(now%d, now%kd)
       if (.not. changed) then
-        share = find_step(level, now, recurrence)
+        if (compliant) then
+          share = find_sprung_step(level, now)
+        else
+          share = find_step(level, now, recurrence)
+        end if
         if (.not. share > 0.0_wp) then
           ! nothing is left to gain in single precision, and perhaps at all
           if (.not. (level%exact .and. now%closing_error > 0.0_wp)) return

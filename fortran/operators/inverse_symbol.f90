@@ -33,8 +33,9 @@ module hc_inverse_symbol
   integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
   !> Self-compliance d_n of a node over lambda_1 and the spacing: K1(0) of the equilateral lattice.
   real(wp), parameter :: self_ratio = 2.854_wp
-  !> Compliance of springs, over d_n, up to which they count as stiff.
-  real(wp), parameter :: stiff = 0.5_wp
+  !> Mean compliance of springs, over d_n, up to which they count as stiff; compliance of a single one among them from which
+  !> on it counts as loose: with 4 it took the fewest iterations of 0.5, 1, 2, 4, 8 and none
+  real(wp), parameter :: stiff = 0.5_wp, loose = 4.0_wp
   !> Kernels of the tangential inverse; those on soft springs come after them.
   integer, parameter :: n_tangential = 3
 
@@ -51,14 +52,16 @@ module hc_inverse_symbol
     real(sp), allocatable, private :: given(:, :, :), wanted(:, :, :)
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
-    !> On springs along the normal: the inverse symbol, and the factor S of each node (n_col, n_row)
+    !> On springs along the normal: the inverse symbol, the factor S of each node, and the stiffness of loose ones (n_col, n_row)
     type(convolution_t), allocatable, private :: sprung
-    real(sp), allocatable, private :: share(:, :)
+    real(sp), allocatable, private :: share(:, :), loose(:, :)
     !> They are stiffer than the nodes: displacements go on beyond the edge as they do without springs
     logical, private :: stiff_springs = .false.
   contains
     !> Put the nodes on springs along the normal
     procedure :: set_springs
+    !> Return whether springs among stiff ones count as loose
+    procedure :: is_loose
     !> Traction that causes a given displacement, approximately
     procedure :: apply
     !> The same in single precision, displacements and tractions in any units of ratio `unit`
@@ -242,7 +245,7 @@ contains
   !> Put the nodes on springs along the normal, of a compliant interface.
   !>
   !> Their compliance varies smoothly from the middle of the contact to its edge, so that one inverse symbol, of the body on
-  !> springs of a mean compliance, serves them all, (P7).
+  !> springs of a mean compliance, serves them all, (P7). Loose springs along the edge of stiff ones stand for themselves.
   subroutine set_springs(self, compliance, active)
     class(inverse_symbol_t), intent(inout) :: self
     !> Compliance of each spring (n_col, n_row) [m/Pa]
@@ -257,12 +260,13 @@ contains
 
     if (.not. any(active .and. compliance > 0.0_wp)) return
     if (.not. allocated(self%sprung)) then
-      allocate (self%sprung, self%share(size(compliance, 1), size(compliance, 2)))
+      allocate (self%sprung, self%share(size(compliance, 1), size(compliance, 2)), &
+                self%loose(size(compliance, 1), size(compliance, 2)))
       call new_convolution(self%sprung, shape(compliance), good_size(shape(compliance)), 1, 1, self%convolution%space, error)
       if (.not. allocated(error)) call self%sprung%find_spectra(found, error)
       if (allocated(error)) then
         ! without memory for it: the symbol without springs still is a preconditioner
-        deallocate (self%sprung, self%share)
+        deallocate (self%sprung, self%share, self%loose)
         return
       end if
     end if
@@ -283,9 +287,24 @@ contains
     !$omp parallel do schedule(static) num_threads(self%convolution%space%threads)
     do row = 1, size(compliance, 2)
       self%share(:, row) = real(sqrt((mean + self_compliance)/(compliance(:, row) + self_compliance)), sp)
+      self%loose(:, row) = 0.0_sp
+      if (.not. self%stiff_springs) cycle
+      where (self%is_loose(compliance(:, row)))
+        self%share(:, row) = 0.0_sp
+        self%loose(:, row) = real(self%unit/(compliance(:, row) + self_compliance), sp)
+      end where
     end do
     !$omp end parallel do
   end subroutine set_springs
+
+  !> Return whether springs count as loose, which those in the middle are not.
+  elemental logical function is_loose(self, compliance)
+    class(inverse_symbol_t), intent(in) :: self
+    !> Compliance of a spring [m/Pa]
+    real(wp), intent(in) :: compliance
+
+    is_loose = compliance > loose*self_ratio*self%unit
+  end function is_loose
 
   !> Apply the inverse for nodes on springs along the normal.
   subroutine apply_on_springs(self, displacement, traction, edge)
@@ -310,7 +329,7 @@ contains
       field(1:size(traction)) => traction
       call edge%fold(field)
     end if
-    traction(:, :, 1) = self%share*traction(:, :, 1)
+    traction(:, :, 1) = self%share*traction(:, :, 1) + self%loose*displacement
   end subroutine apply_on_springs
 
   !> Compute the elastic compliance t_h = 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa].

@@ -117,9 +117,14 @@ contains
     logical, intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
+    logical :: stiff(size(active))
+
     associate (direction => direction)
+      stiff = active
+      ! beyond the nodes on loose springs there is no root of the distance
+      if (present(compliance)) stiff = active .and. .not. self%inverse%is_loose(compliance)
       if (.not. allocated(self%edge)) allocate (self%edge)
-      call new_edge_extension(self%edge, reshape(active, self%extent), self%space, self%options)
+      call new_edge_extension(self%edge, reshape(stiff, self%extent), self%space, self%options)
     end associate
     if (present(compliance)) call self%inverse%set_springs(reshape(compliance, self%extent), reshape(active, self%extent))
   end subroutine set_contact

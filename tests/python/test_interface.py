@@ -47,6 +47,22 @@ def test_reference_sphere(c: float, m: float, approach: float, peak: float) -> N
     assert ((gap < 0) == (pressure > 0)).mean() > 0.99
 
 
+@pytest.mark.parametrize(
+    ("exponent", "share", "most"), [(2.0, 0.01, 1.4), (2.0, 0.1, 1.2), (2.0, 1.0, 1.0), (3.0, 1.0, 1.5)]
+)
+def test_step_costs_little_more_than_without_layer(exponent: float, share: float, most: float) -> None:
+    """`share`: compression under Hertz's largest pressure over the approach, 1 m."""
+    works = []
+    for c in (2 / np.pi / share**exponent, None):
+        given = deck(
+            c or 1.0, exponent, grid={"spacing": 1 / 40}, solver={"tolerance": 1e-8, "method": "fft"}
+        )
+        if c is None:
+            del given["interface"]
+        works.append(float(hc.Case.from_dict(given).run()["operator_applications"][-1]))
+    assert works[0] < most * works[1]
+
+
 def test_what_is_known_without_it_does_not_hold() -> None:
     result = hc.Case.from_dict(deck(10.0, 2.0)).run()
     assert result.dataset.attrs["interface_coefficient"] == 10.0

@@ -64,6 +64,10 @@ module hc_options
     !> The preconditioner is given the springs of a compliant interface anew where the residual has fallen to this share, and after
     !> steps below this length: it takes nodes for stiffer than they are
     real(wp) :: spring_share = 0.03_wp, short_step = 0.3_wp
+    !> Iterations in which the springs of a compliant layer are linearised anew; beyond them (exponents of 3 and more, rough
+    !> surfaces) only where their linear problem is solved to this share of the whole residual: that does not stall
+    integer :: most_linearized = 10
+    real(wp) :: linear_share = 0.3_wp
   end type normal_options_t
 
   !> Newton's method on FFTs (docs/theory/friction.md, "Staggered sweep", "Coupled sweep", "Globalisation").

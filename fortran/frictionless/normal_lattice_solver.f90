@@ -38,11 +38,6 @@ module hc_normal_lattice_solver
 
   public :: solve_on_normal_lattice
 
-  !> Iterations in which the springs of a compliant law are linearised anew; beyond them (exponents of 3 and more, rough surfaces)
-  !> only where their linear problem is solved to this share of the whole residual: that does not stall
-  integer, parameter :: most_linearized = 10
-  real(wp), parameter :: linear_share = 0.3_wp
-
 contains
 
   !> Solve for a normal load or an approach.
@@ -183,12 +178,12 @@ contains
       if (compliant) then
         ! linearising costs no product; the inverse symbol of the springs serves while they change little
         settled = now%residual < options%spring_share*sprung_residual .or. share < options%short_step
-        if (sweeps > most_linearized) then
-          settled = now%residual_active < linear_share*now%residual
+        if (sweeps > options%most_linearized) then
+          settled = now%residual_active < options%linear_share*now%residual
           anew = anew .or. settled
         end if
         if (changed .or. settled) sprung_residual = now%residual
-        if (changed .or. settled .or. sweeps <= most_linearized) then
+        if (changed .or. settled .or. sweeps <= options%most_linearized) then
           call linearize_law(level, now, classification_parameter(level, now), changed .or. settled)
         end if
         if (by_load) call find_approach(level, now)

@@ -35,8 +35,8 @@ from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, STATE, WORN, names_wh
 from .events import Listener
 
 # Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap
-# and zones, with the copies of f2py. With friction: the state before and gaps, and holes in the heap of the C library;
-# the new state takes no memory before it is solved.
+# and zones, with the copies of f2py. With friction: the state before and gaps, and holes in the heap of the C
+# library; the new state takes no memory before it is solved.
 ARRAYS = {False: 8, True: 21}
 S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 

@@ -20,11 +20,13 @@ from typing import Any
 import netCDF4  # noqa: F401
 import numpy as np
 import psutil  # noqa: F401
+import rich.table  # noqa: F401
 import xarray  # noqa: F401
 
 import hexcontact
 from hexcontact.case import Case
 from hexcontact.cli import app as cli
+from hexcontact.cli import messages, run  # noqa: F401
 from hexcontact.result import store
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.step import Step

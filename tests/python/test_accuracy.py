@@ -46,14 +46,15 @@ def made(**keys: Any) -> Case:
 
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_true_errors_lie_within_the_estimate(problem: str) -> None:
-    """Closed solutions on 100 lattices of random spacing and origin, for every scalar that has one.
+    """Closed solutions on lattices of random spacing and origin, for every scalar that has one.
 
     In the median the estimates are 3 to 23 times the true error; what is twice as wide is of little use.
     """
-    found = estimates_over_errors(problem, 100, seed=1)
+    count = 60 if problem == "Cattaneo-Mindlin" else 100
+    found = estimates_over_errors(problem, count, seed=1)
     assert len(found) >= 4
     for name, ratios in found.items():
-        assert len(ratios) >= 100
+        assert len(ratios) >= count
         assert np.mean(ratios >= 1.0) >= 0.95, name
         assert 2.0 < np.median(ratios) < 25.5, name
 
@@ -70,7 +71,7 @@ def test_true_errors_lie_within_the_estimate_on_the_way_to_a_target() -> None:
 
 def test_errors_with_strong_friction_lie_within_the_estimate() -> None:
     """Against a fine lattice: the largest shear traction, at the edge of the stick zone, converges slowly."""
-    found = bars_over_errors("strong friction", 4, seed=3)
+    found = bars_over_errors("strong friction", 2, seed=3)
     assert np.mean(found["max_traction"] >= 1.0) >= 0.95  # 0.85 with the orders of smooth quantities
     assert np.mean(np.concatenate(list(found.values())) >= 1.0) >= 0.98
 

@@ -449,9 +449,12 @@ def test_other_cases_are_not_equal() -> None:
 # --- the work -------------------------------------------------------------------------------------
 
 
+COARSER = {"mindlin_loop": {"grid.nodes_in_radius": 20}}  # the number of iterations changes little
+
+
 @pytest.mark.parametrize("name", ["dissimilar_fretting", "mindlin_loop", "hertz_spheres"])
 def test_the_work_is_estimated_to_a_factor_of_two(name: str) -> None:
-    case = Case.from_toml(ROOT / f"cases/{name}.toml")
+    case = Case.from_toml(ROOT / f"cases/{name}.toml", COARSER.get(name))
     expected = operator_applications(case)
     assert expected is not None
     spent = case.run().history["operator_applications"].sum()

@@ -271,7 +271,7 @@ def test_own_limit_with_the_same_exponent_is_coulomb() -> None:
 @pytest.mark.parametrize("nu", [0.5, 0.3])
 def test_own_limit(m_t: float, c_t: float, nu: float) -> None:
     """No traction is above c_t psi^m_t, slip is on it; both methods agree, with coupling, too."""
-    given = own_limit(c_t, m_t)
+    given = own_limit(c_t, m_t, grid={"spacing": 0.16})
     given["body"]["1"]["poisson_ratio"] = nu
     results = []
     for method in ("fft", "direct"):

@@ -81,12 +81,18 @@ def test_wrong_values_are_named(value: object, dimension: units.Dimension, reaso
     assert bool(str(error.value)) == bool(reason)
 
 
-@given(
-    st.floats(allow_nan=False, allow_infinity=False, width=32), st.sampled_from(["nm", "um", "mm", "cm", "m"])
-)
-def test_plain_units_agree_with_pint(number: float, unit: str) -> None:
-    by_pint = units._registry().Quantity(number, unit).to("m").magnitude
-    assert to_si(f"{number!r} {unit}", LENGTH) == pytest.approx(by_pint, rel=4e-16, abs=1e-320)
+DIRECT = [
+    (dimension, unit)
+    for dimension in (LENGTH, PRESSURE, FORCE, TORQUE)
+    for unit in units._METRIC[dimension.unit]
+]
+
+
+@pytest.mark.parametrize(("dimension", "unit"), [*DIRECT, *((ANGLE, unit) for unit in units._ANGLES)])
+@given(number=st.floats(allow_nan=False, allow_infinity=False, width=32))
+def test_units_without_pint_agree_with_it(dimension: units.Dimension, unit: str, number: float) -> None:
+    by_pint = units._by_pint(number, unit, dimension)
+    assert to_si(f"{number!r} {unit}", dimension) == pytest.approx(by_pint, rel=5e-16, abs=1e-320)
 
 
 @given(st.text(max_size=30))
@@ -108,6 +114,7 @@ def test_pint_is_imported_only_for_unusual_units() -> None:
     script = (
         "import sys; import hexcontact.deck.tables as d; from hexcontact.deck.units import *;"
         "to_si('3 mm', LENGTH), to_si('2 GPa', PRESSURE), to_si('1 kN', FORCE), to_si('3 deg', ANGLE);"
+        "to_si('2 N mm', TORQUE);"
         "assert not {'pint', 'scipy', 'xarray', 'matplotlib', 'netCDF4'} & set(sys.modules), 'early import';"
         "to_si('3 inch', LENGTH); assert 'pint' in sys.modules"
     )

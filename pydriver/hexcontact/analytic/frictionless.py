@@ -19,7 +19,6 @@ from dataclasses import dataclass, field
 from typing import TypedDict, Unpack
 
 import numpy as np
-import scipy  # whose parts, a fifth of a second, are loaded at their first use
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, number, reals
@@ -263,6 +262,8 @@ def axisymmetric(
     -------
     AxisymmetricContact
     """
+    from scipy import optimize
+
     require_positive(effective_modulus=effective_modulus, scale=scale)
     name, value = driven_by(given)
     theta, weight = _gauss(64)
@@ -291,14 +292,14 @@ def axisymmetric(
         upper = scale
         while target(upper) < value:
             upper *= 2.0
-        a = scipy.optimize.brentq(lambda t: target(t) - value, 0.0, upper, xtol=1e-15 * upper, rtol=1e-15)
+        a = optimize.brentq(lambda t: target(t) - value, 0.0, upper, xtol=1e-15 * upper, rtol=1e-15)
     r = np.linspace(0.0, a, 401)
     found = pressure(r)
     at = int(np.argmax(found))
     peak = float(found[at])
     if at > 0:
         bounds = r[at - 1], r[min(at + 1, 400)]
-        peak = -scipy.optimize.minimize_scalar(
+        peak = -optimize.minimize_scalar(
             lambda s: -float(pressure(np.array(s))),
             bounds=bounds,
             method="bounded",
@@ -309,5 +310,7 @@ def axisymmetric(
 
 def _gauss(n: int) -> tuple[Array, Array]:
     """Return nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
-    node, weight = scipy.special.roots_legendre(n)
+    from scipy.special import roots_legendre
+
+    node, weight = roots_legendre(n)
     return 0.5 * (node + 1.0), 0.5 * weight

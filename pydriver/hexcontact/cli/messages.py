@@ -23,7 +23,6 @@ from ..text import visible
 from . import json_output, tables
 from .guard import print_error, print_output
 from .options import LogLevel
-from .plot import picture_of
 
 if TYPE_CHECKING:
     from ..problem.problem import Problem
@@ -148,6 +147,8 @@ def solved(
 
 def overview(path: Path) -> Path:
     """Draw a result beside its file."""
+    from .plot import picture_of
+
     return picture_of([open_result(path)], "overview", picture_beside(path), {})
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 from ..text import did_you_mean, listed
@@ -13,7 +12,6 @@ from .model import Table, meaning
 from .units import LENGTH, NUMBER, PRESSURE
 
 
-@dataclass(frozen=True)
 class _Point(Several):
     """A point of a body: x, y and its depth below the surface."""
 
@@ -24,7 +22,6 @@ class _Point(Several):
         return point
 
 
-@dataclass(frozen=True)
 class _Side(Several):
     """The smallest and the largest coordinate of a box along an axis."""
 

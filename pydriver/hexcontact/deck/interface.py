@@ -61,7 +61,6 @@ class TwoCoefficients:
         return f"{self.along:g} along {math.degrees(self.angle):.6g} deg from x, {self.across:g} across it"
 
 
-@dataclass(frozen=True)
 class FrictionKind(Kind):
     """A number, two of them with a direction, a formula of x and y in meters, or a map."""
 

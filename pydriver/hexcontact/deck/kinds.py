@@ -234,7 +234,6 @@ class Word(Kind):
         return {"enum": list(self.words)}
 
 
-@dataclass(frozen=True)
 class Text(Kind):
     """Any text."""
 
@@ -250,7 +249,6 @@ class Text(Kind):
         return {"type": "string"}
 
 
-@dataclass(frozen=True)
 class FileName(Text):
     """The name of a file."""
 
@@ -263,7 +261,6 @@ class FileName(Text):
         return Path(text) if text else None
 
 
-@dataclass(frozen=True)
 class HeightFormula(Text):
     """A formula of x and y, as text."""
 
@@ -280,7 +277,6 @@ class HeightFormula(Text):
         return text
 
 
-@dataclass(frozen=True)
 class Flag(Kind):
     """True or false."""
 

@@ -47,7 +47,7 @@ SYMBOLS = {
 class Table(BaseModel):
     """A table of a deck: immutable, with known keys only, and with all mistakes reported together."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False, defer_build=True)
 
     schema_of_all: ClassVar[Schema] = {}
     """Conditions of the schema on several keys."""

@@ -111,7 +111,6 @@ def shape(word: str) -> Callable[[type[_S]], type[_S]]:
 
     def register(surface: type[_S]) -> type[_S]:
         surface.model_fields["shape"] = FieldInfo.from_annotated_attribute(this, word)
-        surface.model_rebuild(force=True)
         SHAPES[word] = surface
         return surface
 
@@ -293,7 +292,6 @@ _REFUSED = {
 }
 
 
-@dataclass(frozen=True)
 class SurfaceKind(Kind):
     """A surface: one of the shapes as an inline table, or a `Surface` of Python."""
 

@@ -6,9 +6,9 @@ the tables together (load history, size of the window, limits of this version).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, cast
@@ -190,7 +190,6 @@ class Solver(Table):
     )
 
 
-@dataclass(frozen=True)
 class Fractions(Several):
     """Fractions of a segment, rising to 1."""
 
@@ -378,7 +377,13 @@ class Deck(Table):
         for name, info in cls.model_fields.items():
             if name in data and name not in faulty:
                 with suppress(ValidationError):  # an absent key of another table, which is reported
-                    tables[name] = TypeAdapter(cast(Any, info.annotation)).validate_python(data[name])
+                    tables[name] = _adapter(cls, name).validate_python(data[name])
             elif name not in faulty:
                 tables[name] = info.get_default(call_default_factory=True)
         return tables, problems
+
+
+@functools.cache
+def _adapter(deck: type[Deck], name: str) -> TypeAdapter[Any]:
+    """Return what checks one table of a deck alone."""
+    return TypeAdapter(cast(Any, deck.model_fields[name].annotation))

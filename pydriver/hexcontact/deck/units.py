@@ -1,7 +1,7 @@
 """Quantities of decks as floats in SI: ``"3.5 um"``, ``"432 GPa"``, ``"30 deg"``, bare numbers.
 
 Common metric units are scaled here, exactly, by moving the decimal point. Other units, and messages about
-units, are left to pint, whose import takes a third of a second.
+units, are left to pint, whose import takes longer than that of all other packages.
 """
 
 from __future__ import annotations
@@ -49,11 +49,12 @@ NUMBER = Dimension("a number", "", "0.3")
 # Decimal exponents of common units, by the SI unit of their dimension.
 _METRIC = {
     "m": {"nm": -9, "um": -6, "µm": -6, "mm": -3, "cm": -2, "m": 0},
-    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
-    "N": {"mN": -3, "N": 0, "kN": 3, "MN": 6},
+    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm^2": 6, "N/m^2": 0},
+    "N": {"uN": -6, "µN": -6, "mN": -3, "N": 0, "kN": 3, "MN": 6},
+    "N m": {"N um": -6, "N µm": -6, "mN m": -3, "N mm": -3, "N m": 0, "kN mm": 0, "kN m": 3},
 }
 
-_ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
+_ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0, "mrad": 1e-3}
 
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>.*?)\s*", re.ASCII

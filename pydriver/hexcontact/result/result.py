@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..analytic.compare import Comparison
 from ..arrays import Array, number
 from ..core.lattice import Lattice
 from ..deck.below import Stage
@@ -23,6 +22,8 @@ from .layout import Quantities, history_of, lattice_of, step_of
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
+
+    from ..analytic.compare import Comparison
 
 _WEARING = ("pressure", "traction_x", "traction_y", "slip_increment_x", "slip_increment_y", "zone")
 _SLIP = 2  # among the zones

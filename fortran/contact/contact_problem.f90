@@ -168,7 +168,7 @@ contains
     !> State before
     type(contact_state_t), intent(in) :: start
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Bound of all residuals
@@ -295,7 +295,7 @@ contains
     !> Bound of all residuals
     real(wp), intent(in) :: tolerance
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     !> w, u_x, u_y of the tractions (n_col, n_row, 3) [m]
     real(wp), intent(in) :: displacement(:, :, :)
     !> State to be completed

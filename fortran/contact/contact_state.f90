@@ -10,7 +10,7 @@ module hc_contact_state
   implicit none
   private
 
-  public :: contact_state_t, new_contact_state, new_friction_state, copy_tractions, touches_rim
+  public :: contact_state_t, new_contact_state, new_friction_state, add_fields, copy_tractions, touches_rim
   public :: check_problem, check_target, check_state
   public :: not_finite
   public :: not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, out_of_range
@@ -146,17 +146,32 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Space of the fields; absent: one thread
     type(field_space_t), intent(in), optional :: space
-    integer :: row
     type(field_space_t) :: own
 
     if (present(space)) own = space
-    call new_contact_state(state, lattice, own)
+    call add_fields(state, lattice, own)
+  end subroutine new_friction_state
+
+  !> Give a state its fields: no contact, nothing displaced. Numbers that are known stay.
+  subroutine add_fields(state, lattice, space)
+    !> State without fields
+    type(contact_state_t), intent(inout) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: row
+
     associate (n => lattice%extent)
-      allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2), &
+      allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)), state%traction(n(1), n(2), 2), &
+                state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2), &
                 state%accumulated_slip(n(1), n(2)), state%dissipation_density(n(1), n(2)))
     end associate
-    !$omp parallel do schedule(static) num_threads(own%threads)
+    !$omp parallel do schedule(static) num_threads(space%threads)
     do row = 1, lattice%extent(2)
+      state%pressure(:, row) = 0.0_wp
+      state%gap(:, row) = 0.0_wp
+      state%zone(:, row) = separated
       state%traction(:, row, :) = 0.0_wp
       state%relative_displacement(:, row, :) = 0.0_wp
       state%slip_increment(:, row, :) = 0.0_wp
@@ -164,7 +179,7 @@ contains
       state%dissipation_density(:, row) = 0.0_wp
     end do
     !$omp end parallel do
-  end subroutine new_friction_state
+  end subroutine add_fields
 
   !> Copy tractions, motions and loads of a state, from which an iteration starts.
   subroutine copy_tractions(state, start, space)

@@ -9,7 +9,7 @@ module hc_subwindow
   use hc_error, only: error_t
   use hc_options, only: multilevel_options_t
   use hc_lattice, only: lattice_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, load_target_t
   use hc_contact_solver, only: friction_solver_t
   implicit none
   private
@@ -55,7 +55,7 @@ contains
     !> State at the beginning of the step
     type(contact_state_t), intent(in) :: start
     !> Displacement that slip counts from (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Bound of all residuals
@@ -72,7 +72,6 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
 
     solved = .false.
-    call new_friction_state(state, whole%problem%lattice, whole%problem%space)
     associate (lattice => part%problem%lattice, west => low(1), east => high(1), south => low(2), north => high(2))
       call new_friction_state(before, lattice, whole%problem%space)
       before%pressure = start%pressure(west:east, south:north)
@@ -96,6 +95,7 @@ contains
       state%sweeps = after%sweeps
       solved = after%converged
       if (.not. solved) return
+      call add_fields(state, whole%problem%lattice, whole%problem%space)
       state%pressure(west:east, south:north) = after%pressure
       state%traction(west:east, south:north, :) = after%traction
     end associate

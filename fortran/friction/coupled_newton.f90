@@ -99,6 +99,7 @@ contains
       call now%problem%friction%find_bounds(1, now%p, plane(:n))
       where (now%contact .and. .not. shear_active(n + 1:)) x(2*n + 1:) = ahead*plane(:n) - system%slope*now%p
     end if
+    deallocate (ahead, aside)
 
     ! 3.
     call find_constraints(now, shear_active, driven, shear_columns, shear_missing)

@@ -40,7 +40,7 @@ contains
     !> State at the beginning of the step, in balance
     type(contact_state_t), intent(in) :: start
     !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> State to start from: the old one with new tractions and motions, or unchanged if the coarse lattices do not help

@@ -52,7 +52,7 @@ module hc_friction_iterate
     type(load_target_t) :: target
     real(wp) :: tolerance = 0.0_wp
     !> Initial gap; relative displacement at the beginning of the step
-    real(wp), allocatable :: h(:), origin(:)
+    real(wp), pointer, contiguous :: h(:) => null(), origin(:) => null()
     logical, allocatable :: candidate(:)
     !> Pressure moves nodes tangentially; shear tractions move them along the normal, and so the pressure
     logical :: shear_feels_pressure = .false., pressure_feels_shear = .false.
@@ -99,8 +99,8 @@ contains
     type(operators_t), intent(inout), target :: operators
     !> State to start from
     type(contact_state_t), intent(in) :: start
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m], not copied
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Bound of all residuals
@@ -125,16 +125,15 @@ contains
     highest = huge(1.0_wp)
     ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
     if (target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) highest = target%value(normal)
-    allocate (self%h(n), self%origin(2*n), self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
+    self%h(1:n) => problem%initial_gap
+    self%origin(1:2*n) => reference
+    allocate (self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
     allocate (self%candidate(n), self%contact(n))
     if (problem%normal_law%is_compliant()) allocate (self%pressure%compliance(n), self%pressure%offset(n), source=0.0_wp)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
     do row = 1, problem%lattice%extent(2)
       to = row*problem%lattice%extent(1)
       from = to - problem%lattice%extent(1) + 1
-      self%h(from:to) = problem%initial_gap(:, row)
-      self%origin(from:to) = reference(:, row, 1)
-      self%origin(n + from:n + to) = reference(:, row, 2)
       self%p(from:to) = start%pressure(:, row)
       self%q(from:to) = start%traction(:, row, 1)
       self%q(n + from:n + to) = start%traction(:, row, 2)

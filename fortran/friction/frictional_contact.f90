@@ -107,32 +107,34 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
-    !> Directions of GMRES that are enough as a rule
-    integer, parameter :: n_direction = 6
-    integer(long) :: n, everywhere, building, iterating, inside
+    !> Directions of GMRES that are enough as a rule: five or six, and the holes in the heap that those of earlier sweeps left
+    integer, parameter :: n_direction = 7
+    integer(long) :: n, everywhere, building, iterating, inside, recording
 
     n = int(extent(1), long)*extent(2)
-    ! states before and after, tractions to start from
-    everywhere = 2*(10*field + half) + 3*field
+    ! state before without its slip increment, tractions to start from
+    everywhere = (8 + 3)*field
     ! iterate with traction estimates; shear system; weights and vectors of its preconditioner
-    everywhere = everywhere + (10 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 5*field + half + 4*field + half
+    everywhere = everywhere + (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 5*field + half + 4*field + half
     if (coupled) then
       ! unknowns, slope, constraints thrice, and either what makes them or product, right-hand side
       everywhere = everywhere + (3 + 1)*field + 3*half
       building = (3*3*n_force + 2)*field
-      ! product; GMRES: vector and image, the products of all directions, the product itself
-      iterating = (3 + 2*3 + 3*n_direction + 3)*field
+      ! product; GMRES: vector, the products of all directions, the product itself
+      iterating = (3 + 3 + 3*n_direction + 3)*field
       ! packed: both of all directions, residuals, weights, constraints thrice
       inside = 3*(2*n_direction + 4 + 3*n_force)*field
     else
       ! unknowns, product, traction before; constraints twice, or the vector and image of conjugate gradients
       everywhere = everywhere + 3*2*field + 2*half
-      building = 2*2*max(n_force - 1, 1)*field
+      building = (2*2*max(n_force - 1, 1) + 2)*field
       iterating = 2*2*field
       ! packed: vectors of conjugate gradients, constraints twice
       inside = 2*(7 + 2*max(n_force - 1, 1))*field
     end if
-    friction_step_memory = n*everywhere + max(n*building, n*iterating + n_contact*inside)
+    ! state after, traction and displacements
+    recording = (10 + 2 + 3)*field + half
+    friction_step_memory = n*everywhere + max(n*building, n*iterating + n_contact*inside, n*recording)
   end function friction_step_memory
 
   !> Compute the displacements of given tractions by the operator of the finest lattice.
@@ -149,7 +151,7 @@ contains
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(frictional_contact_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
@@ -220,7 +222,7 @@ contains
   subroutine coarse_guess(self, reference, target, max_sweeps, guess, work, error)
     class(frictional_contact_t), intent(inout), target :: self
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Active sets that may be tried

@@ -10,7 +10,7 @@ module hc_lattice_solver
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
   use hc_options, only: newton_options_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, sweeps_used_up, &
+  use hc_contact_state, only: contact_state_t, add_fields, load_target_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
@@ -35,7 +35,7 @@ contains
     !> State to start from
     type(contact_state_t), intent(in) :: start
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous, target :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Bound of all residuals
@@ -56,7 +56,6 @@ contains
     options = problem%options%newton
     fixed = 0
     call operators%reset()
-    call new_friction_state(state, problem%lattice, operators%space)
     call now%set_start(problem, operators, start, reference, target, tolerance, error)
     if (allocated(error)) return
     ! sweeps that find pressure and shear traction one after the other
@@ -88,6 +87,7 @@ contains
           .and. .not. now%unsupported .and. fixed < options%max_fixed_sweeps) cycle
 
       ! the recorded tractions are admissible exactly, and judged by a product of their own
+      if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
       call record(now, state)
       state%motion = now%motion
       allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
@@ -99,6 +99,8 @@ contains
       call now%refresh(error)
       if (allocated(error)) return
     end do
+    ! numbers that are not finite: no tractions
+    if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
     if (.not. (state%converged .or. state%sliding)) then
       state%sliding = overloads(problem, target, state%pressure, state%residual_normal)
     end if

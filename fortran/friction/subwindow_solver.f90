@@ -78,7 +78,7 @@ contains
   subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(windowed_friction_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
@@ -116,6 +116,8 @@ contains
         if (.not. solved) exit
       end do
     end if
+    ! the contact has outgrown the part: its memory goes before the window takes more
+    if (allocated(self%part)) deallocate (self%part)
     call self%frictional_contact_t%solve_step(start, reference, target, tolerance, max_sweeps, state, error)
     state%operator_applications = state%operator_applications + work
     state%sweeps = state%sweeps + sweeps

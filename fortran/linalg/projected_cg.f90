@@ -68,15 +68,18 @@ contains
 
     space = system%space
     call new_active_set(nodes, active, space)
-    associate (n => nodes%n_active)
-      allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n), rhs_active(n))
-    end associate
     call nodes%pack_columns(constraint, b)
+    deallocate (constraint)
     call nodes%pack_columns(mb, m_b)
+    deallocate (mb)
+    associate (n => nodes%n_active)
+      allocate (rhs_active(n))
+      call nodes%pack(rhs, rhs_active)
+      deallocate (rhs)
+      allocate (r(n), z(n), d(n), ad(n), x_active(n), ax_active(n))
+    end associate
     call nodes%pack(x, x_active)
     call nodes%pack(ax, ax_active)
-    call nodes%pack(rhs, rhs_active)
-    deallocate (constraint, mb, rhs)
     allocate (onto(size(x)), from(size(x)))
     call space%fill(from, 0.0_wp)
     call invert_gram(b, m_b, inverse, independent, space)

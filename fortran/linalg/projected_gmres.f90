@@ -64,8 +64,8 @@ contains
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
     type(active_set_t) :: nodes
-    !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
-    real(wp), allocatable :: from(:), onto(:)
+    !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes)
+    real(wp), allocatable :: from(:)
     !> On the active nodes
     real(wp), allocatable :: w(:), packed(:), b(:, :), m_b(:, :), c_rows(:, :)
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
@@ -81,15 +81,17 @@ contains
     space = system%space
     call new_active_set(nodes, active, space)
     call nodes%pack_columns(columns, b)
+    deallocate (columns)
     call nodes%pack_columns(mb, m_b)
+    deallocate (mb)
     call nodes%pack_columns(rows, c_rows)
-    deallocate (columns, mb, rows)
+    deallocate (rows)
     call invert_gram(c_rows, m_b, inverse, independent, space)
     if (.not. independent) return
     associate (n => nodes%n_active)
       allocate (basis(1)%v(n), w(n), packed(n))
     end associate
-    allocate (onto(size(x)), from(size(x)))
+    allocate (from(size(x)))
     part = size(x)/size(weight)
     do i = 1, size(weight)
       call space%fill(from((i - 1)*part + 1:i*part), weight(i))
@@ -121,9 +123,10 @@ contains
       end if
       packed = basis(k)%v/w
       call nodes%unpack(packed, from)
-      call system%precondition(from, onto, error)
+      ! what comes of it is packed before the product takes its place
+      call system%precondition(from, basis(k)%image, error)
       if (allocated(error)) return
-      call nodes%pack(onto, basis(k)%z)
+      call nodes%pack(basis(k)%image, basis(k)%z)
       share(:, k) = -matmul(inverse, space%dots(c_rows, basis(k)%z))
       call space%add_columns(m_b, share(:, k), basis(k)%z)
       call nodes%unpack(basis(k)%z, from)

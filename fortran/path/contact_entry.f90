@@ -134,7 +134,7 @@ contains
   subroutine find_residuals(problem, reference, target, tolerance, state)
     type(friction_problem_t), intent(in) :: problem
     !> Displacement that slip counts from (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     type(contact_state_t), intent(inout) :: state

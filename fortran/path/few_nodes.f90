@@ -27,7 +27,7 @@ contains
     !> State at the beginning of the step
     type(contact_state_t), intent(in) :: start
     !> Displacement that slip counts from (n_col, n_row, 2) [m]
-    real(wp), intent(in) :: reference(:, :, :)
+    real(wp), intent(in), contiguous :: reference(:, :, :)
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
     !> Bound of all residuals

@@ -169,8 +169,9 @@ contains
 
   !> Advance a state to given loads or motions.
   subroutine advance_friction(handle, control, target, static, interpolated, tolerance, max_sweeps, max_cuts, n_node, &
-                              fields, numbers, new_fields, zone, new_numbers, residuals, sweeps, cuts, &
-                              operator_applications, flags, code, message)
+                              pressure, traction_x, traction_y, gap, displacement_x, displacement_y, slip, density, numbers, &
+                              new_fields, zone, new_numbers, residuals, sweeps, cuts, operator_applications, flags, &
+                              code, message)
     !f2py threadsafe
     !> Handle of the problem
     integer(c_int64_t), intent(in) :: handle
@@ -188,8 +189,9 @@ contains
     integer(c_int), intent(in) :: max_sweeps, max_cuts
     !> Number of nodes of the window
     integer(c_int), intent(in) :: n_node
-    !> The state to go on from
-    real(c_double), intent(in) :: fields(n_node, 10), numbers(12)
+    !> The state to go on from: the fields of a state but for the slip increment, each by itself, so that none is copied
+    real(c_double), intent(in) :: pressure(n_node), traction_x(n_node), traction_y(n_node), gap(n_node), displacement_x(n_node), &
+                                  displacement_y(n_node), slip(n_node), density(n_node), numbers(12)
     !> The new state
     real(c_double), intent(out) :: new_fields(n_node, 10)
     integer(c_int), intent(out) :: zone(n_node)
@@ -209,14 +211,23 @@ contains
     class(friction_solver_t), pointer :: solver
     type(error_t), allocatable :: error
     type(contact_state_t) :: state, next
+    integer :: n(2)
 
-    new_fields = 0.0_c_double
-    zone = 0
     call enter(handle, n_node, slot, error, merge(entry_fields*8_c_int64_t*n_node, 0_c_int64_t, interpolated /= 0))
     if (.not. allocated(error)) then
       call with_friction(slot, solver, error)
       if (.not. allocated(error)) then
-        call unpack_state(slot%lattice, fields, numbers, state)
+        n = slot%lattice%extent
+        allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2))
+        state%pressure = reshape(pressure, n)
+        state%traction(:, :, 1) = reshape(traction_x, n)
+        state%traction(:, :, 2) = reshape(traction_y, n)
+        state%gap = reshape(gap, n)
+        state%relative_displacement(:, :, 1) = reshape(displacement_x, n)
+        state%relative_displacement(:, :, 2) = reshape(displacement_y, n)
+        state%accumulated_slip = reshape(slip, n)
+        state%dissipation_density = reshape(density, n)
+        call unpack_numbers(numbers, state)
         call advance(solver, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
                      next, error, interpolated /= 0)
         if (allocated(solver%guess)) deallocate (solver%guess)
@@ -228,6 +239,9 @@ contains
       zone = reshape(next%zone, [n_node])
       flags = [merge(1, 0, [next%converged, next%sliding, next%clipped]), next%stopped]
     else
+      ! not before: until there is a new state its arrays take no memory
+      new_fields = 0.0_c_double
+      zone = 0
       new_numbers = 0.0_c_double
       flags = 0
     end if
@@ -348,10 +362,18 @@ contains
     state%slip_increment = reshape(fields(:, 7:8), [lattice%extent, 2])
     state%accumulated_slip = reshape(fields(:, 9), lattice%extent)
     state%dissipation_density = reshape(fields(:, n_field), lattice%extent)
+    call unpack_numbers(numbers, state)
+  end subroutine unpack_state
+
+  !> Unpack the numbers of a state.
+  subroutine unpack_numbers(numbers, state)
+    real(c_double), intent(in) :: numbers(:)
+    type(contact_state_t), intent(inout) :: state
+
     state%load(:n_load) = numbers(:n_load)
     state%motion = numbers(n_load + 1:n_load + n_motion)
     state%dissipated_energy = numbers(n_number)
-  end subroutine unpack_state
+  end subroutine unpack_numbers
 
   !> Pack a state into its arrays.
   subroutine pack_state(state, fields, numbers)

@@ -342,10 +342,11 @@ def test_memory_is_that_of_friction(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
     assert near[0] < core < near[1]
     assert memory_needed(case, lattice) > memory_needed(plain, lattice)
-    # Python holds the state before a step, which is also on its way into the core and out of it
+    # Python holds the state before a step, which goes into the core without a copy; the new one comes later
     large = case.on_lattice(lattice.spacing / 100, lattice.origin)
     in_python = memory_needed(large, large.lattice) - large.memory_needed(large.lattice)
-    assert in_python >= 3 * 8 * len(FrictionWindow.state) * large.lattice.size
+    held = 8 * len(FrictionWindow.state) * large.lattice.size
+    assert held <= in_python < 3 * held
     monkeypatch.setattr(memory, "available", lambda: 1000)
     monkeypatch.setattr("hexcontact.core.friction.FrictionalContact", None)  # must not be reached
     with pytest.raises(ResourceError, match="a window of .* needs .* GB of memory"):

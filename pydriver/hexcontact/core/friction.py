@@ -41,6 +41,7 @@ Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS, _NUMBERS, _RESIDUALS = (CORE[name] for name in ("fields", "numbers", "residuals"))
+_SLIP = ("slip_increment_x", "slip_increment_y")  # of a step, from which the next one does not start
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 """Motions of the remote parts, in the order of the core."""
 
@@ -289,7 +290,7 @@ class FrictionalContact(Contact):
             _api.advance_friction,
             *([_CONTROLS[word] for word in control], [*targets, *strain], static, entry == "interpolated"),
             *(tolerance, integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
-            self._columns(state),
+            *(self._vector(state, name) for name in _FIELDS if name not in _SLIP),
             [number(getattr(state, name), name) for name in _NUMBERS],
         )
         new_fields, zone, new_numbers, residuals, sweeps, cuts, work, flags = out
@@ -343,13 +344,15 @@ class FrictionalContact(Contact):
         """Return the fields of a state as columns of one array."""
         columns = np.empty((self.lattice.size, len(_FIELDS)), order="F")
         for column, name in enumerate(_FIELDS):
-            values = getattr(state, name)
-            columns[:, column] = checked_field(
-                np.where(self._mask, shaped(values, self.lattice, name), 0.0) if name == "gap" else values,
-                self.lattice,
-                name,
-            )
+            columns[:, column] = self._vector(state, name)
         return columns
+
+    def _vector(self, state: ContactState, name: str) -> Array:
+        """Return a field of a state as a vector, which is no copy if it can be."""
+        values = getattr(state, name)
+        if name == "gap":
+            values = np.where(self._mask, shaped(values, self.lattice, name), 0.0)
+        return checked_field(values, self.lattice, name)
 
     def extended(self, state: ContactState, lattice: Lattice) -> ContactState:
         """Return a state of a smaller window on the window of this problem.

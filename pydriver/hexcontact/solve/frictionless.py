@@ -35,9 +35,9 @@ from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, STATE, WORN, names_wh
 from .events import Listener
 
 # Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap
-# and zones, with the copies of f2py. With friction: the state before, the state, the copies of both, gaps,
-# coordinates.
-ARRAYS = {False: 8, True: 37}
+# and zones, with the copies of f2py. With friction: the state before and gaps, and holes in the heap of the C
+# library; the new state takes no memory before it is solved.
+ARRAYS = {False: 8, True: 21}
 S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 
 _ITEM = 8  # bytes of a float
@@ -51,7 +51,7 @@ _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the 
 _COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
 _LAW_ARRAYS = 6  # coefficients by node, here, in the core, on its lattices and parts
 _INTERFACE_ARRAYS = {False: 4, True: 6}  # springs of a compliant interface, and the symbol of bodies on them
-_WEAR_ARRAYS = 78  # fields of the cycles before and after a jump, and of their record
+_WEAR_ARRAYS = 108  # fields of the cycles before and after a jump, and of their record
 _END_ARRAYS = 3  # fields that remember the end of a load step of the cycle
 _ENTRY_ARRAYS = 45  # fields of the core for the places of nodes when their gap closed
 

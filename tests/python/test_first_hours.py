@@ -310,6 +310,13 @@ def test_a_wrong_case_is_named_by_the_names_that_were_given(folder: Path) -> Non
     assert {line.partition(" (in case ")[2] for line in refused("study", "first.toml")} == {"1: mu = 0.1)"}
 
 
+def test_a_plan_shows_no_rounding_errors(folder: Path) -> None:
+    shear = 'key = "load.2.path.1.tangential_load_x"\nname = "Q"\nexpression = "0.8 * 0.2 * 100"\n'
+    (folder / "short.toml").write_text(f"{STUDY}[[parameter]]\n{shear}", encoding="utf-8")
+    rows = [line.split() for line in command("study", "short.toml", "--plan").stdout.splitlines()]
+    assert rows[:2] == [["case", "mu", "Q", "state"], ["1", "0.3", "16.0", "missing"]]
+
+
 def test_a_study_names_its_parameters_and_has_no_empty_job(folder: Path) -> None:
     done = command("study", "study.toml", "--jobs", "1")
     assert done.exit_code == 0, done.output

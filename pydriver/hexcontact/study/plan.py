@@ -78,7 +78,12 @@ def hash_of(deck: str) -> str:
 def described(settings: Mapping[str, Any], names: Mapping[str, str]) -> str:
     """Write the parameters of a case on one line, by the names of those keys that have one."""
     named = {names.get(key, key): value for key, value in settings.items()}
-    return ", ".join(f"{name} = {shown(value)}" for name, value in named.items())
+    return ", ".join(f"{name} = {in_short(value)}" for name, value in named.items())
+
+
+def in_short(value: object) -> str:
+    """Write a value of a parameter, without the rounding errors of a range or an expression."""
+    return shown(float(f"{value:.10g}") if isinstance(value, float) else value)
 
 
 def plan(

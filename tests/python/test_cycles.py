@@ -5,6 +5,7 @@ from pathlib import Path
 import drawn
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.console import Console
 from typer.testing import CliRunner
@@ -65,6 +66,11 @@ def test_segments_and_cycles_of_a_result(result: Result) -> None:
     # the work of the load is what friction dissipates, but for the chords between the steps
     np.testing.assert_allclose(cycles["loop_area"], cycles["dissipated_energy"], rtol=0.03)
     assert (cycles["loop_area"] < cycles["dissipated_energy"]).all()
+
+
+def test_nothing_is_worn_without_wear(result: Result) -> None:
+    with pytest.raises(ValueError, match="the surfaces do not wear"):
+        plotting.field_map("worn_depth", result)
 
 
 def test_tables_and_json_have_the_energies(folder: Path, result: Result) -> None:
@@ -161,6 +167,33 @@ def test_axes_of_the_caller_hold_one_step(result: Result) -> None:
             plotting.FIGURES[name](result, [1, 2], ax=axes)
     with pytest.raises(ValueError, match="ax holds quantities of one unit"):
         plotting.history(result, ax=axes)
+
+
+def test_a_history_with_many_peaks_keeps_the_ends_of_its_segments() -> None:
+    # twenty segments of three steps; the torque turns in every step
+    histories = [
+        {"segment": 1 + k // 3, "normal_load": 9.0, "torque": 1e-5 * (-1) ** k}
+        | {"approach": 1e-6, "contact_radius": 1e-4, "max_pressure": 1e9}
+        for k in range(60)
+    ]
+    places = some_steps(histories, 24)
+    assert len(places) == 24 and set(range(2, 60, 3)) <= set(places)
+
+
+@pytest.mark.parametrize(
+    ("radius_x", "radius_y"), [("38 mm", "12 mm"), ("12 mm", "38 mm"), ("10 mm", "10 mm")]
+)
+def test_labels_of_pictures_are_inside_of_them(radius_x: str, radius_y: str) -> None:
+    shape = 'radius_x = "{}", radius_y = "{}"'
+    deck = DECK.replace(shape.format("30 mm", "10 mm"), shape.format(radius_x, radius_y))
+    result = Case.from_text(deck + SHEAR.format(30, 2, "to")).run()
+    for name in ("pressure", "traction_y", "slip_increment", "dissipation_density", "outlines", "boundary"):
+        figure = plotting.FIGURES[name](result)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        box, (width, height) = figure.get_tightbbox(canvas.get_renderer()), figure.get_size_inches()
+        assert box.x0 > -0.01 and box.x1 < width + 0.01, (name, box)
+        assert box.y0 > -0.01 and box.y1 < height + 0.01, (name, box)
 
 
 @pytest.mark.parametrize(("radius_x", "radius_y"), [("200 mm", "10 mm"), ("10 mm", "200 mm")])

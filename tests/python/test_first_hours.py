@@ -53,6 +53,7 @@ def refused(*words: str) -> list[str]:
 
 
 QUOTES = "a value with a unit stands in quotes: "
+PRESSING = 'normal_load = "100 N"\nramp = "cubic"'  # what the first load of the deck has
 WRONG = [  # what stands in the deck, what is written instead, the only lines of the answer
     ('normal_load = "100 N"', "normal_load = 40 N", [rf"\d+:18: is not TOML: .*; {QUOTES}\"40 N\""]),
     ('radius = "10 mm"', "radius = 10 mm", [f"9:.*; {QUOTES}\"10 mm\""]),
@@ -63,6 +64,12 @@ WRONG = [  # what stands in the deck, what is written instead, the only lines of
     ("poisson_ratio = 0.3\n", "nu = 0.3\n", [r"8:1: body\.1\.nu: unknown key; did you mean poisson_ratio\?"]),
     ("coefficient = 0.3", "mu = 0.3", [r".*friction\.mu: unknown key; did you mean coefficient\?"]),
     ('normal_load = "100 N"', 'P = "100 N"', [r".*load\.1\.P: unknown key; did you mean normal_load\?"]),
+    (PRESSING, 'force_x = "9 N"', [r".*load\.1\.force_x: .*; did you mean tangential_load_x\?"]),
+    (PRESSING, 'weight = "9 N"', [r".*load\.1\.weight: unknown key; known here: .*"]),
+    (PRESSING, 'tangential_load_x = "9 N"', [r".* above zero somewhere in the history"]),
+    ('"10 mm"', '"10,5 mm"', [r".*; a number has a decimal point: 10\.5"]),
+    ("[grid]", "[friction]", [r"\d+:10: is not TOML: Cannot declare \('friction',\) twice"]),
+    ("[[load]]", "[load]\nsteps = 1\n[load]", [r"\d+:6: .*; of several tables .*: \[\[load\]\]"]),
     ("radius = ", "R = ", [r".*body\.1\.surface\.R: unknown key; did you mean radius\?"]),
     ("nodes_in_radius = 20", 'h = "1 um"', [r".*grid\.h: unknown key; did you mean spacing\?"]),
     ("[friction]", "[frction]", [r".*frction: unknown key; did you mean friction\?"]),
@@ -280,6 +287,13 @@ def test_piped_tables_end_without_blanks(folder: Path) -> None:
         assert [line for line in lines if line != line.rstrip()] == []
 
 
+def test_piped_help_ends_without_blanks() -> None:
+    done = subprocess.run([sys.executable, "-m", "hexcontact", "run", "-h"], capture_output=True, check=True)
+    lines = done.stdout.decode().splitlines()
+    assert len(lines) > 20
+    assert [line for line in lines if line != line.rstrip()] == []
+
+
 def test_written_files_have_the_names_that_were_given(folder: Path) -> None:
     (folder / "sub").mkdir()
     for given in ("sub/out.nc", str(folder / "sub/out.nc")):
@@ -287,6 +301,20 @@ def test_written_files_have_the_names_that_were_given(folder: Path) -> None:
         assert shown == f"written: {given}, {given.replace('.nc', '.png')}"
     assert command("plot", "sub/out.nc").stdout == "written: sub/out_overview.png\n"
     assert command("report", "sub/out.nc").stdout == "written: sub/out.html\n"
+
+
+def test_a_wrong_case_is_named_by_the_names_that_were_given(folder: Path) -> None:
+    (folder / "wrong.toml").write_text(STUDY.replace("0.4]", "0.1]"), encoding="utf-8")
+    assert {line.partition(" (in case ")[2] for line in refused("study", "wrong.toml")} == {"2: mu = 0.1)"}
+    (folder / "first.toml").write_text(STUDY.replace("[0.3", "[0.1"), encoding="utf-8")
+    assert {line.partition(" (in case ")[2] for line in refused("study", "first.toml")} == {"1: mu = 0.1)"}
+
+
+def test_a_plan_shows_no_rounding_errors(folder: Path) -> None:
+    shear = 'key = "load.2.path.1.tangential_load_x"\nname = "Q"\nexpression = "0.8 * 0.2 * 100"\n'
+    (folder / "short.toml").write_text(f"{STUDY}[[parameter]]\n{shear}", encoding="utf-8")
+    rows = [line.split() for line in command("study", "short.toml", "--plan").stdout.splitlines()]
+    assert rows[:2] == [["case", "mu", "Q", "state"], ["1", "0.3", "16.0", "missing"]]
 
 
 def test_a_study_names_its_parameters_and_has_no_empty_job(folder: Path) -> None:

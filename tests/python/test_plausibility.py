@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from hexcontact import Case, open_result
-from hexcontact.analytic import hertz_sphere
+from hexcontact.analytic import hertz_ellipse, hertz_sphere
 from hexcontact.cli.app import app
 from hexcontact.core.estimators import expected_entry_error, expected_lattice_errors
 from hexcontact.deck.write import STARTERS, starter
@@ -75,6 +76,10 @@ def test_cases_need_no_warning(path: Path) -> None:
             {"solver__entry": "implicit"},
             ["the contact grows in 4.9 even steps, which leaves an error of about 41 %"],
         ),
+        (
+            {"solver__entry": "implicit", "load__1__steps": 1},
+            ["the contact grows in one step, which leaves an error of about "],
+        ),
         ({"solver__entry": "implicit", "load__1__steps": 40}, []),
         ({"solver__entry": "implicit", "load__1__steps": "auto"}, []),
     ],
@@ -94,6 +99,18 @@ def test_loads_that_grow_together_are_warned_of_with_alike_bodies() -> None:
     assert "about 32 % in the shear tractions" in sentence
     assert warned(**alike, load=[load | {"steps": 60}]) == []
     assert warned(**alike) == []  # pressed, then sheared
+
+
+def test_the_size_of_an_elongated_contact_is_two_half_axes() -> None:
+    surface = {"shape": "paraboloid", "radius_x": "5 mm", "radius_y": "50 mm"}
+    long = case(body__1__surface=surface, grid__nodes_in_radius=5)
+    pressed = hertz_ellipse(long.pair.effective_modulus, np.diag([1 / 5e-3, 1 / 50e-3]), normal_load=100.0)
+    words = plausibility.row(long)
+    major, minor = (float(part) for part in re.findall(r"([\d.]+) µm", words)[:2])
+    assert words.startswith("half-axes about ") and "spacings in the smaller one" in words
+    assert (major, minor) == pytest.approx((1e6 * pressed.semi_major, 1e6 * pressed.semi_minor), rel=0.05)
+    assert "spacings in the smaller half-axis of the contact may" in plausibility.warnings(long)[0]
+    assert plausibility.row(case()).startswith("radius about 234 µm, 20 spacings;")
 
 
 def test_a_refined_lattice_is_judged_by_its_error_bars() -> None:

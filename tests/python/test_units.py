@@ -55,7 +55,11 @@ def test_values_become_si(text: object, dimension: units.Dimension, expected: fl
         ("3 %", ANGLE, '"%" is a pure number'),
         ("3 m/N", LENGTH, "a quantity in"),
         ("3 furlongz", LENGTH, '"furlongz" is not a known unit'),
-        ("3 Mpa", PRESSURE, '"Mpa" is not a known unit'),
+        ("3 Mpa", PRESSURE, '"Mpa" is not a known unit; did you mean MPa?'),
+        ("3 gpa", PRESSURE, '"gpa" is not a known unit; did you mean GPa?'),
+        ("3 N/mm2", PRESSURE, '"N/mm2" is not a known unit; did you mean N/mm^2?'),
+        ("3 Mn", FORCE, '"Mn" is not a known unit; did you mean mN or MN?'),
+        ("3,5 mm", LENGTH, "a number has a decimal point: 3.5"),
         ("3 mm**9**9**9", LENGTH, "is not a known unit"),  # would keep pint busy for ever
         ("3 mm^999999999", LENGTH, "is not a known unit"),
         ("3 __import__('os')", LENGTH, "is not a known unit"),

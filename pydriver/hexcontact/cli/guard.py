@@ -7,6 +7,7 @@ import errno
 import functools
 import io
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -122,6 +123,15 @@ class _Outlet(io.FileIO):
         return memoryview(content).nbytes
 
 
+class _Unpadded(io.TextIOWrapper):
+    """Text of a pipe or file, without the blanks at the ends of lines that help texts are padded with."""
+
+    def write(self, text: str) -> int:
+        """Write text."""
+        super().write(re.sub(r" +(?=\n)", "", text))
+        return len(text)
+
+
 @contextlib.contextmanager
 def standard_streams() -> Iterator[None]:
     """Let a command end normally although its standard streams are closed, full or no longer read.
@@ -141,7 +151,7 @@ def standard_streams() -> Iterator[None]:
         setattr(
             sys,
             name,
-            io.TextIOWrapper(
+            (io.TextIOWrapper if outlet.isatty() else _Unpadded)(
                 io.BufferedWriter(outlet),
                 encoding=plain.encoding if plain else "utf-8",
                 errors="replace",  # a terminal without µ gets a question mark, not a traceback

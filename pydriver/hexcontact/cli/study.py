@@ -12,7 +12,7 @@ import typer
 
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
-from ..text import shown, text_table
+from ..text import text_table
 from .guard import Content, Failure, command, print_error, print_output
 from .options import AsJson, Level, LogFile, Quiet, argument, flag, output_to
 
@@ -102,6 +102,8 @@ def study(
 
 def _plan(study: Study, as_json: bool) -> Content:
     """Print the cases of a study with their parameters and states; nothing is solved or written."""
+    from ..study.plan import in_short
+
     states = study.states()
     cases = list(zip(map(study.folder.number, study.cases), study.cases, states, strict=True))
     if as_json:
@@ -109,7 +111,7 @@ def _plan(study: Study, as_json: bool) -> Content:
         return {"title": study.title, "output": study.output, "cases": content}
     headers = ("case", *(axis.name for axis in study.plan.axes), "state")
     rows = [
-        (str(number), *(shown(case.settings.get(axis.key, "-")) for axis in study.plan.axes), state)
+        (str(number), *(in_short(case.settings.get(axis.key, "-")) for axis in study.plan.axes), state)
         for number, case, state in cases
     ]
     print(text_table(headers, rows))

@@ -249,7 +249,9 @@ class Segment(_Driven):
     def conflicts(cls, data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Require one control of each motion, and one kind of ramp."""
         whole = "path" in data or "series" in data
-        if not whole and not any(key in data for key in DRIVEN):
+        known = cls.known_keys()
+        # an unknown key may be that of the load
+        if not whole and not any(key in DRIVEN or (key not in known and not cls.meant(key)) for key in data):
             yield "", "expected at least one of normal_load, tangential_load_x, ... or approach, shift_x, ..."
         for force, displacement in LOADS.values():
             if force in data and displacement in data:

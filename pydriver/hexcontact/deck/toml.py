@@ -18,6 +18,7 @@ DEEPEST = 50  # levels of tables and arrays; no key needs more than six
 _QUOTED = re.compile(r"""\"[^\"]*\"|'[^']*'|\#.*""")
 _COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)\s*$")
 _BRACKET = re.compile(r"(\w+)\[\d*\]")
+_ARRAYS = ("load", "stress", "fatigue", "parameter")  # tables of which a file may have several
 _TWICE = re.compile(r"Cannot declare \('(\w+)',\) twice")
 _WITH_UNIT = re.compile(r"(?<![\w.])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*(?:[^\W\d_]+[\w/^*·]*|[%°])")
 
@@ -70,7 +71,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
             hint = f'; a value with a unit stands in quotes: "{bare[0].strip()}"'
         elif comma := _COMMA.search(unquoted):
             hint = f"; a number has a decimal point: {comma[1]}.{comma[2]}"
-        elif twice := _TWICE.match(message):
+        elif (twice := _TWICE.match(message)) and twice[1] in _ARRAYS:
             hint = f"; of several tables each begins with two brackets: [[{twice[1]}]]"
         sentence = f"{name}:{place[1]}:{place[2]}: is not TOML: {message[: place.start()]}{hint}"
         raise DeckError(sentence, [Fault(sentence, "", "", name, int(place[1]), int(place[2]))]) from None

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
+from ..text import listed
+
 if TYPE_CHECKING:
     import pint
 
@@ -123,7 +125,7 @@ def _from_text(text: str, dimension: Dimension) -> float:
 
 
 def _by_pint(number: float, unit: str, dimension: Dimension) -> float:
-    unknown = UnitError(f'"{unit}" is not a known unit')
+    unknown = UnitError(_unknown(number, unit, dimension))
     if len(unit) > _LONGEST_UNIT or _UNIT.fullmatch(unit) is None:
         raise unknown
     registry = _registry()
@@ -136,6 +138,16 @@ def _by_pint(number: float, unit: str, dimension: Dimension) -> float:
     if not _same(quantity.units, target.units):
         raise UnitError(f'"{unit}" is {_describe(quantity)}')
     return float(quantity.magnitude / target.magnitude)
+
+
+def _unknown(number: float, unit: str, dimension: Dimension) -> str:
+    """Return the sentence about an unknown unit, with the one that is meant if it differs little."""
+    if decimals := re.match(r",\d+", unit):
+        return f"a number has a decimal point: {number:g}.{decimals[0][1:]}"
+    alike = [known for known in _METRIC.get(dimension.unit, {}) if known.lower() == unit.lower()]
+    power = re.sub(r"(?<=[^\W\d_])(?=\d$)", "^", unit)
+    hint = listed(alike, "or") if alike else power if power != unit else ""
+    return f'"{unit}" is not a known unit' + (f"; did you mean {hint}?" if hint else "")
 
 
 def _same(units: Any, other: Any) -> bool:

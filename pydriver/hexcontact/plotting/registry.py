@@ -11,7 +11,7 @@ from typing import ParamSpec
 import matplotlib
 from matplotlib.figure import Figure
 
-from .style import STYLE
+from .style import STYLE, settle
 
 P = ParamSpec("P")
 Draw = Callable[P, Figure]
@@ -68,12 +68,16 @@ def entries() -> dict[str, Entry]:
 
 
 def styled(draw: Draw[P]) -> Draw[P]:
-    """Return a function that draws in the common style."""
+    """Return a function that draws in the common style, and lays out figures that are not the caller's."""
+    signature = inspect.signature(draw)
 
     @functools.wraps(draw)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
         with matplotlib.rc_context(STYLE):
-            return draw(*args, **kwargs)
+            figure = draw(*args, **kwargs)
+            if signature.bind(*args, **kwargs).arguments.get("ax") is None:
+                settle(figure)
+            return figure
 
     return drawn
 

@@ -20,6 +20,7 @@ from matplotlib.transforms import ScaledTranslation
 COMPUTED, EXACT, THIRD, GUIDE = "#0072B2", "#D55E00", "#009E73", "0.55"
 IN_CONTACT = "#56B4E9"
 _NAMED = 10  # labels of a color scale
+_PASSES = 8  # of the layout at most; three to five are usual
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
@@ -47,6 +48,17 @@ def drawing(ax: Axes | None, width: float, height: float, equal: bool = False) -
         return cast(Figure, ax.get_figure(root=True)), ax
     figure = Figure(figsize=(width, height), layout="compressed" if equal else "constrained")
     return figure, figure.add_subplot()
+
+
+def settle(figure: Figure) -> None:
+    """Repeat the layout of a figure until its axes stay in place; labels may be beyond the edge before."""
+    engine = figure.get_layout_engine()
+    for _ in range(_PASSES if engine is not None else 0):
+        before = [axes.get_position(original=True).bounds for axes in figure.axes]
+        cast(Any, engine).execute(figure)
+        after = [axes.get_position(original=True).bounds for axes in figure.axes]
+        if np.allclose(before, after, rtol=0.0, atol=1e-3):
+            break
 
 
 def set_title(figure: Figure, title: str, ax: Axes | None = None) -> None:

@@ -282,7 +282,7 @@ class History:
             first = self._entries[0].normal_load
             key, value = (("load", 0, "normal_load"), first) if first is not None else (("load",), MISSING)
             sentence = "expected a normal load or an approach above zero somewhere in the history"
-            problems.append(Mistake(key, value, sentence))
+            return [Mistake(key, value, sentence)]  # from which sliding and unknown shares follow
         return problems
 
 

@@ -90,14 +90,14 @@ LIMITS = (
     ),
     Limit(
         "lattice_error",
-        "{spacings:.2g} spacings in the contact radius may leave errors of {lattice_words}; "
+        "{spacings:.2g} spacings in the {radius_words} may leave errors of {lattice_words}; "
         "{needed_spacings:g} leave at most 5 %",
         "Errors fall with the square of the spacings, or faster: (X1), (X2)",
         most=_LATTICE_ERROR,
     ),
     Limit(
         "step_error",
-        "the contact grows in {growing_steps:.2g} even steps, which leaves an error of about {step_percent} "
+        "the contact grows in {growing_words}, which leaves an error of about {step_percent} "
         "in the shear tractions (rings of nodes that enter together); {needed_steps:.2g} steps leave 10 %, "
         'solver.entry = "interpolated" less at two to six times the work of a step',
         "Nodes that enter are charged with the slip of the whole step: (X3) to (X5)",
@@ -110,6 +110,7 @@ _OPEN = (-math.inf, math.inf)
 _ASSUMED = 0.5  # Q/mu P of shear that is prescribed by a motion: a ring of a fifth of the radius
 _NOTICED = 0.2  # Q/mu P below which slip dissipates next to no energy
 _ALIKE = 0.02  # beta up to which the shear of pressing is less than 1.5 % of the pressure
+_ROUND = 0.95  # smaller half-axis over radius from which an estimated contact counts as a circle
 _STEADY = 0.05  # exponent of the radius on the load up to which a contact does not grow: punches
 
 
@@ -157,6 +158,8 @@ def warnings(case: Problem) -> list[str]:
     worth = [f"{percent(error)} in the {spelled(name)}" for error, name in errors if error > 0.01]
     known = found | {
         "lattice_words": listed(worth, "and") if worth else "",
+        "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
+        "growing_words": _even_steps(found.get("growing_steps", 0.0)),
         "step_percent": percent(found.get("step_error", 0.0)),
     }
     passed = [
@@ -170,11 +173,28 @@ def row(case: Problem) -> str:
     if case.estimate is None:
         return ""
     found = expected(case)
-    radius, pressure = quantity(found["contact_radius"], "m", 3), quantity(found["max_pressure"], "Pa", 3)
+    pressure, axes = quantity(found["max_pressure"], "Pa", 3), _half_axes(found)
+    size = f"radius about {quantity(found['contact_radius'], 'm', 3)}, {found['spacings']:.2g} spacings"
+    if axes:
+        major, minor = (quantity(axis, "m", 3) for axis in axes)
+        size = f"half-axes about {major} by {minor}, {found['spacings']:.2g} spacings in the smaller one"
     return (
-        f"radius about {radius}, {found['spacings']:.2g} spacings; p_max about {pressure}, "
+        f"{size}; p_max about {pressure}, "
         f"{found['pressure_ratio']:.2g} E*; slope at the edge {found['slope']:.2g}"
     )
+
+
+def _half_axes(found: dict[str, Any]) -> tuple[float, float] | None:
+    """Return the expected half-axes of an elongated contact, as those of an ellipse; None of a round one."""
+    if "half_width" not in found or found["half_width"] > _ROUND * found["contact_radius"]:
+        return None
+    return found["contact_radius"] ** 2 / found["half_width"], found["half_width"]
+
+
+def _even_steps(count: float) -> str:
+    """Return a number of even steps in words."""
+    words = f"{count:.2g}"
+    return "one step" if words == "1" else f"{words} even steps"
 
 
 def limits() -> list[dict[str, Any]]:

@@ -196,15 +196,19 @@ def ends_of_segments(histories: Sequence[History]) -> list[int]:
 
 
 def some_steps(histories: Sequence[History], most: int) -> list[int]:
-    """Return the indices of some steps of a long history: ends of segments, peaks, others evenly."""
+    """Return the indices of some steps of a long history: ends of segments, then peaks, then others.
+
+    Of each kind that exceeds the places left, evenly chosen ones.
+    """
     names = [*worth_showing(histories), "max_pressure"]
     turns = {place for name in names for place in turning_points(_column(histories, name))}
-    kept = sorted({*ends_of_segments(histories), *turns})
-    others = [k for k in range(len(histories)) if k not in kept]
-    spare = most - len(kept)
-    if spare < 0:
-        return [kept[(k + 1) * len(kept) // most - 1] for k in range(most)]
-    return sorted([*kept, *{others[k * len(others) // spare] for k in range(spare) if others}])
+    last = len(histories) - 1
+    kept = {last}
+    for places in (ends_of_segments(histories), sorted(turns), range(last)):
+        others = [place for place in places if place not in kept]
+        room = min(most - len(kept), len(others))
+        kept |= {others[k * len(others) // room] for k in range(room)}
+    return sorted(kept)
 
 
 def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:

@@ -14,7 +14,7 @@ from ..arrays import Array, Mask
 from ..core.edges import ContactEdges, ZoneMesh
 from ..core.interpolation import linear
 from ..text import visible, worded
-from ..variables import LARGEST, VARIABLES, spelled
+from ..variables import LARGEST, VARIABLES, WORN, spelled
 from .interpolate import PressureField, is_kept
 from .layout import lattice_of, step_of
 
@@ -132,6 +132,8 @@ class StepView:
         if name not in self.data:
             if self.friction == 0.0 and name in VARIABLES and VARIABLES[name].frictional:
                 raise ValueError(f"a contact without friction has no {words}")
+            if name in WORN and "wear_cycles" not in self.data:
+                raise ValueError("the surfaces do not wear; a deck with [wear] is needed")
             raise ValueError(f"the {words} was not kept (output.fields)")
         values = self.data[name].values
         if not is_kept(values):

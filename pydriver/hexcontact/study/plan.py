@@ -58,7 +58,7 @@ class PlannedCase:
         return hash_of(self.deck)
 
     def __str__(self) -> str:
-        return described({self.names.get(key, key): value for key, value in self.settings.items()})
+        return described(self.settings, self.names)
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,15 @@ def hash_of(deck: str) -> str:
     return hashlib.sha256(deck.encode()).hexdigest()[:20]
 
 
-def described(settings: Mapping[str, Any]) -> str:
-    """Write the parameters of a case on one line."""
-    return ", ".join(f"{key} = {shown(value)}" for key, value in settings.items())
+def described(settings: Mapping[str, Any], names: Mapping[str, str]) -> str:
+    """Write the parameters of a case on one line, by the names of those keys that have one."""
+    named = {names.get(key, key): value for key, value in settings.items()}
+    return ", ".join(f"{name} = {in_short(value)}" for name, value in named.items())
+
+
+def in_short(value: object) -> str:
+    """Write a value of a parameter, without the rounding errors of a range or an expression."""
+    return shown(float(f"{value:.10g}") if isinstance(value, float) else value)
 
 
 def plan(
@@ -121,13 +127,13 @@ def plan(
             raise DeckError(f"{mark}{key}: a study names the files of its cases itself")
         if keys.count(key) > 1:
             raise DeckError(f"{mark}{key}: expected each key only once")
-    deck = _first_deck(file, base, about, mark, tolerant)
+    names = {key: entry.name for entry in file.parameter if entry.name for key in entry.key}
+    deck = _first_deck(file, base, about, mark, tolerant, names)
     given = [axis_of(entry, deck, file.combine, study) for entry in file.parameter]
     refuse_namesakes(given, [entry.group for entry in file.parameter], study)
     axes, dims = dimensions(file, given, deck, study)
     if (count := math.prod(map(len, dims.values()))) > MOST_CASES:
         raise DeckError(f"{study}: {count} cases; expected at most {MOST_CASES}")
-    names = {key: entry.name for entry in file.parameter if entry.name for key in entry.key}
     cases = []
     for position, choices in enumerate(itertools.product(*dims.values())):
         values = {key: value for choice in choices for key, value in choice.items()}
@@ -150,7 +156,7 @@ def plan(
         lines = _each_once([
             line
             for case in wrong
-            for line in _with_case(case.fault, mark, case.position + 1, case.settings).splitlines()
+            for line in _with_case(case.fault, mark, case.position + 1, case.settings, names).splitlines()
         ])  # fmt: skip
         if (more := len(lines) - _MOST_LINES) > 0:
             lines = [*lines[:_MOST_LINES], f"... and {more} more"]
@@ -159,7 +165,14 @@ def plan(
     return Plan(axes, tuple(cases), {name: len(choices) for name, choices in dims.items()})
 
 
-def _first_deck(file: StudyFile, base: Mapping[str, Any], about: Source, mark: str, tolerant: bool) -> Deck:
+def _first_deck(
+    file: StudyFile,
+    base: Mapping[str, Any],
+    about: Source,
+    mark: str,
+    tolerant: bool,
+    names: Mapping[str, str],
+) -> Deck:
     """Return the checked deck of the first values, or of the first valid ones, in which keys are found."""
     given = {key: entry.values or entry.range or () for entry in file.parameter for key in entry.key}
     error: DeckError | None = None
@@ -168,7 +181,8 @@ def _first_deck(file: StudyFile, base: Mapping[str, Any], about: Source, mark: s
         try:
             return Deck.parse(with_overrides(base, values), about)
         except DeckError as found:
-            error = error or DeckError(_with_case(_message_of(found), mark, place + 1, values), found.faults)
+            message = _with_case(_message_of(found), mark, place + 1, values, names)
+            error = error or DeckError(message, found.faults)
     assert error is not None
     raise error
 
@@ -181,9 +195,11 @@ def _output(base: Mapping[str, Any]) -> dict[str, Any]:
     return {"output": others} if others else {}
 
 
-def _with_case(error: str, mark: str, number: int, settings: Mapping[str, Any]) -> str:
+def _with_case(
+    error: str, mark: str, number: int, settings: Mapping[str, Any], names: Mapping[str, str]
+) -> str:
     """Return a message with the parameters of the case, on lines whose key is none of them."""
-    named = f" (in case {number}: {described(settings)})"
+    named = f" (in case {number}: {described(settings, names)})"
     keys = tuple(settings)
     lines = []
     for line in error.splitlines():

@@ -5,6 +5,7 @@ from bench.memory import deck, measured
 
 DIRECT = '[solver]\nmethod = "direct"\n'
 BOX = "[[stress]]\ndepths = [1e-5, 2e-5, 3e-5, 4e-5, 5e-5, 6e-5, 7e-5, 8e-5]\n"
+POINTS = "[[stress]]\npoints = [[0.0, 0.0, 1e-5]]\n"
 INTERFACE = "[interface]\ncoefficient = 1e15\nexponent = 1\n"
 MOVED = '[output]\nfields = ["displacement_1_z"]\n'
 
@@ -35,6 +36,11 @@ def check(text: str, bound: float) -> None:
         ("friction, unlike", 256, {"share": 0.4}),
         ("friction, unlike", 256, {}),
         ("friction, unlike", 256, {"steps": 8}),
+        # tractions corrected at the edges, of the last step and of all
+        ("friction, alike", 256, {"more": POINTS}),
+        ("friction, unlike", 256, {"more": POINTS}),
+        ("friction, alike", 256, {"more": POINTS + 'steps = "all"\n', "steps": 8}),
+        ("friction, alike", 512, {"more": POINTS}),
         ("wear", 128, {}),
         ("wear", 128, {"steps": 6}),
     ],
@@ -42,6 +48,16 @@ def check(text: str, bound: float) -> None:
 def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, options: dict[str, object]) -> None:
     """With the interpreter and all libraries, as the system counts it."""
     check(deck(problem, side, **options), 0.1)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("side", [128, 256])
+def test_the_estimate_of_fatigue_parameters(side: int) -> None:
+    """Stress histories of twelve load steps."""
+    text = deck("wear", side, steps=4)
+    wear = text[text.index("[wear]") :]
+    text = text.replace(wear[: wear.index("jump = 10\n") + 10], "")
+    text = text.replace('[[load]]\nlabel = "cycle"', '[[load]]\nrepeat = 2\nlabel = "cycle"')
+    check(text + '[[fatigue]]\nsegment = ["cycle"]\nparameters = ["smith_watson_topper"]\n', 0.1)
 
 
 @pytest.mark.parametrize(

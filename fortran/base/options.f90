@@ -275,6 +275,10 @@ module hc_options
     real(wp) :: fit_from = 0.5_wp, fit_reach = 4.0_wp, fit_depth = 3.0_wp, fit_beyond = 1.0_wp
     real(wp) :: fit_share = 2.0_wp/3.0_wp
     integer :: fit_nodes = 12
+    !> Displacements of nodes in contact are what they were to this share of the largest change, after at most as many iterations
+    !> of conjugate gradients: 25 are enough on 128 x 128 nodes, 42 on 512 x 512
+    real(wp) :: accuracy = 1.0e-3_wp
+    integer :: max_iterations = 400
   end type edge_options_t
 
   !> Cycles of a load history (docs/theory/load_path.md, "Cycles").

@@ -24,7 +24,7 @@ module hc_linear_system
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
   integer, parameter :: solution_accurate = 1, iterations_used_up = 2, solution_broke_off = 3
 
-  !> A symmetric positive definite operator with a preconditioner, on fields that
+  !> A symmetric positive definite operator with a preconditioner, the identity unless it is overridden, on fields that
   !> are vectors over all nodes.
   type, abstract :: linear_system_t
     !> Space of the vectors
@@ -33,7 +33,7 @@ module hc_linear_system
     !> y = A x for an x that vanishes off the active nodes; y is wanted everywhere
     procedure(linear_map), deferred :: product
     !> z = M r for an r that vanishes off the active nodes; z is used on them only
-    procedure(linear_map), deferred :: precondition
+    procedure :: precondition => no_precondition
   end type linear_system_t
 
   abstract interface
@@ -54,6 +54,18 @@ module hc_linear_system
   real(wp), parameter :: dependence = 1.0e-12_wp
 
 contains
+
+  !> Apply the identity as a preconditioner.
+  subroutine no_precondition(self, x, y, error)
+    class(linear_system_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (error => error)
+      call self%space%copy(x, y)
+    end associate
+  end subroutine no_precondition
 
   !> Compute M B, the constraint vectors after the preconditioner, zero off the active nodes.
   subroutine precondition_constraints(system, active, constraint, mb, error)

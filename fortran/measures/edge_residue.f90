@@ -8,18 +8,22 @@
 !> Equations: docs/theory/interior.md, (I17) and (I18).
 module hc_edge_residue
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility, only: blocks, block_index
   use hc_field_space, only: field_space_t
-  use hc_linear_system, only: linear_system_t
+  use hc_linear_system, only: linear_system_t, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
   private
 
-  public :: edge_residue_t, new_edge_residue, edge_residue_memory
+  public :: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
+
+  !> Error of the correction at the edges
+  character(len=*), parameter :: not_found = &
+    'the tractions at the edges of the contact were not found to the accuracy of the correction; use source "nodes"'
 
   !> Cells about a node whose residue moves it.
   integer, parameter :: reach = 4
@@ -59,7 +63,6 @@ module hc_edge_residue
     real(wp) :: weight(-means_of:means_of, -means_of:means_of) = 0.0_wp
   contains
     procedure :: product => mean_product
-    procedure :: precondition => no_precondition
   end type means_t
 
 contains
@@ -170,6 +173,10 @@ contains
         call projected_cg(means, spread(.true., 1, size(x)), constraint, mb, rhs, x, ax, accuracy*maxval(abs(rhs)), &
                           most_iterations, none, residual, iterations, outcome, error)
         if (allocated(error)) return
+        if (outcome /= solution_accurate) then
+          call raise(error, status%no_convergence, not_found)
+          return
+        end if
         values(:, :, component) = reshape(x, [n(1), n(2)])
         deallocate (ax)
       end do
@@ -227,17 +234,6 @@ contains
       end do
     end associate
   end subroutine mean_product
-
-  subroutine no_precondition(self, x, y, error)
-    class(means_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-
-    associate (nothing_of => self, error => error)
-      y = x
-    end associate
-  end subroutine no_precondition
 
   !> Take hats off the values.
   pure subroutine take_off(self, nodal)

@@ -10,7 +10,7 @@
 !> Equations: docs/theory/interior.md, (I16) to (I18).
 module hc_edge_tractions
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t, neighbors
   use hc_field_space, only: field_space_t
@@ -18,20 +18,16 @@ module hc_edge_tractions
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_linear_system, only: linear_system_t, precondition_constraints, satisfy_constraints
+  use hc_linear_system, only: linear_system_t, solution_accurate, precondition_constraints, satisfy_constraints
   use hc_projected_cg, only: projected_cg
   use hc_interpolation, only: interpolate, interpolate_pressure
   use hc_contact_edges, only: contact_edges_t
-  use hc_edge_residue, only: edge_residue_t, new_edge_residue, edge_residue_memory
+  use hc_edge_residue, only: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
   use hc_edge_fit, only: fit_squares
   implicit none
   private
 
   public :: correct_at_edges, edge_tractions_memory
-
-  !> Displacements of nodes are what they were to this share of the largest change, after at most as many iterations.
-  real(wp), parameter :: accuracy = 1.0e-3_wp
-  integer, parameter :: most_iterations = 100
 
   !> Shape of the tractions at the nodes of a contact (n_col, n_row).
   type :: edge_shape_t
@@ -51,7 +47,6 @@ module hc_edge_tractions
     integer, allocatable :: component(:)
   contains
     procedure :: product => elastic_product
-    procedure :: precondition => no_precondition
   end type elastic_part_t
 
 contains
@@ -103,7 +98,7 @@ contains
     real(wp), intent(inout) :: traction(:, :, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    !> Allocated on failure: not enough memory
+    !> Allocated on failure: not enough memory, no convergence
     type(error_t), allocatable, intent(out) :: error
     !> Spectra that are kept
     type(kernel_cache_t), pointer, intent(in), optional :: cache
@@ -138,7 +133,7 @@ contains
       call residue%hats(space, hats, error)
       if (allocated(error)) return
       call residue%take_off(hats)
-      call solve_again(flexibility, pair, residue, contact, stick, friction, edge_shape, space, hats, change, error)
+      call solve_again(flexibility, pair, tuning, residue, contact, stick, friction, edge_shape, space, hats, change, error)
       if (allocated(error)) return
       if (pass == tuning%passes) exit
       at_nodes = traction(:, :, :n) + change + at_nodes - hats
@@ -187,11 +182,13 @@ contains
   end subroutine sample
 
   !> Compute the change of the nodal tractions that leaves the displacements of the nodes in contact as they are, (I18).
-  subroutine solve_again(flexibility, pair, residue, contact, stick, friction, shape_of, space, hats, change, error)
+  subroutine solve_again(flexibility, pair, options, residue, contact, stick, friction, shape_of, space, hats, change, error)
     !> Elastic operator
     type(fft_flexibility_t), intent(inout), target :: flexibility
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
+    !> Tuning numbers
+    type(edge_options_t), intent(in) :: options
     !> What is between the nodes, less the hats
     type(edge_residue_t), intent(in) :: residue
     !> Nodes in contact, and those of them that stick (n_col, n_row)
@@ -216,7 +213,7 @@ contains
     system%flexibility => flexibility
     system%space = space
     system%component = [normal]
-    call settle(system, contact, residue%displacements(pair, contact, system%component), change(:, :, 1:1), error)
+    call settle(system, options, contact, residue%displacements(pair, contact, system%component), change(:, :, 1:1), error)
     if (allocated(error) .or. size(hats, 3) == 1) return
     do k = 2, 3
       where (contact .and. .not. stick)
@@ -230,13 +227,16 @@ contains
       call flexibility%apply([normal], change(:, :, 1:1), system%component, by_pressure, error)
       if (allocated(error)) return
     end if
-    call settle(system, stick, residue%displacements(pair, stick, system%component) + by_pressure, change(:, :, 2:3), error)
+    call settle(system, options, stick, residue%displacements(pair, stick, system%component) + by_pressure, change(:, :, 2:3), &
+                error)
   end subroutine solve_again
 
   !> Change tractions of some nodes so that displacements become alike all over them, without any load.
-  subroutine settle(system, nodes, moved, change, error)
+  subroutine settle(system, options, nodes, moved, change, error)
     !> The operator of the components
     type(elastic_part_t), intent(inout) :: system
+    !> Tuning numbers
+    type(edge_options_t), intent(in) :: options
     !> The nodes (n_col, n_row)
     logical, intent(in) :: nodes(:, :)
     !> Displacements by anything else (n_col, n_row, component) [m]
@@ -251,6 +251,7 @@ contains
     logical :: independent
     integer :: k, iterations, outcome
 
+    if (.not. any(nodes)) return
     associate (n => size(nodes))
       active = reshape(spread(nodes, 3, size(change, 3)), [size(change)])
       x = reshape(change, [size(change)])
@@ -266,8 +267,10 @@ contains
       call system%product(x, ax, error)
       if (allocated(error)) return
       residual = maxval(abs(rhs - ax), mask=active)
-      call projected_cg(system, active, constraint, mb, rhs, x, ax, accuracy*residual, most_iterations, multiplier, &
+      call projected_cg(system, active, constraint, mb, rhs, x, ax, options%accuracy*residual, options%max_iterations, multiplier, &
                         residual, iterations, outcome, error)
+      if (allocated(error)) return
+      if (outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)
       change = reshape(x, shape(change))
     end associate
   end subroutine settle
@@ -285,17 +288,6 @@ contains
       call self%flexibility%apply(c, acting, c, wanted, error)
     end associate
   end subroutine elastic_product
-
-  subroutine no_precondition(self, x, y, error)
-    class(elastic_part_t), intent(inout) :: self
-    real(wp), intent(in), contiguous, target :: x(:)
-    real(wp), intent(out), contiguous, target :: y(:)
-    type(error_t), allocatable, intent(out) :: error
-
-    associate (nothing_of => self, error => error)
-      y = x
-    end associate
-  end subroutine no_precondition
 
   !> Compute the direction of the shear traction at the nodes in contact, and at those next to them.
   pure function directions(shear, size_of, contact) result(direction)

@@ -54,9 +54,8 @@ def main() -> None:
         if not ring.any():
             continue
         error = abs(depth[ring] - limiting_depth(r[ring])).max() / largest
-        print(
-            f"beyond c + {away:g} spacings: depth {error:.2%}, pressure {pressure[ring].max() / pressure.max():.2%}"
-        )
+        carried = pressure[ring].max() / pressure.max()
+        print(f"beyond c + {away:g} spacings: depth {error:.2%}, pressure {carried:.2%}")
 
 
 if __name__ == "__main__":

@@ -2,15 +2,20 @@
 !> the envelopes 1/(4 pi max(1, R)) of the displacement and 1/(2 pi max(1, R)^2) of the stress.
 module test_interior
   use hc_precision, only: wp, pi
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status
+  use hc_options, only: edge_options_t
+  use hc_field_space, only: field_space_t
+  use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_interior_pyramid, only: interior_pyramid_t, new_interior_pyramid
   use hc_interior_triangle, only: triangle_fields, mesh_fields
   use hc_interior_points, only: fields_at_points
   use hc_interior_planes, only: interior_planes_t, new_interior_planes
   use hc_interior_fields, only: xx, yy, zz, xy, yz, xz
+  use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_edge_tractions, only: correct_at_edges
   use hc_stress_invariants, only: principal_stresses, von_mises
-  use testing, only: test_t, new_test, check, check_true, open_table
+  use testing, only: test_t, new_test, check, check_raised, check_true, open_table
   implicit none
   private
 
@@ -33,7 +38,8 @@ contains
       new_test('planes', test_planes), &
       new_test('second body', test_second_body), &
       new_test('principal stresses', test_principal), &
-      new_test('bad arguments', test_arguments) &
+      new_test('bad arguments', test_arguments), &
+      new_test('correction at edges', test_correction) &
     ]
   end subroutine collect_interior
 
@@ -275,5 +281,51 @@ contains
     call new_interior_planes(planes, lattice, 3, 0.3_wp, raised)
     call check_true(error, allocated(raised), 'a third body is refused')
   end subroutine test_arguments
+
+  !> The pressure of Hertz, corrected at its edge: it has the same load; without the iterations that this takes there is an error,
+  !> and without contact nothing to correct.
+  subroutine test_correction(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable :: failure
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+    type(edge_options_t) :: options
+    real(wp), allocatable :: x(:, :), y(:, :), square(:, :), nodal(:, :, :), corrected(:, :, :), frictionless(:, :)
+    logical, allocatable :: contact(:, :), stick(:, :)
+    integer, parameter :: n = 50
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-n, -n], [2*n + 1, 2*n + 1], error)
+    if (allocated(error)) return
+    allocate (x(2*n + 1, 2*n + 1), y(2*n + 1, 2*n + 1))
+    call lattice%coordinates(x, y)
+    allocate (square, source=1.0_wp - (x**2 + y**2)/20.3_wp**2)
+    allocate (contact, source=square > 0.0_wp)
+    allocate (stick, source=contact .and. .false.)
+    allocate (nodal(2*n + 1, 2*n + 1, 3), source=0.0_wp)
+    allocate (frictionless(2*n + 1, 2*n + 1), source=0.0_wp)
+    nodal(:, :, 1) = sqrt(max(square, 0.0_wp))
+    call new_contact_edges(edges, lattice, nodal(:, :, 1), max(-square, 0.0_wp)**1.5_wp, contact, square < huge(1.0_wp))
+    associate (pair => elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp), space => field_space_t(1))
+      corrected = nodal
+      call correct_at_edges(lattice, edges, pair, contact, stick, frictionless, corrected, space, error)
+      if (allocated(error)) return
+      call check(error, sum(corrected(:, :, 1)), sum(nodal(:, :, 1)), 1.0e-9_wp*sum(nodal), 'load of the corrected pressure')
+      if (allocated(error)) return
+      call check_true(error, maxval(abs(corrected - nodal)) > 1.0e-3_wp, 'the pressure is corrected')
+      if (allocated(error)) return
+
+      options%max_iterations = 1
+      corrected = nodal
+      call correct_at_edges(lattice, edges, pair, contact, stick, frictionless, corrected, space, failure, options=options)
+      call check_raised(error, failure, status%no_convergence, 'an iteration is too few')
+      if (allocated(error)) return
+
+      corrected = 0.0_wp*nodal
+      call new_contact_edges(edges, lattice, corrected(:, :, 1), 1.0_wp + 0.0_wp*x, stick, square < huge(1.0_wp))
+      call correct_at_edges(lattice, edges, pair, stick, stick, frictionless, corrected, space, error)
+      if (allocated(error)) return
+      call check_true(error, all(abs(corrected) <= 0.0_wp), 'no contact, no correction')
+    end associate
+  end subroutine test_correction
 
 end module test_interior

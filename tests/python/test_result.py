@@ -139,6 +139,8 @@ class TestResult:
             _ = self.result.pressur
         with pytest.raises(KeyError, match="pressur"):
             _ = self.result["pressur"]
+        with pytest.raises(KeyError, match=r"result.step\(-1\) returns a load step"):
+            _ = self.result[-1]
 
     def test_steps_count_from_one(self) -> None:
         assert len(self.result) == 2

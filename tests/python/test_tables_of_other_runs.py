@@ -1,4 +1,4 @@
-"""Tables [[stress]] and [[fatigue]] of runs with adaptive steps, bulk stress and wear: run, stopped, resumed, again."""
+"""Tables [[stress]] and [[fatigue]] of runs with adaptive steps, bulk stress and wear, also when stopped."""
 
 import io
 from pathlib import Path

@@ -68,6 +68,8 @@ class Result(BelowSurface):
         """Return a quantity, also ``step``, which is a method as an attribute."""
         if name in self.dataset.variables:
             return self.dataset[name]
+        if not isinstance(name, str):
+            raise KeyError(f"{name!r} is no name of a quantity; result.step({name!r}) returns a load step")
         what = "not in this result" if name in VARIABLES else "no quantity of a result"
         hint = did_you_mean(name, map(str, self.dataset.variables)) or f"; {_ELSEWHERE.get(name, _LISTED)}"
         raise KeyError(f"{name} is {what}{hint}")

@@ -75,9 +75,9 @@ def _stress_memory(case: Problem, lattice: Lattice, kept: bool = False) -> int:
         steps = all_steps if table.steps == "all" else len(table.steps or (1,))
         below = stress.memory_needed(lattice, region(lattice, **table.where), steps, kept)
         needed = max(needed, below, _tractions_memory(case, lattice, steps, table.source))
-    for table in case.deck.fatigue:
-        steps = len(table.steps or _cycle_of(case, table.segment or ()))
-        points = region(lattice, **table.where)
+    for cycle in case.deck.fatigue:
+        steps = len(cycle.steps or _cycle_of(case, cycle.segment or ()))
+        points = region(lattice, **cycle.where)
         below = fatigue.memory_needed(lattice, points, steps) + _ITEM * 5 * steps * lattice.size
         needed = max(needed, below, _tractions_memory(case, lattice, steps, None))
     return needed + _LOADED_AFTER * bool(case.deck.stress or case.deck.fatigue)

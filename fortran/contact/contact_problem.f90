@@ -18,7 +18,7 @@ module hc_contact_problem
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: flexibility_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
-    normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, sweeps_used_up, &
+    normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement_row, force_control, within_tolerance, sweeps_used_up, &
     loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
     tangential_residual, force_residual, least_traction
@@ -218,13 +218,11 @@ contains
     !> Motions
     real(wp), intent(in) :: motion(n_motion)
     real(wp), allocatable :: displacement(:, :, :)
-    integer :: col, row
+    integer :: row
 
     allocate (displacement(size(self%x, 1), size(self%x, 2), 2))
     do row = 1, size(self%x, 2)
-      do col = 1, size(self%x, 1)
-        displacement(col, row, :) = remote_displacement(motion, self%x(col, row), self%y(col, row))
-      end do
+      call remote_displacement_row(motion, self%x(:, row), self%y(:, row), displacement(:, row, 1), displacement(:, row, 2))
     end do
   end function rigid_displacement
 
@@ -301,8 +299,8 @@ contains
     !> State to be completed
     type(contact_state_t), intent(inout) :: state
 
-    real(wp) :: r, unit
-    integer :: col, row, m, n_contact
+    real(wp) :: r, unit, remote(size(state%pressure, 1), 2)
+    integer :: row, m, n_contact
     logical :: finite
 
     n_contact = self%space%count_positive(state%pressure)
@@ -310,14 +308,12 @@ contains
     unit = max(self%space%max(state%pressure), 0.0_wp)
     if (unit > 0.0_wp) unit = 1.0_wp/unit
     finite = .true.
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(col, m) reduction(.and.: finite)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(m, remote) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
-      do col = 1, size(state%pressure, 1)
-        state%gap(col, row) = self%initial_gap(col, row) + displacement(col, row, 1) - state%motion(normal)
-        state%relative_displacement(col, row, :) = displacement(col, row, 2:) &
-                                                   - remote_displacement(state%motion, self%x(col, row), self%y(col, row))
-      end do
+      state%gap(:, row) = self%initial_gap(:, row) + displacement(:, row, 1) - state%motion(normal)
+      call remote_displacement_row(state%motion, self%x(:, row), self%y(:, row), remote(:, 1), remote(:, 2))
       do m = 1, 2
+        state%relative_displacement(:, row, m) = displacement(:, row, m + 1) - remote(:, m)
         state%slip_increment(:, row, m) = merge(state%relative_displacement(:, row, m) - reference(:, row, m), 0.0_wp, &
                                                 state%pressure(:, row) > 0.0_wp)
       end do

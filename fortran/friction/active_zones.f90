@@ -3,7 +3,7 @@
 !> Equations: docs/theory/friction.md, (F5), (F8); docs/theory/normal_contact.md, (N6).
 module hc_active_zones
   use hc_precision, only: wp
-  use hc_contact_state, only: separated, stick, slip, about_z, n_motion, remote_displacement, force_control
+  use hc_contact_state, only: separated, stick, slip, about_z, n_motion, remote_displacement_row, force_control
   use hc_disc_law, only: normal_to
   use hc_friction_iterate, only: friction_iterate_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions, fix_in_stick
@@ -177,19 +177,20 @@ contains
     type(friction_iterate_t), intent(in) :: now
     !> In the frames (2 n)
     real(wp), intent(out), contiguous :: frame(:)
-    real(wp) :: motion(n_motion), s(2)
+    real(wp) :: motion(n_motion), remote(now%problem%lattice%extent(1), 2), along, across
     integer :: n, row, col, i
 
     n = size(now%p)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(s, col, i)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(remote, along, across, col, i)
     do row = 1, now%problem%lattice%extent(2)
+      call remote_displacement_row(motion, now%problem%x(:, row), now%problem%y(:, row), remote(:, 1), remote(:, 2))
       do col = 1, now%problem%lattice%extent(1)
         i = (row - 1)*now%problem%lattice%extent(1) + col
-        s = [now%origin(i), now%origin(n + i)] &
-            + remote_displacement(motion, now%problem%x(col, row), now%problem%y(col, row))
-        frame(i) = -now%shear%direction(2, i)*s(1) + now%shear%direction(1, i)*s(2)
-        frame(n + i) = now%shear%direction(1, i)*s(1) + now%shear%direction(2, i)*s(2)
+        along = now%origin(i) + remote(col, 1)
+        across = now%origin(n + i) + remote(col, 2)
+        frame(i) = -now%shear%direction(2, i)*along + now%shear%direction(1, i)*across
+        frame(n + i) = now%shear%direction(1, i)*along + now%shear%direction(2, i)*across
       end do
     end do
     !$omp end parallel do

@@ -9,7 +9,7 @@ module hc_friction_iterate
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, &
-    remote_displacement, force_control
+    remote_displacement_row, force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions
@@ -220,15 +220,14 @@ contains
     real(wp), intent(out), contiguous :: dsx(:), dsy(:)
     integer :: i, n, col
     logical :: touches
-    real(wp) :: remote(2)
 
     n = size(self%p)
+    call remote_displacement_row(self%motion, self%problem%x(:, row), self%problem%y(:, row), dsx, dsy)
     do col = 1, size(dsx)
       i = (row - 1)*size(dsx) + col
       touches = self%contact(i) .or. self%p(i) > 0.0_wp
-      remote = remote_displacement(self%motion, self%problem%x(col, row), self%problem%y(col, row))
-      dsx(col) = self%u(i) - self%origin(i) - remote(1)
-      dsy(col) = self%u(n + i) - self%origin(n + i) - remote(2)
+      dsx(col) = self%u(i) - self%origin(i) - dsx(col)
+      dsy(col) = self%u(n + i) - self%origin(n + i) - dsy(col)
       dsx(col) = merge(dsx(col), 0.0_wp, touches)
       dsy(col) = merge(dsy(col), 0.0_wp, touches)
     end do

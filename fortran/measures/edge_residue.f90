@@ -19,7 +19,7 @@ module hc_edge_residue
   implicit none
   private
 
-  public :: edge_residue_t, new_edge_residue, not_found
+  public :: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
 
   !> Error of the correction at the edges
   character(len=*), parameter :: not_found = &
@@ -32,6 +32,8 @@ module hc_edge_residue
   !> Means of the hats are those of the residue to this share of the largest, after at most as many iterations.
   real(wp), parameter :: accuracy = 1.0e-4_wp
   integer, parameter :: most_iterations = 60
+  !> Cells over the square root of the number of nodes in a round zone: about twelve rows along its edge.
+  real(wp), parameter :: cells_of_zone = 50.0_wp
 
   !> Points between the nodes near the edges.
   type :: edge_residue_t
@@ -110,6 +112,16 @@ contains
     real(wp) :: at(2)
     at = real([mod(i - 1, self%samples), (i - 1)/self%samples], wp)/self%samples
   end function point
+
+  !> Count the bytes of points along the edges of a round zone.
+  pure integer(selected_int_kind(18)) function edge_residue_memory(n_zone, samples, n)
+    !> Nodes of the zone, points along a spacing, components
+    integer, intent(in) :: n_zone, samples, n
+    integer, parameter :: long = selected_int_kind(18)
+
+    ! values of the points, and the first node of each cell
+    edge_residue_memory = int(cells_of_zone*sqrt(real(n_zone, wp)), long)*8*(samples**2*n + 1)
+  end function edge_residue_memory
 
   !> Values of hats at the nodes that have the means of the points about each node, (I17).
   subroutine hats(self, space, values, error)

@@ -16,18 +16,18 @@ module hc_edge_tractions
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal, along_x, along_y
-  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_linear_system, only: linear_system_t, solution_accurate, precondition_constraints, satisfy_constraints
   use hc_projected_cg, only: projected_cg
   use hc_interpolation, only: interpolate, interpolate_pressure
   use hc_contact_edges, only: contact_edges_t
-  use hc_edge_residue, only: edge_residue_t, new_edge_residue, not_found
+  use hc_edge_residue, only: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
   use hc_edge_fit, only: fit_squares
   implicit none
   private
 
-  public :: correct_at_edges
+  public :: correct_at_edges, edge_tractions_memory
 
   !> Shape of the tractions at the nodes of a contact (n_col, n_row).
   type :: edge_shape_t
@@ -50,6 +50,37 @@ module hc_edge_tractions
   end type elastic_part_t
 
 contains
+
+  !> Count the bytes that the correction takes, for a window and a contact of given sizes.
+  pure integer(selected_int_kind(18)) function edge_tractions_memory(extent, n_contact, sheared, threads, unlike)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Nodes in contact
+    integer, intent(in) :: n_contact
+    !> Shear tractions are corrected, too
+    logical, intent(in) :: sheared
+    !> Threads to use
+    integer, intent(in) :: threads
+    !> The materials are unlike
+    logical, intent(in) :: unlike
+    integer, parameter :: long = selected_int_kind(18)
+    !> Bytes of a field of numbers, and of one of integers or logical values
+    integer, parameter :: field = 8, half = 4
+    type(edge_options_t) :: tuning
+    integer(long) :: everywhere, packed
+    integer :: n, solved
+
+    n = merge(3, 1, sheared)
+    solved = merge(2, 1, sheared)
+    ! edges: zones, places in the band; shape; change, hats, values at the nodes; cells
+    everywhere = 3*half + merge(8, 2, sheared)*field + 3*n*field + half
+    ! displacements by the rest, and by the pressure; unknowns, product, right-hand side, constraints twice, active nodes
+    everywhere = everywhere + merge(6, 1, sheared)*field + (3*solved + 2*solved**2)*field + solved*half
+    ! vectors of conjugate gradients, constraints twice
+    packed = (7*solved + 2*solved**2)*field
+    edge_tractions_memory = everywhere*extent(1)*extent(2) + packed*n_contact + fft_memory(extent, .not. sheared, threads, unlike) &
+                            + merge(2, 1, sheared)*edge_residue_memory(n_contact, tuning%samples, n)
+  end function edge_tractions_memory
 
   !> Correct pressure and shear traction at the edges.
   subroutine correct_at_edges(lattice, edges, pair, contact, stick, friction, traction, space, error, cache, options)

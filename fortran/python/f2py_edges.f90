@@ -6,19 +6,21 @@
 !> `fields` are the pressure [Pa], the gap [m] and the reserve of friction [Pa]; `zones` the nodes in contact, those that can
 !> touch and those that stick. The third of each matters to the edge of the stick area only.
 module hc_f2py_edges
-  use iso_c_binding, only: c_double, c_int
+  use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_error, only: error_t, status, raise
+  use hc_memory, only: require_memory
   use hc_f2py_handles, only: report, kernel_cache
-  use hc_field_space, only: space_over
+  use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
-  use hc_edge_tractions, only: correct_at_edges
+  use hc_edge_tractions, only: correct_at_edges, edge_tractions_memory
   use hc_zone_edge, only: zone_edge_t, zone_mesh_t, cut_triangles
   implicit none
   private
 
-  public :: count_cut_triangles, edge_of_zone, mesh_of_zone, distances_of_zone, pressure_squares, tractions_to_edges
+  public :: count_cut_triangles, edge_of_zone, mesh_of_zone, distances_of_zone, pressure_squares, tractions_to_edges, &
+            memory_of_edges
 
 contains
 
@@ -135,16 +137,37 @@ contains
     type(error_t), allocatable :: error
     type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
+    type(field_space_t) :: space
 
     corrected = traction
+    space = space_over([n_col, n_row], threads)
     call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
+    if (.not. allocated(error)) then
+      call require_memory(edge_tractions_memory([n_col, n_row], count(zones(:, :, 1) /= 0), maxval(friction) > 0.0_c_double, &
+                                                space%threads, abs(lambda(2)) > 0.0_c_double), error, space%threads)
+    end if
     if (.not. allocated(error)) then
       call new_contact_edges(edges, lattice, traction(:, :, 1), gap, zones(:, :, 1) /= 0, zones(:, :, 2) /= 0)
       call correct_at_edges(lattice, edges, elastic_pair_t(lambda(1), lambda(2), lambda(3)), zones(:, :, 1) /= 0, &
-                            zones(:, :, 3) /= 0, friction, corrected, space_over([n_col, n_row], threads), error, kernel_cache)
+                            zones(:, :, 3) /= 0, friction, corrected, space, error, kernel_cache)
     end if
     call report(error, code, message)
   end subroutine tractions_to_edges
+
+  !> Count the bytes that the correction at the edges takes.
+  subroutine memory_of_edges(n_col, n_row, n_contact, sheared, unlike, threads, bytes)
+    !> Number of columns and rows, and of nodes in contact
+    integer(c_int), intent(in) :: n_col, n_row, n_contact
+    !> Not zero: shear tractions are corrected, too; the materials are unlike
+    integer(c_int), intent(in) :: sheared, unlike
+    !> Threads to use; 0: as many as OpenMP would take
+    integer(c_int), intent(in) :: threads
+    integer(c_int64_t), intent(out) :: bytes
+    type(field_space_t) :: space
+
+    space = space_over([n_col, n_row], threads)
+    bytes = edge_tractions_memory([n_col, n_row], n_contact, sheared /= 0, space%threads, unlike /= 0)
+  end subroutine memory_of_edges
 
   !> Fill the contact area, or the part of it that sticks, with triangles, and carry a field there.
   subroutine mesh_of_zone(n_col, n_row, basis, start, fields, zones, of_stick, &

@@ -339,7 +339,7 @@ def test_what_a_person_sees(tmp_path: Path) -> None:
     out = tmp_path / "out.nc"
     result = case.run(out, progress=Lines(stream))
     first, *lines = stream.getvalue().splitlines()
-    assert first == "Demo: adaptive load steps"
+    assert first == "Demo: steps that are chosen on the way"
     assert lines[0].startswith("step   1 (") and "(100%)" in lines[-1]
     assert " ± " in lines[-1]
     assert " ± " not in describe(result.history.iloc[-1].to_dict(), short=True)

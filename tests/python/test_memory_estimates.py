@@ -5,6 +5,7 @@ from bench.memory import deck, measured
 
 DIRECT = '[solver]\nmethod = "direct"\n'
 BOX = "[[stress]]\ndepths = [1e-5, 2e-5, 3e-5, 4e-5, 5e-5, 6e-5, 7e-5, 8e-5]\n"
+POINTS = "[[stress]]\npoints = [[0.0, 0.0, 1e-5]]\n"
 INTERFACE = "[interface]\ncoefficient = 1e15\nexponent = 1\n"
 MOVED = '[output]\nfields = ["displacement_1_z"]\n'
 
@@ -33,6 +34,11 @@ def check(text: str, bound: float) -> None:
         ("friction, unlike", 128, {"share": 0.4}),
         ("friction, unlike", 256, {"share": 0.4}),
         ("friction, unlike", 192, {"steps": 6}),
+        # tractions corrected at the edges, of the last step and of all
+        ("friction, alike", 256, {"more": POINTS}),
+        ("friction, unlike", 256, {"more": POINTS}),
+        ("friction, alike", 256, {"more": POINTS + 'steps = "all"\n', "steps": 8}),
+        ("friction, alike", 512, {"more": POINTS}),
         ("wear", 128, {}),
         ("wear", 128, {"steps": 6}),
     ],
@@ -46,6 +52,16 @@ def test_a_load_step_takes_few_copies_of_its_state() -> None:
     """Bytes a further node of the window: 890 with like materials, 1,130 with a state held five times."""
     small, large = (measured(deck("friction, alike", side)).peak for side in (256, 512))
     assert (large - small) / (512**2 - 256**2) < 1000
+
+
+@pytest.mark.parametrize("side", [128, 256])
+def test_the_estimate_of_fatigue_parameters(side: int) -> None:
+    """Stress histories of twelve load steps."""
+    text = deck("wear", side, steps=4)
+    wear = text[text.index("[wear]") :]
+    text = text.replace(wear[: wear.index("jump = 10\n") + 10], "")
+    text = text.replace('[[load]]\nlabel = "cycle"', '[[load]]\nrepeat = 2\nlabel = "cycle"')
+    check(text + '[[fatigue]]\nsegment = ["cycle"]\nparameters = ["smith_watson_topper"]\n', 0.1)
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,27 @@ _api = _core.hc_f2py_edges
 _Zone = tuple[Array, NDArray[np.int32], bool]  # fields and zones of the core; whether it is the stick area
 
 
+def tractions_memory(
+    n_row: int, n_col: int, contact: int, sheared: bool, unlike: bool, threads: int = 0
+) -> int:
+    """Return the memory (bytes) of `ContactEdges.tractions`, besides what it is given and returns.
+
+    Parameters
+    ----------
+    n_row, n_col : int
+        Rows and columns of the window.
+    contact : int
+        Nodes in contact.
+    sheared : bool
+        Whether the shear tractions change.
+    unlike : bool
+        Whether the materials are dissimilar.
+    threads : int
+        Number of threads; 0: as many as OpenMP would take.
+    """
+    return int(_api.memory_of_edges(n_col, n_row, contact, sheared, unlike, threads))
+
+
 @dataclass(frozen=True)
 class Edge:
     """An area of the plane whose edge runs between the nodes.

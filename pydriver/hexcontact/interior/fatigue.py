@@ -93,6 +93,18 @@ MEANINGS = {
 """The quantities, after the parameters of a deck; those on a critical plane have its angles, too."""
 
 
+def memory_needed(lattice: Lattice, where: Region, steps: int) -> int:
+    """Return the memory (bytes) that the stress histories of a region and their parameters take."""
+    loads = 24 * steps * lattice.size
+    block = min(max(_BLOCK, loads), 48 * steps * where.count)
+    besides = 2 * block  # a block as it comes, and as the parameters take it
+    if where.lattice is not None and not summed(lattice, where):
+        whole, _, _ = window_over(lattice, where.lattice)
+        # tractions, and the stress on a plane twice
+        besides = max(besides, fields.planes_memory(whole) + 8 * min(steps, _AT_ONCE) * 15 * whole.size)
+    return 2 * loads + block + besides + 80 * where.count
+
+
 def histories(
     lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, body: int, where: Region, friction: float
 ) -> Iterator[tuple[slice, Array]]:
@@ -115,7 +127,7 @@ def histories(
     block = max(_BLOCK, loads.nbytes)
     most = max(block // (48 * len(steps)), 1)
     memory.require(
-        2 * loads.nbytes + 3 * min(block, 48 * len(steps) * where.count) + 80 * where.count,
+        memory_needed(lattice, where, len(steps)),
         f"the stress at {where.count} points in {len(steps)} steps",
         "choose fewer points or steps",
     )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, integer
 from ..core import kernel_cache, memory
 from ..core.contact import ElasticPair
-from ..core.edges import ContactEdges
+from ..core.edges import ContactEdges, tractions_memory
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
 from ..deck.tables import Body, Deck
@@ -38,6 +38,11 @@ LOADED = (*TRACTIONS, "bulk_body", *BULK_STRESS)
 """What the stress below the surface comes from."""
 EDGES = ("gap", "zone")
 """What else tells where the edges of contact and stick are."""
+# fields of each step, as read and for the core; corrected ones, while others follow and in all
+_LOADED_ARRAYS, _CORRECTED_ARRAYS = 8, (3, 6)
+# fields as floats that are read for them, and bytes of each that the netCDF library keeps
+_READ_ARRAYS, _READ_KEPT = 4, 16 * 2**20
+_EDGE_ARRAYS = 11  # arguments and results of the correction at the edges
 _STICK = 1  # value of zone at a sticking node
 _SUMS_FOR_A_NODE = 50  # pyramids summed at single points in the time of a node of a plane, at least
 TENSOR = tuple(f"stress_{ab}" for ab in fields.COMPONENTS)
@@ -264,6 +269,33 @@ def memory_needed(lattice: Lattice, where: Region, steps: int, kept: bool = Fals
         + 8 * (12 * count * where.lattice.size + (6 * count + 6 * steps) * whole.size)
         + kept * min(spectra, kernel_cache.bound())
     )
+
+
+def tractions_needed(
+    lattice: Lattice, steps: int, contact: int, sheared: bool, unlike: bool, source: str | None = None
+) -> int:
+    """Return the memory (bytes) that the tractions of some steps take, with their correction at the edges.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Window of the steps.
+    steps : int
+        Number of steps.
+    contact : int
+        Nodes in contact.
+    sheared, unlike : bool
+        Whether shear tractions are corrected, and whether the materials are dissimilar.
+    source : str, optional
+        One of `SOURCES`.
+    """
+    field = 8 * lattice.size
+    loaded = field * _LOADED_ARRAYS * steps + _READ_ARRAYS * min(field * steps, _READ_KEPT)
+    if source == "nodes":
+        return loaded
+    each, all_of_them = _CORRECTED_ARRAYS
+    correction = _EDGE_ARRAYS * field + tractions_memory(*lattice.shape, contact, sheared, unlike)
+    return loaded + max(field * each * steps + correction, field * all_of_them * steps)
 
 
 def _at_points(lattice: Lattice, loads: Array, body: int, nu: float, where: Region) -> tuple[Array, Array]:

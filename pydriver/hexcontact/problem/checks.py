@@ -165,7 +165,7 @@ def _problems_below(tables: dict[str, Any], steps: Sequence[LoadStep]) -> list[M
     """Return faults of stresses: of a rigid body, without the fields of the surface, of equal names."""
     found, names = [], set()
     last = 0 if any(step.ramp is not None for step in steps) else len(steps)
-    stages = [_stage(step) for step in steps] if tables["fatigue"] else []
+    stages = [stage_of(step) for step in steps] if tables["fatigue"] else []
     output, bodies = tables["output"], tables["body"]
     frictional = coulomb(tables.get("friction"), tables.get("interface")) is not None
     known = FIELDS if frictional else FRICTIONLESS_FIELDS
@@ -219,7 +219,7 @@ def _fatigue_problems(
     return found
 
 
-def _stage(step: LoadStep) -> Stage:
+def stage_of(step: LoadStep) -> Stage:
     """Return segment, label and known loads of a load step."""
     targets = zip(MOTIONS, step.targets, strict=True)
     known = {LOADS[m][t.control == "displacement"]: t.value for m, t in targets if not t.from_start}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from itertools import pairwise
 
@@ -18,6 +19,11 @@ _ADAPTIVE, _ADAPTIVE_SIMILAR = 30, 6  # solutions in a segment of adaptive steps
 _SECONDS_FRICTIONLESS, _SECONDS = 2e-7, 1.3e-7
 _SECONDS_LEAST = 5e-3  # of a step
 
+# Operator applications of a load step in a cycle that wears, which starts from the cycle before, by coupling;
+# cycles that jumps of "auto" solve, within a factor of 3, over the tolerance to -1/2.
+_WORN, _WORN_COUPLED = 6.0, 20.0
+_JUMPS = 1.0
+
 
 def operator_applications(case: Problem) -> float | None:
     """Estimate the operator applications of all load steps; None for the direct method."""
@@ -31,7 +37,23 @@ def operator_applications(case: Problem) -> float | None:
         loads = [0.0, *(step.z.value for step in case.load_steps)]
         entering = sum(after > before for before, after in pairwise(loads))
     share = entering / len(case.load_steps)
-    return each * (1.0 + (_INTERPOLATED - 1.0) * share) * _solutions(case)
+    worn = _WORN_COUPLED if case.coupled else _WORN
+    return each * (1.0 + (_INTERPOLATED - 1.0) * share) * _solutions(case) + worn * _worn_steps(case)
+
+
+def cycles(case: Problem) -> int:
+    """Return the number of cycles that are solved to wear the surfaces; a guess where jumps are chosen."""
+    wear = case.deck.wear
+    if wear is None:
+        return 0
+    if isinstance(wear.jump, str):
+        return min(math.ceil(_JUMPS * wear.tolerance**-0.5), wear.cycles) + 1
+    return math.ceil(wear.cycles / wear.jump) + 1
+
+
+def _worn_steps(case: Problem) -> int:
+    """Return the number of load steps in these cycles, with the ones onto the worn gap."""
+    return cycles(case) * (1 + len(case.cycle))
 
 
 def _solutions(case: Problem) -> int:
@@ -47,7 +69,7 @@ def seconds(case: Problem) -> float | None:
     if applications is None:
         return None
     each = (_SECONDS if case.frictional else _SECONDS_FRICTIONLESS) * case.lattice.size
-    return applications * each + _SECONDS_LEAST * _solutions(case)
+    return applications * each + _SECONDS_LEAST * (_solutions(case) + _worn_steps(case))
 
 
 def work(case: Problem) -> str:
@@ -60,7 +82,10 @@ def work(case: Problem) -> str:
     count = " to ".join(f"{_rounded(number):,}" for number in applications if number)
     durations = " to ".join(dict.fromkeys(_duration(time) for time in times if time))
     guess = "; load steps are chosen on the way, so a third or three times as much may be needed"
-    return f"about {count} operator applications, about {durations} on one core" + guess * case.adaptive
+    wear = case.deck.wear
+    chosen = f"; {cycles(case)} cycles are guessed, since jumps are chosen on the way" if wear else ""
+    guess = guess * case.adaptive + chosen * (wear is not None and isinstance(wear.jump, str))
+    return f"about {count} operator applications, about {durations} on one core{guess}"
 
 
 def _total(parts: Iterable[float | None]) -> float | None:

@@ -138,6 +138,9 @@ def describe(history: History, short: bool = False) -> str:
         if not short:
             parts.append(" ".join(contact_size(history)).removeprefix("contact "))
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
+    if history.get("wear_cycles", -1.0) >= 0.0:
+        worn = quantity(history["max_worn_depth"], "m")
+        parts.append(f"cycles {history['wear_cycles']:,.0f}  worn {worn}")
     parts.append(parts_of(history))
     if not short:
         parts.append(quantity(history["seconds"], "s", 3))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
@@ -21,11 +21,13 @@ from ..core.contact import ElasticPair, FlexibilityOperator, NormalSolution
 from ..core.friction import ContactState
 from ..core.lattice import Lattice
 from ..core.measures import measures
+from ..deck.below import cycle_of
 from ..deck.interface import coulomb
 from ..deck.units import readable
 from ..errors import DeckError
-from ..interior import stress
+from ..interior import fatigue, stress
 from ..interior.region import region
+from ..problem.checks import stage_of
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
 from ..problem.window import grown, rim_sides
@@ -71,8 +73,30 @@ def _stress_memory(case: Problem, lattice: Lattice, kept: bool = False) -> int:
     for table in case.deck.stress:
         all_steps = math.ceil(len(case.load_steps) / case.output.every)
         steps = all_steps if table.steps == "all" else len(table.steps or (1,))
-        needed = max(needed, stress.memory_needed(lattice, region(lattice, **table.where), steps, kept))
+        below = stress.memory_needed(lattice, region(lattice, **table.where), steps, kept)
+        needed = max(needed, below, _tractions_memory(case, lattice, steps, table.source))
+    for cycle in case.deck.fatigue:
+        steps = len(cycle.steps or _cycle_of(case, cycle.segment or ()))
+        points = region(lattice, **cycle.where)
+        below = fatigue.memory_needed(lattice, points, steps) + _ITEM * 5 * steps * lattice.size
+        needed = max(needed, below, _tractions_memory(case, lattice, steps, None))
     return needed + _LOADED_AFTER * bool(case.deck.stress or case.deck.fatigue)
+
+
+def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
+    """Return the places of the load steps of a closed cycle, adaptive segments as one step each."""
+    first, last = cycle_of([stage_of(step) for step in case.load_steps], labels)
+    return range(first, last + 1)
+
+
+def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str | None) -> int:
+    """Return the memory (bytes) of the tractions of some steps, corrected at sharp edges."""
+    sheared = math.isfinite(case.friction_coefficient) and case.friction_coefficient > 0.0
+    nodes, unlike = case.contact_nodes(lattice), case.pair.beta != 0.0
+    used = "nodes" if case.deck.interface else source
+    needed = stress.tractions_needed(lattice, steps, nodes, case.frictional and sheared, unlike, used)
+    # beside the spectra of the solver, which are kept
+    return needed + case.frictional * contact.memory_needed("fft", *lattice.shape, part="operator")
 
 
 def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:

@@ -82,6 +82,7 @@ class _Ends:
         self.fields = np.zeros((count, 2, 3, *lattice.shape), dtype=np.float32)
         self.numbers = np.zeros((count, 2, len(MOTION)))
         self.cycles = np.full(count, -1.0)
+        self.before: tuple[Array, Array] | None = None  # what was expected of the last load step
 
     def expected(self, step: int, cycles: float) -> tuple[Array, Array] | None:
         """Return tractions and motions at the end of a load step, after so many cycles of wear."""
@@ -93,11 +94,27 @@ class _Ends:
         np.maximum(tractions[0], 0.0, out=tractions[0])
         return tractions, numbers + ahead * changes
 
+    def guess(self, step: int, cycles: float, state: ContactState) -> tuple[Array, Array] | None:
+        """Return tractions and motions to start a load step from, after one whose end `state` was found.
+
+        The pressure and the motions are those of that end, and what is expected to change between the two: so
+        what the expectation misses at both of them is right, above all where the pressure stays as it is. The
+        shear traction, which turns round in a cycle, is the expected one.
+        """
+        expected, self.before = self.before, self.expected(step, cycles)
+        if expected is None or self.before is None or not step:
+            return self.before
+        (last, last_motions), (tractions, motions) = expected, self.before
+        ahead = tractions.astype(float)
+        ahead[0] = np.maximum(state.pressure + (ahead[0] - last[0]), 0.0)
+        ahead *= ahead[0] > 0.0
+        return ahead, _motions(state) + (motions - last_motions)
+
     def found(self, step: int, cycles: float, state: ContactState) -> None:
         """Remember the end of a load step, in the place of the one before: records are written by then."""
         passed = cycles - self.cycles[step] if self.cycles[step] >= 0.0 else 0.0
         tractions = state.pressure, state.traction_x, state.traction_y
-        motions = np.array([getattr(state, name) for name in MOTION])
+        motions = _motions(state)
         for known, new in (
             *zip(self.fields[step].swapaxes(0, 1), tractions, strict=True),
             (self.numbers[step], motions),
@@ -269,7 +286,7 @@ class WearPath(GivenPath):
             if target.segment != segment:
                 segment, begun = target.segment, _standing(state)
             numbered = dataclasses.replace(target, index=self._number)
-            how = {"guess": self._ends.expected(place, cycles), "tolerance": self._tolerance}
+            how = {"guess": self._ends.guess(place, cycles, state), "tolerance": self._tolerance}
             _, state = self._reached(state, numbered, target.values(begun), **how)
             if self._ends.lattice != self.window.lattice:
                 self._ends = _Ends(self.window.lattice, 1 + len(self.case.cycle))
@@ -349,6 +366,11 @@ class WearPath(GivenPath):
             float(step.history["wear_cycles"]),
             float(step.control["until"]),
         )
+
+
+def _motions(state: ContactState) -> Array:
+    """Return the motions of a state."""
+    return np.array([getattr(state, name) for name in MOTION])
 
 
 def _standing(state: ContactState) -> dict[str, float]:

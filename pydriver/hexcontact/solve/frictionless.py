@@ -91,7 +91,8 @@ def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
 
 def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str | None) -> int:
     """Return the memory (bytes) of the tractions of some steps, corrected at sharp edges."""
-    sheared = math.isfinite(case.friction_coefficient) and case.friction_coefficient > 0.0
+    mu = case.friction_coefficient  # nan where it varies
+    sheared = math.isnan(mu) or 0.0 < mu < math.inf
     nodes, unlike = case.contact_nodes(lattice), case.pair.beta != 0.0
     used = "nodes" if case.deck.interface else source
     needed = stress.tractions_needed(lattice, steps, nodes, case.frictional and sheared, unlike, used)

@@ -491,9 +491,10 @@ def test_overwrite_replaces_results_only(deck: Path) -> None:
     done = hexcontact_(deck.parent, "run", "sphere.toml", "--output", "sphere.toml", "--overwrite")
     assert (done.returncode, deck.read_text()) == (2, before)
     assert "sphere.toml is not a result of hexcontact" in done.stderr
-    done = hexcontact_(deck.parent, "run", "sphere.toml", "--output", "a.png", "--plot")
-    assert done.returncode == 2
-    assert "output a.png: expected a netCDF file, such as a.nc" in done.stderr
+    for name in ("a.png", "a.csv"):
+        done = hexcontact_(deck.parent, "run", "sphere.toml", "--output", name, "--plot")
+        assert done.returncode == 2
+        assert f"output {name}: expected a netCDF file, such as a.nc" in done.stderr
 
 
 def test_check_refuses_what_memory_cannot_hold(deck: Path) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..problem.problem import Problem
     from ..result.result import Result
 
-_PICTURES = (".png", ".pdf", ".svg")
+_OTHER_FILES = (".png", ".pdf", ".svg", ".csv", ".html", ".json", ".vtk", ".vtu")
 
 
 def argument(metavar: str, help: str) -> Any:
@@ -138,7 +138,7 @@ def case_of(deck: Path, settings: list[str] | None) -> Case:
 def target_of(case: Problem, deck: Path, output: Path | None = None) -> Path:
     """Return the file that a run writes: that of the option or the deck, else one named after the deck."""
     target = output or case.output.file or Path(f"{deck.stem}.nc")
-    if target.suffix in _PICTURES:
+    if target.suffix in _OTHER_FILES:
         raise DeckError(f"output {target}: expected a netCDF file, such as {target.with_suffix('.nc')}")
     if not target.parent.is_dir():
         there = target.parent.exists()

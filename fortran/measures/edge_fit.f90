@@ -5,6 +5,7 @@
 !>
 !> Equations: docs/theory/interior.md, (I16).
 module hc_edge_fit
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use hc_precision, only: wp
   use hc_options, only: edge_options_t
   use hc_lattice, only: equilateral_basis
@@ -34,7 +35,7 @@ contains
     reach = ceiling(options%fit_reach*2.0_wp/sqrt(3.0_wp))
     do row = 1, size(squares, 2)
       do col = 1, size(squares, 1)
-        if (.not. abs(squares(col, row)) >= 0.0_wp) cycle
+        if (ieee_is_nan(squares(col, row))) cycle
         if (distance(col, row) > options%fit_depth .or. distance(col, row) < -options%fit_beyond) cycle
         matrix = 0.0_wp
         rhs = 0.0_wp

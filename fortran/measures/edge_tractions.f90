@@ -9,6 +9,7 @@
 !>
 !> Equations: docs/theory/interior.md, (I16) to (I18).
 module hc_edge_tractions
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_options, only: edge_options_t
@@ -349,8 +350,8 @@ contains
 
     associate (c => [max(col - 1, 1), min(col + 1, size(shape_of%squares, 1))], &
                r => [max(row - 1, 1), min(row + 1, size(shape_of%squares, 2))])
-      near_edge = any(abs(shape_of%squares(c(1):c(2), r(1):r(2))) >= 0.0_wp)
-      if (n > 1) near_edge = near_edge .or. any(abs(shape_of%stick_squares(c(1):c(2), r(1):r(2))) >= 0.0_wp)
+      near_edge = .not. all(ieee_is_nan(shape_of%squares(c(1):c(2), r(1):r(2))))
+      if (n > 1) near_edge = near_edge .or. .not. all(ieee_is_nan(shape_of%stick_squares(c(1):c(2), r(1):r(2))))
     end associate
   end function near_edge
 

@@ -211,8 +211,7 @@ contains
     real(wp), intent(in) :: x, y
     real(wp) :: displacement(2)
 
-    displacement(1) = motion(along_x) - motion(about_z)*y - (motion(strain_xx)*x + motion(strain_xy)*y)
-    displacement(2) = motion(along_y) + motion(about_z)*x - (motion(strain_xy)*x + motion(strain_yy)*y)
+    call remote_displacement_row(motion, [x], [y], displacement(:1), displacement(2:))
   end function remote_displacement
 
   !> Compute it at the points of a row; a call for each point would take longer than what it computes.

@@ -3,10 +3,12 @@
 !> The outer iteration sorts the nodes in contact into stick and slip, the inner
 !> one finds the contact area with these frozen (section 8.6 and chapter 12,
 !> Figures 8.3 and 12.1): it solves one linear system for the tractions and the
-!> rigid motions, nodes in tension leave and nodes that penetrate enter. The
-!> area of a step starts from the last one with a ring of nodes around it. Stick and
+!> rigid motions, nodes in tension leave and nodes that penetrate enter. Stick and
 !> slip follow from q - r ds, and slip is linearised as in hc_coulomb, so
 !> that the whole is a Newton method for pressure, traction and motions at once.
+!>
+!> A step starts from what the same method finds on the lattice of every second node (hc_coarse_change), or from the last
+!> contact area with a ring of nodes around it.
 !>
 !> Equations: docs/theory/friction.md, (F7).
 module hc_direct_friction
@@ -15,10 +17,12 @@ module hc_direct_friction
   use hc_options, only: direct_options_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
+  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, copy_tractions, separated, stick, slip, &
     normal, along_x, force_control, displacement_control, loads_not_carried
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
+  use hc_coarse_change, only: restrict_state, balance, add_change, prolong_state
+  use hc_transfer, only: restrict_vector
   use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: first_guess, exchange
   use hc_area_factors, only: area_factors_t
@@ -37,6 +41,8 @@ module hc_direct_friction
     type(fft_flexibility_t) :: operator
     !> Factors of the last contact area
     type(area_factors_t) :: factors
+    !> The same on the lattice of every second node, set up when it is first of use
+    class(friction_solver_t), allocatable :: coarser
   contains
     procedure :: solve_step
     procedure :: displacements
@@ -68,9 +74,155 @@ contains
     call self%problem%displacements(self%operator, pressure, traction, displacement, error)
   end subroutine displacements
 
-  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+  recursive subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(direct_friction_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
+    real(wp), intent(in), contiguous :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: guess
+    real(wp) :: work
+    integer :: sweeps
+    logical :: guessed
+
+    if (.not. self%problem%is_pressed(target)) then
+      call self%problem%separate(start, reference, target, tolerance, state)
+      return
+    end if
+    call find_start(self, start, reference, target, max_sweeps, guess, guessed, work, error)
+    if (allocated(error)) return
+    sweeps = 0
+    if (guessed) then
+      call attempt(guess)
+      if (allocated(error)) return
+    end if
+    ! the start by coarse lattices may not converge where the old state does
+    if (.not. state%converged) call attempt(start)
+    state%sweeps = sweeps
+    state%operator_applications = work
+
+  contains
+
+    !> Iterate on this lattice, and count what it takes.
+    subroutine attempt(from)
+      !> State to start from
+      type(contact_state_t), intent(in) :: from
+
+      call iterate(self, from, guessed .and. sweeps == 0, reference, target, tolerance, max_sweeps, state, error)
+      sweeps = sweeps + state%sweeps
+      work = work + state%operator_applications
+    end subroutine attempt
+
+  end subroutine solve_step
+
+  !> Find tractions and motions to start from by the lattice of every second node.
+  recursive subroutine find_start(self, start, reference, target, max_sweeps, guess, guessed, work, error)
+    class(direct_friction_t), intent(inout), target :: self
+    !> State to start from otherwise
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in), contiguous :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> State to start from
+    type(contact_state_t), intent(out) :: guess
+    !> There is one
+    logical, intent(out) :: guessed
+    !> Work, in applications of the operator of this lattice
+    real(wp), intent(out) :: work
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: before, after
+    type(load_target_t) :: coarse_target
+    real(wp), allocatable :: displacement(:, :, :), origin(:, :, :), gap(:, :)
+    logical :: touching
+
+    guessed = .false.
+    work = 0.0_wp
+    touching = any(start%pressure > 0.0_wp)
+    if (.not. is_worth_coarsening(self, touching, start, target)) return
+    if (.not. allocated(self%coarser)) call set_up_coarser(self, error)
+    if (allocated(error)) return
+    call copy_tractions(start, guess, self%problem%space)
+    associate (model => self%coarser%problem, options => self%problem%options%multilevel)
+      if (.not. any(model%candidate)) return
+      if (touching) then
+        call restrict_state(self%problem, start, model, before)
+        allocate (displacement(model%lattice%extent(1), model%lattice%extent(2), 3))
+        call self%coarser%displacements(before%pressure, before%traction, displacement, error)
+        if (allocated(error)) return
+        gap = model%initial_gap
+        call balance(self%problem, start, reference, target, before, displacement, model, origin, coarse_target)
+        call self%coarser%solve_step(before, origin, coarse_target, options%change_tolerance, options%change_sweeps, after, error)
+        model%initial_gap = gap
+        if (allocated(error)) return
+        guessed = after%converged
+        if (guessed) call add_change(model, before, after, self%problem, guess)
+      else
+        call new_friction_state(before, model%lattice, model%space)
+        before%motion = start%motion
+        call self%coarser%solve_step(before, restrict_vector(self%problem%lattice, reference, model%lattice), target, &
+                                     options%nested_tolerance, max_sweeps, after, error)
+        if (allocated(error)) return
+        guessed = after%converged
+        if (guessed) call prolong_state(model, after, self%problem, guess)
+      end if
+      work = after%operator_applications*model%lattice%size()/self%problem%lattice%size()
+    end associate
+    if (guessed) guessed = any(guess%pressure > 0.0_wp)
+  end subroutine find_start
+
+  !> Tell whether the contact has nodes enough for a coarser lattice to help.
+  logical function is_worth_coarsening(self, touching, start, target) result(worth)
+    type(direct_friction_t), intent(in) :: self
+    !> There is a contact already
+    logical, intent(in) :: touching
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    logical, allocatable :: nodes(:)
+
+    associate (problem => self%problem, options => self%problem%options%multilevel)
+      worth = minval(problem%lattice%extent) >= 2*options%smallest_side
+      if (.not. worth) return
+      if (touching) then
+        nodes = reshape(start%pressure > 0.0_wp, [problem%lattice%size()])
+      else
+        nodes = first_guess(problem%lattice, problem%pair, target%control(normal), target%value(normal), &
+                            reshape(problem%initial_gap, [problem%lattice%size()]), &
+                            reshape(problem%candidate, [problem%lattice%size()]))
+      end if
+      worth = count(nodes) >= 4*options%least_contact
+    end associate
+  end function is_worth_coarsening
+
+  !> Set up the problem on the lattice of every second node.
+  subroutine set_up_coarser(self, error)
+    type(direct_friction_t), intent(inout) :: self
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: problem
+    type(direct_friction_t), allocatable :: coarser
+
+    call self%problem%coarsen(problem)
+    allocate (coarser)
+    call new_direct_friction(coarser, problem, error)
+    if (.not. allocated(error)) call move_alloc(coarser, self%coarser)
+  end subroutine set_up_coarser
+
+  !> Iterate from a state until the residuals are within the tolerance.
+  subroutine iterate(self, start, is_near, reference, target, tolerance, max_sweeps, state, error)
+    class(direct_friction_t), intent(inout), target :: self
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Its contact area needs no ring around it
+    logical, intent(in) :: is_near
     real(wp), intent(in), contiguous :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
@@ -82,10 +234,6 @@ contains
     real(wp) :: share
     integer :: n, sweep, unsupported
 
-    if (.not. self%problem%is_pressed(target)) then
-      call self%problem%separate(start, reference, target, tolerance, state)
-      return
-    end if
     options = self%problem%options%direct
     ! with rows of the step before, the last bits would depend on whether the run was interrupted
     call self%factors%clear()
@@ -102,7 +250,7 @@ contains
     allocate (it%zone(n), source=separated)
 
     if (any(start%pressure > 0.0_wp)) then
-      call continue_from(self, start, it, error)
+      call continue_from(self, start, is_near, it, error)
     else
       call set_start(self, target, it, error)
     end if
@@ -137,7 +285,7 @@ contains
       call classify(self%problem, share, it)
     end do
     if (state%sliding) state%stopped = loads_not_carried
-  end subroutine solve_step
+  end subroutine iterate
 
   !> First contact: without shear traction, and then against the slip that its pressure causes.
   subroutine set_start(self, target, it, error)
@@ -171,10 +319,12 @@ contains
   end subroutine set_start
 
   !> Tractions, and contact with a ring around it, of the state to start from.
-  subroutine continue_from(self, start, it, error)
+  subroutine continue_from(self, start, is_near, it, error)
     class(direct_friction_t), intent(inout) :: self
     !> State to start from
     type(contact_state_t), intent(in) :: start
+    !> Its contact area needs no ring around it
+    logical, intent(in) :: is_near
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
@@ -182,7 +332,9 @@ contains
     integer :: n
 
     n = size(it%p)
-    it%contact = it%candidate .and. reshape(ring(start%pressure > 0.0_wp), [n])
+    it%contact = reshape(start%pressure > 0.0_wp, [n])
+    if (.not. is_near) it%contact = reshape(ring(start%pressure > 0.0_wp), [n])
+    it%contact = it%candidate .and. it%contact
     if (.not. any(it%contact)) it%contact = it%candidate
     it%p = merge(reshape(start%pressure, [n]), 0.0_wp, it%contact)
     it%q = reshape(start%traction, [n, 2])

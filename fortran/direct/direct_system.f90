@@ -208,14 +208,15 @@ contains
     logical, intent(out) :: done
     !> Allocated if there is not enough memory
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: key(size(stuck)), bound(size(it%p)), side(2, size(sliding))
+    real(wp) :: key(size(stuck)), bound(size(it%p)), side(2, size(sliding)), largest
     logical :: other(size(it%p))
     integer :: i
 
     call problem%friction%find_bounds(1, it%p, bound)
+    largest = max(maxval(it%p), tiny(1.0_wp))
     do i = 1, size(stuck)
       ! how far a node is from slip and from the edge of the contact
-      key(i) = it%p(stuck(i))/max(maxval(it%p), tiny(1.0_wp))
+      key(i) = it%p(stuck(i))/largest
       if (bound(stuck(i)) > 0.0_wp) key(i) = min(key(i), 1.0_wp - norm2(it%q(stuck(i), :))/bound(stuck(i)))
     end do
     do i = 1, size(sliding)

@@ -26,11 +26,12 @@ module hc_direct_friction
   use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: first_guess, exchange
   use hc_area_factors, only: area_factors_t
-  use hc_direct_system, only: direct_iterate_t, infinite, unloaded, solve_area
+  use hc_direct_iterate, only: direct_iterate_t, infinite, ring, classify, enter, is_unsupported, linearize_law, evaluate, record
+  use hc_direct_system, only: solve_area
   implicit none
   private
 
-  public :: direct_friction_t, new_direct_friction, ring
+  public :: direct_friction_t, new_direct_friction
 
   !> A contact problem with friction and its flexibility.
   type, extends(friction_solver_t) :: direct_friction_t
@@ -273,7 +274,7 @@ contains
           if (allocated(error)) return
         end if
       end if
-      call record(self, reference, target, tolerance, it, state, error)
+      call record(self%problem, self%operator, reference, target, tolerance, it, state, error)
       if (allocated(error) .or. state%converged) exit
       it%accuracy = min(it%accuracy, max(options%last_accuracy*tolerance, options%inner_accuracy* &
                                          max(state%residual_normal, state%residual_tangential)))
@@ -338,76 +339,9 @@ contains
     if (.not. any(it%contact)) it%contact = it%candidate
     it%p = merge(reshape(start%pressure, [n]), 0.0_wp, it%contact)
     it%q = reshape(start%traction, [n, 2])
-    call evaluate(self, it, error)
+    call evaluate(self%problem, self%operator, it, error)
     if (.not. allocated(error)) call classify(self%problem, self%problem%options%direct%cautious_share, it)
   end subroutine continue_from
-
-  !> An area with the ring of lattice neighbours around it.
-  pure function ring(area) result(wider)
-    !> Area (n_col, n_row)
-    logical, intent(in) :: area(:, :)
-    logical :: wider(size(area, 1), size(area, 2))
-    integer :: sign
-
-    wider = area
-    do sign = -1, 1, 2
-      wider = wider .or. eoshift(area, sign, dim=1) .or. eoshift(area, sign, dim=2) &
-              .or. eoshift(eoshift(area, sign, dim=1), -sign, dim=2)
-    end do
-  end function ring
-
-  !> Stick or slip at every node in contact.
-  pure subroutine classify(problem, share, it)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Share of the classification parameter to use
-    real(wp), intent(in) :: share
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    logical :: pressed(size(it%p))
-    real(wp) :: r
-    integer :: i
-
-    r = share*problem%classification_parameter(count(it%contact .and. it%p > 0.0_wp))
-    pressed = it%contact .and. it%p > 0.0_wp .and. problem%friction%resists() .and. problem%friction%is_bounded()
-    call problem%friction%linearize(1, maxval(it%p), r, pressed, it%p, it%q(:, 1), it%q(:, 2), it%ds(:, 1), it%ds(:, 2), &
-                                    it%zone, it%direction, it%compliance)
-    do i = 1, size(it%p)
-      if (it%contact(i) .and. .not. pressed(i)) call enter(problem, it, i)
-    end do
-  end subroutine classify
-
-  !> State of a node that comes into contact: its traction, if any, will oppose its slip.
-  pure subroutine enter(problem, it, node)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    !> Node
-    integer, intent(in) :: node
-    real(wp) :: length
-
-    it%zone(node) = merge(slip, stick, problem%friction%is_bounded())
-    it%compliance(node) = merge(infinite, 0.0_wp, problem%friction%is_bounded())
-    it%direction(:, node) = 0.0_wp
-    length = norm2(it%ds(node, :))
-    if (length > problem%options%direct%negligible_slip*problem%tangential_compliance*maxval(it%p)) then
-      it%direction(:, node) = -it%ds(node, :)/length
-    end if
-  end subroutine enter
-
-  !> Is there nothing to carry the loads, or no more than the directions of slip, with tractions to match?
-  pure logical function is_unsupported(problem, it)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Iterate
-    type(direct_iterate_t), intent(in) :: it
-
-    is_unsupported = .not. it%carried
-    if (is_unsupported .or. any(it%zone == stick)) return
-    is_unsupported = sqrt(maxval(sum(it%q**2, dim=2)))/problem%options%direct%most_across &
-                     > problem%friction%largest_bound(maxval(it%p))
-  end function is_unsupported
 
   !> Contact area under a frozen state of stick and slip, and its tractions.
   subroutine find_area(self, target, max_tries, it, error)
@@ -431,7 +365,7 @@ contains
       call solve_area(self%problem, self%flexibility, self%operator, self%factors, target, it, error)
       if (allocated(error)) return
       it%solves = it%solves + 1
-      call evaluate(self, it, error)
+      call evaluate(self%problem, self%operator, it, error)
       if (allocated(error)) return
       if (self%problem%normal_law%is_compliant()) then
         violation = 0.0_wp
@@ -451,76 +385,5 @@ contains
       end do
     end do
   end subroutine find_area
-
-  !> Nodes in contact, and springs of a compliant law, that the present pressure and gap call for.
-  pure subroutine linearize_law(problem, it)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    logical :: before(size(it%p))
-    real(wp) :: r
-    integer :: i
-
-    before = it%contact
-    r = problem%normal_classification_parameter(count(it%contact))
-    call problem%normal_law%find_contact(r, it%p, it%gap, it%candidate, it%contact)
-    if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
-    call problem%normal_law%linearize(1, r, problem%softest_spring(maxval(abs(it%p))), it%p, it%gap, it%contact, &
-                                      it%spring, it%offset)
-    do i = 1, size(it%p)
-      if (it%contact(i) .and. .not. before(i)) call enter(problem, it, i)
-    end do
-  end subroutine linearize_law
-
-  !> Gap and slip under the tractions and motions of an iterate.
-  subroutine evaluate(self, it, error)
-    class(direct_friction_t), intent(inout) :: self
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), dimension(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3) :: traction, displacement
-    real(wp) :: conditions(size(it%p), 3)
-
-    traction = reshape([it%p, it%q], shape(traction))
-    call self%displacements(traction(:, :, normal), traction(:, :, along_x:), displacement, error)
-    if (allocated(error)) return
-    conditions = unloaded(self%problem, it) + reshape(displacement, shape(conditions))
-    it%gap = conditions(:, normal)
-    it%ds = conditions(:, along_x:)
-  end subroutine evaluate
-
-  !> The state that an iterate stands for: with its tractions projected on p >= 0 and on the cone.
-  subroutine record(self, reference, target, tolerance, it, state, error)
-    class(direct_friction_t), intent(inout) :: self
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Iterate
-    type(direct_iterate_t), intent(in) :: it
-    !> State to be filled
-    type(contact_state_t), intent(inout) :: state
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    real(wp) :: displacement(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3)
-    real(wp) :: p(size(it%p)), q(size(it%p), 2), unit
-
-    call self%problem%normal_law%project(it%p, p)
-    unit = maxval(p)
-    if (unit > 0.0_wp) unit = 1.0_wp/unit
-    call self%problem%friction%project(1, unit, p, it%q(:, 1), it%q(:, 2), q(:, 1), q(:, 2))
-    state%pressure = reshape(p, shape(state%pressure))
-    state%traction = reshape(q, shape(state%traction))
-    state%motion = it%motion
-    call self%displacements(state%pressure, state%traction, displacement, error)
-    if (allocated(error)) return
-    call self%problem%complete_state(target, tolerance, reference, displacement, state)
-    state%sweeps = it%solves
-    state%operator_applications = self%operator%applications
-  end subroutine record
 
 end module hc_direct_friction

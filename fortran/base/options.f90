@@ -185,6 +185,8 @@ module hc_options
     integer :: most_explicit = 60
     !> Share of the rows of a factor that may come or go before it is made anew
     real(wp) :: most_exchanged = 0.1_wp
+    !> Change of a direction of slip, and of a spring across it, that its factor serves for, too
+    real(wp) :: largest_turn = 0.1_wp
     !> Solutions with kept factors: accuracy relative to the last residuals, and to the tolerance; the accuracy of the first one;
     !> directions of GMRES after which the whole matrix is factorized
     real(wp) :: inner_accuracy = 1.0e-3_wp, last_accuracy = 0.05_wp, first_accuracy = 1.0e-4_wp

@@ -18,6 +18,7 @@ module hc_area_factors
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_memory, only: require_memory
+  use hc_options, only: direct_options_t
   use hc_lapack, only: spotrf, spotrs, strsm, strsv, ssyrk, sgemm, sgemv
   use hc_flexibility_dense, only: dense_flexibility_t
   implicit none
@@ -46,9 +47,9 @@ module hc_area_factors
     !> Rows of nodes that have left the contact; W and the factor of W^T W
     integer, allocatable, private :: gone(:)
     real(real32), allocatable, private :: away(:, :), gram(:, :)
-    !> Unknowns of T: row behind the core, direction (:, 2); upper factor of T
+    !> Unknowns of T: row behind the core, direction (:, 2) and spring; upper factor of T
     integer, allocatable, private :: behind(:)
-    real(real32), allocatable, private :: side(:, :), across(:, :)
+    real(real32), allocatable, private :: side(:, :), spring(:), across(:, :)
   contains
     !> Factorize another area
     procedure :: factorize
@@ -65,19 +66,20 @@ contains
     class(area_factors_t), intent(inout) :: self
 
     if (allocated(self%order)) deallocate (self%order)
+    if (allocated(self%behind)) deallocate (self%behind)
     self%n_core = 0
   end subroutine clear
 
   !> Factorize the matrix of an area.
-  subroutine factorize(self, flexibility, unit, shear, most_exchanged, contact, stuck, is_core, sliding, side, compliance, &
+  subroutine factorize(self, flexibility, unit, shear, options, contact, stuck, is_core, sliding, side, compliance, &
                        done, error)
     class(area_factors_t), intent(inout) :: self
     !> Influence coefficients
     type(dense_flexibility_t), intent(in) :: flexibility
     !> Self-compliance of a node [m/Pa], and c
     real(wp), intent(in) :: unit, shear
-    !> Share of the rows that may have come or gone since L was made
-    real(wp), intent(in) :: most_exchanged
+    !> What may have changed since L and T were made
+    type(direct_options_t), intent(in) :: options
     !> Nodes in contact; those that stick, and which of these are sure to go on doing so (size(stuck)); those that slip with
     !> a spring across
     integer, intent(in) :: contact(:), stuck(:), sliding(:)
@@ -97,7 +99,7 @@ contains
     self%shear = shear
     self%wanted = self%wanted + size(contact)
     info = 0
-    if (is_kept(self, most_exchanged, contact, stuck, is_here)) then
+    if (is_kept(self, options%most_exchanged, contact, stuck, is_here)) then
       new = pack(contact, self%row(contact) == 0)
       if (size(new) > 0) call add_rows(self, flexibility, unit, new, info, error)
     else
@@ -119,7 +121,7 @@ contains
       call hold_gone(self, info, error)
       if (allocated(error)) return
     end if
-    if (info == 0) call factorize_across(self, side, compliance, info, error)
+    if (info == 0) call factorize_across(self, side, compliance, options%largest_turn, info, error)
     done = info == 0
     ! nothing can be kept of what fails
     if (.not. done) call self%clear()
@@ -150,6 +152,7 @@ contains
     integer, intent(in) :: n_window
 
     self%order = [integer ::]
+    if (allocated(self%behind)) deallocate (self%behind)
     if (allocated(self%row)) deallocate (self%row)
     allocate (self%row(n_window), source=0)
   end subroutine clear_rows
@@ -285,57 +288,73 @@ contains
     call spotrf('L', k, self%gram, k, info)
   end subroutine hold_gone
 
-  !> Factorize T.
-  subroutine factorize_across(self, side, compliance, info, error)
+  !> Factorize T, unless the last one is nearly the same.
+  subroutine factorize_across(self, side, compliance, largest_turn, info, error)
     type(area_factors_t), intent(inout) :: self
     !> Directions across the slip (2, number of sliding nodes), and compliances D over the unit
     real(wp), intent(in) :: side(:, :), compliance(:)
+    !> Change of a direction, and of D over the whole compliance of a node, that counts as nearly the same
+    real(wp), intent(in) :: largest_turn
     !> Not zero: not positive definite
     integer, intent(out) :: info
     !> Allocated if there is not enough memory
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: unsure(:)
+    integer, allocatable :: row(:)
+    real(real32), allocatable :: t(:, :), d(:)
     integer :: i, j, m, n
 
     info = 0
-    associate (core => self%n_core)
-      unsure = pack(self%stuck, self%stuck > core)
-      self%behind = [unsure, unsure, self%sliding]
-      n = size(unsure)
-      m = size(self%behind)
-      if (allocated(self%side)) deallocate (self%side)
-      allocate (self%side(m, 2), source=none)
-      self%side(:n, 1) = one
-      self%side(n + 1:2*n, 2) = one
-      self%side(2*n + 1:, :) = transpose(real(side, real32))
-      if (allocated(self%across)) then
-        if (size(self%across, 1) /= m) deallocate (self%across)
-      end if
-      if (m == 0) return
-      if (.not. allocated(self%across)) then
-        call require_memory(4*int(m, int64)**2, error)
-        if (allocated(error)) return
-        allocate (self%across(m, m))
-      end if
-      associate (t => self%side, s => self%lower, row => self%behind)
-        !$omp parallel do schedule(dynamic, 32) private(j) if (m > 1000)
-        do i = 1, m
-          do j = 1, i - 1
-            self%across(j, i) = s(min(row(i), row(j)), max(row(i), row(j)))*(t(j, 1)*t(i, 1) + t(j, 2)*t(i, 2))
-          end do
-          self%across(i, i) = self%diagonal(row(i))
-          ! both components of a node are orthogonal
-          if (i > n .and. i <= 2*n) self%across(i - n, i) = none
-        end do
-        !$omp end parallel do
-        do i = 2*n + 1, m
-          self%across(i, i) = self%across(i, i) + real(min(compliance(i - 2*n)/self%shear, loosest), real32)
-        end do
-      end associate
-    end associate
-    call spotrf('U', m, self%across, m, info)
-    self%behind = self%behind - self%n_core
+    row = pack(self%stuck, self%stuck > self%n_core)
+    n = size(row)
+    row = [row, row, self%sliding]
+    m = size(row)
+    allocate (t(m, 2), d(m), source=none)
+    t(:n, 1) = one
+    t(n + 1:2*n, 2) = one
+    t(2*n + 1:, :) = transpose(real(side, real32))
+    d(2*n + 1:) = real(min(compliance/self%shear, loosest), real32)
+    if (allocated(self%behind)) then
+      if (is_like(self, row, t, d, real(largest_turn, real32))) return
+      deallocate (self%behind)
+    end if
+    if (allocated(self%across)) then
+      if (size(self%across, 1) /= m) deallocate (self%across)
+    end if
+    if (.not. allocated(self%across)) then
+      call require_memory(4*int(m, int64)**2, error)
+      if (allocated(error)) return
+      allocate (self%across(m, m))
+    end if
+    !$omp parallel do schedule(dynamic, 32) private(j) if (m > 1000)
+    do i = 1, m
+      do j = 1, i - 1
+        self%across(j, i) = self%lower(min(row(i), row(j)), max(row(i), row(j)))*(t(j, 1)*t(i, 1) + t(j, 2)*t(i, 2))
+      end do
+      self%across(i, i) = self%diagonal(row(i)) + d(i)
+      ! both components of a node are orthogonal
+      if (i > n .and. i <= 2*n) self%across(i - n, i) = none
+    end do
+    !$omp end parallel do
+    if (m > 0) call spotrf('U', m, self%across, m, info)
+    self%behind = row - self%n_core
+    self%side = t
+    self%spring = d
   end subroutine factorize_across
+
+  !> Tell whether T is nearly that of some unknowns.
+  pure logical function is_like(self, row, side, spring, largest_turn)
+    type(area_factors_t), intent(in) :: self
+    !> Row of each unknown, its direction (:, 2) and spring
+    integer, intent(in) :: row(:)
+    real(real32), intent(in) :: side(:, :), spring(:)
+    !> Change of a direction, and of a spring over the whole compliance of a node, that counts as nearly the same
+    real(real32), intent(in) :: largest_turn
+
+    is_like = size(row) == size(self%behind)
+    if (is_like) is_like = all(row == self%behind + self%n_core)
+    if (is_like) is_like = maxval(abs(side - self%side)) <= largest_turn
+    if (is_like) is_like = all(abs(spring - self%spring) <= largest_turn*(self%diagonal(row) + self%spring))
+  end function is_like
 
   !> Find tractions from displacements, nearly: pressure of all nodes, both components of the stuck, tau of the sliding ones.
   subroutine apply(self, given, found)

@@ -261,7 +261,7 @@ contains
       if (allocated(error)) return
       before = it
       ! while stick and slip are wrong, iterating the contact area to its end costs more than it saves
-      call find_area(self, target, sweep, it, error)
+      call find_area(self, target, merge(1, sweep, is_near), it, error)
       if (allocated(error)) return
       if (is_unsupported(self%problem, it)) then
         unsupported = unsupported + 1

@@ -177,7 +177,7 @@ contains
     end do
     associate (pair => problem%pair, unit => problem%normal_compliance)
       call factors%factorize(flexibility, unit, 1.0_wp + 0.5_wp*pair%lambda_5/pair%lambda_1, &
-                             problem%options%direct%most_exchanged, contact, stuck, .not. edge(stuck), sliding, side, &
+                             problem%options%direct, contact, stuck, .not. edge(stuck), sliding, side, &
                              it%compliance(sliding)/unit, done, error)
     end associate
   end subroutine factorize_area

@@ -301,7 +301,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: row(:)
     real(real32), allocatable :: t(:, :), d(:)
-    integer :: i, j, m, n
+    integer :: i, j, m, n, room
 
     info = 0
     row = pack(self%stuck, self%stuck > self%n_core)
@@ -317,13 +317,16 @@ contains
       if (is_like(self, row, t, d, real(largest_turn, real32))) return
       deallocate (self%behind)
     end if
-    if (allocated(self%across)) then
-      if (size(self%across, 1) /= m) deallocate (self%across)
-    end if
-    if (.not. allocated(self%across)) then
-      call require_memory(4*int(m, int64)**2, error)
+    room = 0
+    if (allocated(self%across)) room = size(self%across, 1)
+    if (room < m) then
+      if (allocated(self%across)) deallocate (self%across)
+      ! later areas have more unknowns: memory that is not touched costs nothing, a hole in the heap does
+      room = max(m, size(self%order))
+      room = room + room/10
+      call require_memory(4*int(room, int64)**2, error)
       if (allocated(error)) return
-      allocate (self%across(m, m))
+      allocate (self%across(room, room))
     end if
     !$omp parallel do schedule(dynamic, 32) private(j) if (m > 1000)
     do i = 1, m
@@ -335,7 +338,7 @@ contains
       if (i > n .and. i <= 2*n) self%across(i - n, i) = none
     end do
     !$omp end parallel do
-    if (m > 0) call spotrf('U', m, self%across, m, info)
+    if (m > 0) call spotrf('U', m, self%across, room, info)
     self%behind = row - self%n_core
     self%side = t
     self%spring = d
@@ -429,8 +432,8 @@ contains
         tau = tau - self%side(:, i)*part(self%behind)
       end do
       if (m > 0) then
-        call strsv('U', 'T', 'N', m, self%across, m, tau, 1)
-        call strsv('U', 'N', 'N', m, self%across, m, tau, 1)
+        call strsv('U', 'T', 'N', m, self%across, size(self%across, 1), tau, 1)
+        call strsv('U', 'N', 'N', m, self%across, size(self%across, 1), tau, 1)
       end if
       do i = 1, 2
         if (core == 0) exit

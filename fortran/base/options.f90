@@ -153,6 +153,8 @@ module hc_options
 
   !> Explicit matrices (docs/theory/friction.md, "Direct method").
   type :: direct_options_t
+    !> The iteration as the dissertation writes it, for comparison
+    logical :: as_written = .false.
     !> Exchanges of whole sets that may fail to lower the number of wrong nodes, before Murty's rule exchanges one by one
     integer :: stalled_exchanges = 10
     !> Accuracy at which a compliant interface is not linearised any more, relative to the tolerance

@@ -26,7 +26,9 @@ module hc_direct_friction
   use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: first_guess, exchange
   use hc_area_factors, only: area_factors_t
-  use hc_direct_iterate, only: direct_iterate_t, infinite, ring, classify, enter, is_unsupported, linearize_law, evaluate, record
+  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, classify, enter, is_unsupported, &
+    linearize_law, evaluate, record
+  use hc_written_iteration, only: iterate_as_written
   use hc_direct_system, only: solve_area
   implicit none
   private
@@ -91,6 +93,11 @@ contains
 
     if (.not. self%problem%is_pressed(target)) then
       call self%problem%separate(start, reference, target, tolerance, state)
+      return
+    end if
+    if (self%problem%options%direct%as_written) then
+      call iterate_as_written(self%problem, self%flexibility, self%operator, self%factors, start, reference, target, tolerance, &
+                              max_sweeps, state, error)
       return
     end if
     call find_start(self, start, reference, target, max_sweeps, guess, guessed, work, error)
@@ -233,22 +240,15 @@ contains
     type(direct_iterate_t) :: it, before
     type(direct_options_t) :: options
     real(wp) :: share
-    integer :: n, sweep, unsupported
+    integer :: sweep, unsupported
 
     options = self%problem%options%direct
     ! with rows of the step before, the last bits would depend on whether the run was interrupted
     call self%factors%clear()
     call new_friction_state(state, self%problem%lattice)
     self%operator%applications = 0.0_wp
-    n = self%problem%lattice%size()
-    it%initial_gap = reshape(self%problem%initial_gap, [n])
-    it%candidate = reshape(self%problem%candidate, [n])
-    it%reference = reshape(reference, [n, 2])
+    call new_direct_iterate(it, self%problem, start, reference, target)
     it%accuracy = options%first_accuracy
-    it%motion = merge(target%value, start%motion, target%control == displacement_control)
-    allocate (it%p(n), it%compliance(n), it%spring(n), it%offset(n), source=0.0_wp)
-    allocate (it%q(n, 2), it%direction(2, n), source=0.0_wp)
-    allocate (it%zone(n), source=separated)
 
     if (any(start%pressure > 0.0_wp)) then
       call continue_from(self, start, is_near, it, error)

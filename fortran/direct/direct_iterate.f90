@@ -5,12 +5,14 @@ module hc_direct_iterate
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t
-  use hc_contact_state, only: contact_state_t, load_target_t, stick, slip, normal, along_x, n_motion
+  use hc_contact_state, only: contact_state_t, load_target_t, separated, stick, slip, normal, along_x, n_motion, &
+    displacement_control
   use hc_contact_problem, only: friction_problem_t
   implicit none
   private
 
-  public :: direct_iterate_t, infinite, unloaded, ring, classify, enter, is_unsupported, linearize_law, evaluate, record
+  public :: direct_iterate_t, new_direct_iterate, infinite, unloaded, ring, classify, enter, is_unsupported, linearize_law, &
+            evaluate, record
 
   !> A compliance that leaves no traction across the direction of slip.
   real(wp), parameter :: infinite = huge(1.0_wp)
@@ -42,6 +44,30 @@ module hc_direct_iterate
   end type direct_iterate_t
 
 contains
+
+  !> Set up an iterate without tractions or contact.
+  subroutine new_direct_iterate(it, problem, start, reference, target)
+    !> Iterate
+    type(direct_iterate_t), intent(out) :: it
+    !> What is given
+    type(friction_problem_t), intent(in) :: problem
+    !> State to start from: its motions
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in), contiguous :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    integer :: n
+
+    n = problem%lattice%size()
+    it%initial_gap = reshape(problem%initial_gap, [n])
+    it%candidate = reshape(problem%candidate, [n])
+    it%reference = reshape(reference, [n, 2])
+    it%motion = merge(target%value, start%motion, target%control == displacement_control)
+    allocate (it%p(n), it%compliance(n), it%spring(n), it%offset(n), source=0.0_wp)
+    allocate (it%q(n, 2), it%direction(2, n), source=0.0_wp)
+    allocate (it%zone(n), source=separated)
+  end subroutine new_direct_iterate
 
   !> Gap and slip that the motions alone would cause, without tractions (n, 3) [m].
   pure function unloaded(problem, it)

@@ -37,6 +37,8 @@ from .lattice import Lattice
 _api = _core.hc_f2py_friction
 
 Coupling = Literal["full", "goodman"]
+Iteration = Literal["newton", "dissertation"]
+_AS_WRITTEN = 2  # the direct method with the iteration of the dissertation
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
@@ -178,6 +180,8 @@ class FrictionalContact(Contact):
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
     method
         ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
+    iteration
+        Of the direct method: ``"newton"``, or ``"dissertation"``, as it is written there, for comparison.
     threads
         Threads to use; 0: the default of OpenMP.
     interface
@@ -199,6 +203,7 @@ class FrictionalContact(Contact):
         shear_limit: float = math.inf,
         coupling: Coupling = "full",
         method: Method = "fft",
+        iteration: Iteration = "newton",
         threads: int = 0,
         interface: Interface = UNILATERAL,
         rim_warning: bool = True,
@@ -208,7 +213,7 @@ class FrictionalContact(Contact):
         word(coupling, "coupling", ("full", "goodman"))
         self._create(
             _api.create_frictional_contact,
-            *(method_code(method), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
+            *(_method(method, iteration), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
             *self._surfaces,
             *law.as_arguments(),
             checked_interface(interface),
@@ -400,6 +405,16 @@ def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: La
     kind = "a number of at least 0, or inf"
     found = number(coefficient, "friction_coefficient", kind, lambda found: found >= 0)
     return FrictionLaw(found, limit)
+
+
+def _method(method: Method, iteration: Iteration) -> int:
+    """Return the number of a method with its iteration in the core."""
+    code = method_code(method)
+    if word(iteration, "iteration", ("newton", "dissertation")) == "newton":
+        return code
+    if method != "direct":
+        raise DeckError(f'iteration = "{iteration}" needs method = "direct", not "{method}"')
+    return _AS_WRITTEN
 
 
 def memory_needed(

@@ -1,16 +1,17 @@
 !> Contact with friction by the iteration of the dissertation as it is written, for comparison with hc_direct_friction.
 !>
 !> Sections 8.6 and 12.3, Figures 8.3 and 12.1. Inside, under frozen zones: solve for the tractions; nodes in
-!> tension leave, (8.40) and (12.28), until there are none; where the bodies then overlap outside of the area, a ring is added to
-!> it. Outside: a node that sticks and has |q| >= mu p slips, (12.31), in the direction of its last traction, (8.35); the
+!> tension leave, (8.40) and (12.28), until there are none. In a first step the area only shrinks (chapter 8); in a later one,
+!> where the bodies then overlap outside of the area, a ring is added to it (12.3.1). Outside: a node that sticks and has |q| >= mu p slips, (12.31), in the direction of its last traction, (8.35); the
 !> components of this direction keep their lengths and have the signs of the last slip, (12.20) to (12.25); a node that slips
 !> with no velocity sticks, (12.32). Nothing is damped. Where the text leaves a choice:
 !>
 !> - The first area is that on which the undeformed bodies would overlap; all of it sticks, and so do nodes that are added.
 !>   A later step begins with the area and the zones of the last one.
+!> - Where ring and shrinking lead to an area that was there before, the zones are next.
 !> - A velocity is never zero in numbers: (12.32) holds as soon as the slip is not against the traction any more.
 !>
-!> It ends when the residuals are within the tolerance, when zones and area stand, or when an arrangement of them comes again.
+!> It ends when the residuals are within the tolerance, when zones and directions stand, or when they come again with the same area.
 !>
 !> Theory: docs/direct_method.md.
 module hc_written_iteration
@@ -66,7 +67,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(direct_iterate_t) :: it
     type(arrangements_t) :: before
-    logical :: changed, repeated
+    logical :: changed, repeated, first
     integer :: sweep
 
     call factors%clear()
@@ -74,7 +75,8 @@ contains
     operator%applications = 0.0_wp
     call new_direct_iterate(it, problem, start, reference, target)
     it%accuracy = problem%options%direct%last_accuracy*tolerance
-    if (any(start%pressure > 0.0_wp)) then
+    first = .not. any(start%pressure > 0.0_wp)
+    if (.not. first) then
       it%contact = it%candidate .and. reshape(start%pressure > 0.0_wp, [size(it%p)])
       it%p = reshape(start%pressure, [size(it%p)])
       it%q = reshape(start%traction, [size(it%p), 2])
@@ -84,10 +86,11 @@ contains
     end if
     if (.not. any(it%contact)) it%contact = it%candidate
     where (it%contact) it%zone = stick
-    if (any(it%p > 0.0_wp)) call partition(problem, it, changed)
+    if (.not. first) call partition(problem, it, changed)
     allocate (before%sums(2, 0))
     do sweep = 1, max_sweeps
-      call find_area(problem, flexibility, operator, factors, target, before, repeated, it, error)
+      call before%add(it, repeated)
+      call find_area(problem, flexibility, operator, factors, target, first, it, error)
       if (allocated(error)) return
       call record(problem, operator, reference, target, tolerance, it, state, error)
       if (allocated(error) .or. state%converged) return
@@ -105,7 +108,7 @@ contains
   end subroutine iterate_as_written
 
   !> Inner loop: the contact area under frozen zones.
-  subroutine find_area(problem, flexibility, operator, factors, target, before, repeated, it, error)
+  subroutine find_area(problem, flexibility, operator, factors, target, shrinks, it, error)
     !> What is given
     type(friction_problem_t), intent(in) :: problem
     !> Its flexibility: coefficients, and products
@@ -115,17 +118,18 @@ contains
     type(area_factors_t), intent(inout) :: factors
     !> Loads or motions to be reached
     type(load_target_t), intent(in) :: target
-    !> What has been solved for
-    type(arrangements_t), intent(inout) :: before
-    !> The arrangement has been there before
-    logical, intent(out) :: repeated
+    !> Nodes leave the area only
+    logical, intent(in) :: shrinks
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     logical, dimension(size(it%p)) :: tension, wider
+    type(arrangements_t) :: before
     real(wp) :: negligible
+    logical :: repeated
 
+    allocate (before%sums(2, 0))
     do
       call before%add(it, repeated)
       if (repeated) return
@@ -139,6 +143,8 @@ contains
       if (any(tension)) then
         it%contact = it%contact .and. .not. tension
         if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
+      else if (shrinks) then
+        return
       else if (any(it%candidate .and. .not. it%contact .and. it%gap < -negligible*problem%normal_compliance)) then
         wider = it%candidate .and. reshape(ring(reshape(it%contact, problem%lattice%extent)), [size(it%p)])
         where (wider .and. .not. it%contact) it%zone = stick

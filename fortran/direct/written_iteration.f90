@@ -2,7 +2,9 @@
 !>
 !> Sections 8.6 and 12.3, Figures 8.3 and 12.1. Inside, under frozen zones: solve for the tractions; nodes in
 !> tension leave, (8.40) and (12.28), until there are none. In a first step the area only shrinks (chapter 8); in a later one,
-!> where the bodies then overlap outside of the area, a ring is added to it (12.3.1). Outside: a node that sticks and has |q| >= mu p slips, (12.31), in the direction of its last traction, (8.35); the
+!> where the bodies then overlap outside of the area, a ring is added to it (12.3.1).
+!>
+!> Outside: a node that sticks and has |q| >= mu p slips, (12.31), in the direction of its last traction, (8.35); the
 !> components of this direction keep their lengths and have the signs of the last slip, (12.20) to (12.25); a node that slips
 !> with no velocity sticks, (12.32). Nothing is damped. Where the text leaves a choice:
 !>
@@ -11,7 +13,8 @@
 !> - Where ring and shrinking lead to an area that was there before, the zones are next.
 !> - A velocity is never zero in numbers: (12.32) holds as soon as the slip is not against the traction any more.
 !>
-!> It ends when the residuals are within the tolerance, when zones and directions stand, or when they come again with the same area.
+!> It ends when the residuals are within the tolerance, when zones and directions stand, or when they come again with the
+!> same area.
 !>
 !> Theory: docs/direct_method.md.
 module hc_written_iteration

@@ -174,8 +174,8 @@ class Solver(Table):
     )
     iteration: Annotated[str, Word(ITERATIONS)] = meaning(
         "newton",
-        'of method = "direct" with friction; dissertation: as it is written there, which mostly ends far from '
-        "the tolerance (for comparison)",
+        'of method = "direct" with friction; dissertation: as it is written there, which mostly '
+        "misses the tolerance (for comparison)",
     )
     tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-14, at_most=0.1)] = meaning(
         1e-8, "bound on every residual at the end of every load step", "1e-10"

@@ -9,8 +9,7 @@
 !>
 !> the Schur complement of the core's two components, exactly. A sliding node has one of them, across its
 !> slip; a sticking one that is not of the core has two. So zones may change without a change of L. Nodes that come into contact
-!> get rows at its end; those that leave it keep theirs, and their pressure is held at 0: with W the columns of L^-1 of
-!> these nodes, L^-1 A ... is projected on what is orthogonal to W.
+!> get rows at its end; those that leave it keep theirs, and their pressure is held at 0, (F17).
 !>
 !> Equations: docs/theory/friction.md, (F7) and "Direct method".
 module hc_area_factors
@@ -92,7 +91,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     logical :: is_here(flexibility%lattice%size())
     integer, allocatable :: new(:)
-    integer :: i, n, info
+    integer :: i, info
 
     is_here = .false.
     is_here(contact) = .true.
@@ -106,6 +105,7 @@ contains
       self%n_core = count(is_core)
       is_here(pack(stuck, is_core)) = .false.
       new = [pack(stuck, is_core), pack(contact, is_here(contact))]
+      is_here(contact) = .true.
       call clear_rows(self, size(is_here))
       call add_rows(self, flexibility, unit, new, info, error)
     end if
@@ -114,10 +114,7 @@ contains
       self%pressed = self%row(contact)
       self%stuck = self%row(stuck)
       self%sliding = self%row(sliding)
-      is_here = .false.
-      is_here(contact) = .true.
-      n = size(self%order)
-      self%gone = pack([(i, i=1, n)],.not. is_here(self%order))
+      self%gone = pack([(i, i=1, size(self%order))],.not. is_here(self%order))
       call hold_gone(self, info, error)
       if (allocated(error)) return
     end if
@@ -225,10 +222,8 @@ contains
     real(real32), allocatable :: part(:, :)
     integer :: i, n, m, room
 
-    info = 0
     n = to - from
     room = size(self%lower, 1)
-    if (n == 0) return
     associate (a => self%lower, order => self%order, core => self%n_core)
       !$omp parallel do schedule(dynamic, 32) if (to > 1000)
       do i = 1, to
@@ -320,7 +315,7 @@ contains
     room = 0
     if (allocated(self%across)) room = size(self%across, 1)
     if (room < m) then
-      if (allocated(self%across)) deallocate (self%across)
+      if (room > 0) deallocate (self%across)
       ! later areas have more unknowns: memory that is not touched costs nothing, a hole in the heap does
       room = max(m, size(self%order))
       room = room + room/10
@@ -410,12 +405,11 @@ contains
     real(wp) :: found(size(given))
     real(real32) :: q(self%n_core, 2), tau(size(self%behind)), part(size(self%order) - self%n_core)
     integer, allocatable :: sure(:), unsure(:)
-    integer :: i, j, k, m, n, s, room, rest
+    integer :: i, k, m, n, s, room
 
     s = size(self%stuck)
     m = size(tau)
     room = size(self%lower, 1)
-    rest = size(part)
     sure = pack([(i, i=1, s)], self%stuck <= self%n_core)
     unsure = pack([(i, i=1, s)], self%stuck > self%n_core)
     n = size(unsure)
@@ -428,7 +422,7 @@ contains
         q(self%stuck(sure), i) = real(given((i - 1)*s + sure), real32)
         call strsv('L', 'N', 'N', core, l, room, q(:, i), 1)
         if (m == 0) cycle
-        call sgemv('N', rest, core, one, l(core + 1, 1), room, q(:, i), 1, none, part, 1)
+        call sgemv('N', size(part), core, one, l(core + 1, 1), room, q(:, i), 1, none, part, 1)
         tau = tau - self%side(:, i)*part(self%behind)
       end do
       if (m > 0) then
@@ -440,10 +434,9 @@ contains
         if (m > 0) then
           part = none
           do k = 1, m
-            j = self%behind(k)
-            part(j) = part(j) + self%side(k, i)*tau(k)
+            part(self%behind(k)) = part(self%behind(k)) + self%side(k, i)*tau(k)
           end do
-          call sgemv('T', rest, core, -one, l(core + 1, 1), room, part, 1, one, q(:, i), 1)
+          call sgemv('T', size(part), core, -one, l(core + 1, 1), room, part, 1, one, q(:, i), 1)
         end if
         call strsv('L', 'T', 'N', core, l, room, q(:, i), 1)
         found((i - 1)*s + sure) = q(self%stuck(sure), i)

@@ -21,6 +21,7 @@ from .contact import (
     Contact,
     ElasticPair,
     Interface,
+    Iteration,
     Method,
     NormalSolution,
     checked_field,
@@ -37,8 +38,6 @@ from .lattice import Lattice
 _api = _core.hc_f2py_friction
 
 Coupling = Literal["full", "goodman"]
-Iteration = Literal["newton", "dissertation"]
-_AS_WRITTEN = 2  # the direct method with the iteration of the dissertation
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
@@ -213,7 +212,7 @@ class FrictionalContact(Contact):
         word(coupling, "coupling", ("full", "goodman"))
         self._create(
             _api.create_frictional_contact,
-            *(_method(method, iteration), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
+            *(method_code(method, iteration), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
             *self._surfaces,
             *law.as_arguments(),
             checked_interface(interface),
@@ -405,16 +404,6 @@ def _checked_law(coefficient: ArrayLike | FrictionLaw, limit: float, lattice: La
     kind = "a number of at least 0, or inf"
     found = number(coefficient, "friction_coefficient", kind, lambda found: found >= 0)
     return FrictionLaw(found, limit)
-
-
-def _method(method: Method, iteration: Iteration) -> int:
-    """Return the number of a method with its iteration in the core."""
-    code = method_code(method)
-    if word(iteration, "iteration", ("newton", "dissertation")) == "newton":
-        return code
-    if method != "direct":
-        raise DeckError(f'iteration = "{iteration}" needs method = "direct", not "{method}"')
-    return _AS_WRITTEN
 
 
 def memory_needed(

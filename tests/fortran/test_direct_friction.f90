@@ -8,7 +8,7 @@ module test_direct_friction
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
-    stick, slip, normal, along_x, along_y, about_z
+    stick, slip, normal, along_x, along_y, about_z, no_progress
   use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_solver, only: friction_solver_t
@@ -54,6 +54,7 @@ contains
       new_test('units', test_units), &
       new_test('strong_coupling', test_strong_coupling), &
       new_test('methods_agree', test_methods_agree), &
+      new_test('as_written', test_as_written), &
       new_test('gross_sliding', test_gross_sliding), &
       new_test('nothing_touches', test_nothing_touches), &
       new_test('few_nodes', test_few_nodes), &
@@ -665,12 +666,48 @@ contains
     call check(error, largest(state%slip_increment), 0.0_wp, 1.0e-9_wp, 'no motion, no slip')
   end subroutine test_strong_coupling
 
-  !> A history through both methods, solved to 1e-10: tractions to 1e-9 mu p_max, motions likewise.
+  !> The iteration as the dissertation writes it: with gamma = 0, where slip is parallel to the load, it ends where Newton's does; with
+  !> gamma > 0 directions stand, and it says so.
+  subroutine test_as_written(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: problem
+    type(direct_friction_t) :: newton, written
+    type(contact_state_t) :: start, one, other
+    real(wp), parameter :: gamma(2) = [0.0_wp, 0.49_wp], mu = 0.5_wp, value(4) = [load, 0.4_wp*mu*load, 0.0_wp, 0.0_wp]
+    integer :: i
+
+    do i = 1, 2
+      call sphere(problem, 12, 9, 0.0_wp, gamma(i), coulomb_t(mu), error)
+      if (allocated(error)) return
+      call new_direct_friction(newton, problem, error)
+      if (allocated(error)) return
+      problem%options%direct%as_written = .true.
+      call new_direct_friction(written, problem, error)
+      if (allocated(error)) return
+      one = contact_state_t()
+      other = contact_state_t()
+      call step(newton, one, [f, f, f, d], value, error)
+      if (allocated(error)) return
+      call new_friction_state(start, problem%lattice)
+      call written%solve_step(start, start%relative_displacement, load_target_t([f, f, f, d], value), tight, 40, other, error)
+      if (allocated(error)) return
+      call check_true(error, other%converged .eqv. i == 1, 'converged')
+      if (allocated(error)) return
+      call check(error, difference(one, other), 0.0_wp, merge(1.0e-9_wp, 0.05_wp*mu, i == 1), 'tractions')
+      if (allocated(error)) return
+    end do
+    call check_true(error, other%stopped == no_progress, 'zones and directions stand')
+    if (allocated(error)) return
+    call check(error, other%residual_normal, 0.0_wp, 1.0e-10_wp, 'alike bodies: the pressure does not feel it')
+  end subroutine test_as_written
+
+  !> A history through both methods, solved to 1e-10: tractions to 1e-9 mu p_max, motions likewise; with 650 nodes in contact it
+  !> starts from the coarse lattice.
   subroutine test_methods_agree(error)
     type(error_t), allocatable, intent(out) :: error
     type(friction_problem_t) :: problem
-    type(direct_friction_t) :: direct
-    type(frictional_contact_t) :: fft
+    type(direct_friction_t), allocatable :: direct
+    type(frictional_contact_t), allocatable :: fft
     type(contact_state_t) :: one, other
     real(wp), parameter :: mu = 0.3_wp
     real(wp), parameter :: value(4, 5) = reshape([ &
@@ -679,23 +716,29 @@ contains
       load, 0.2_wp, 0.1_wp, 0.0_wp, &
       0.9_wp*load, -0.1_wp, 0.2_wp, 0.02_wp, &
       1.1_wp*load, 0.0_wp, 0.0_wp, -0.04_wp], [4, 5])
-    integer :: i
+    integer :: i, a_nodes
 
-    call sphere(problem, 12, 9, -0.19_wp, 0.47_wp, coulomb_t(mu), error)
-    if (allocated(error)) return
-    call new_direct_friction(direct, problem, error)
-    if (allocated(error)) return
-    call new_frictional_contact(fft, problem, error)
-    if (allocated(error)) return
-    do i = 1, size(value, 2)
-      call step(direct, one, [f, f, f, f], value(:, i), error)
+    do a_nodes = 9, 15, 6
+      call sphere(problem, 4*a_nodes/3, a_nodes, -0.19_wp, 0.47_wp, coulomb_t(mu), error)
       if (allocated(error)) return
-      call step(fft, other, [f, f, f, f], value(:, i), error)
+      allocate (direct, fft)
+      call new_direct_friction(direct, problem, error)
       if (allocated(error)) return
-      call check(error, difference(one, other), 0.0_wp, 1.0e-9_wp*mu, 'tractions')
+      call new_frictional_contact(fft, problem, error)
       if (allocated(error)) return
-      call check(error, one%motion, other%motion, 1.0e-9_wp*mu, 'motions')
-      if (allocated(error)) return
+      do i = 1, size(value, 2)
+        call step(direct, one, [f, f, f, f], value(:, i), error)
+        if (allocated(error)) return
+        call step(fft, other, [f, f, f, f], value(:, i), error)
+        if (allocated(error)) return
+        call check(error, difference(one, other), 0.0_wp, 1.0e-9_wp*mu, 'tractions')
+        if (allocated(error)) return
+        call check(error, one%motion, other%motion, 1.0e-9_wp*mu, 'motions')
+        if (allocated(error)) return
+      end do
+      deallocate (direct, fft)
+      one = contact_state_t()
+      other = contact_state_t()
     end do
   end subroutine test_methods_agree
 

@@ -666,8 +666,8 @@ contains
     call check(error, largest(state%slip_increment), 0.0_wp, 1.0e-9_wp, 'no motion, no slip')
   end subroutine test_strong_coupling
 
-  !> The iteration as the dissertation writes it: with gamma = 0, where slip is parallel to the load, it ends where Newton's does; with
-  !> gamma > 0 directions stand, and it says so.
+  !> The iteration as the dissertation writes it: with gamma = 0, where slip is parallel to the load, it ends where Newton's
+  !> does; with gamma > 0 directions stand, and it says so.
   subroutine test_as_written(error)
     type(error_t), allocatable, intent(out) :: error
     type(friction_problem_t) :: problem

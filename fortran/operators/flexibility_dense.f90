@@ -99,9 +99,9 @@ contains
     integer(long), parameter :: buffers = 5500000
     !> Vectors of a node in contact with friction: rows and columns of its unknowns, 2.5 as a rule, and ten directions of GMRES
     integer(long), parameter :: vectors = 1800
-    !> Pages at the ends of columns of which half is touched; the complement of the sliding nodes is the larger one of unlike
-    !> materials
-    integer(long), parameter :: pages(2) = [4500, 8700]
+    !> Pages at the ends of columns of which half is touched, and fifths of the bytes for a pair of nodes: the complement of the
+    !> sliding nodes is the larger one of unlike materials
+    integer(long), parameter :: pages(2) = [6500, 8700], fifths(2) = [21, 24]
     integer(long) :: n, n_window
     logical :: slides
 
@@ -115,8 +115,8 @@ contains
       slides = .true.
       if (present(unlike)) slides = unlike
       ! with those of the coarse lattice; in single precision the factor, and the complement of the sliding nodes, half touched
-      dense_memory = dense_memory + 2*n_block*4*n_window + 5*fft_memory(extent, .false., 1, unlike)/4 + 24*n**2/5 &
-                     + (vectors + merge(pages(2), pages(1), slides))*n
+      dense_memory = dense_memory + 2*n_block*4*n_window + 5*fft_memory(extent, .false., 1, unlike)/4 &
+                     + merge(fifths(2), fifths(1), slides)*n**2/5 + (vectors + merge(pages(2), pages(1), slides))*n
     end if
   end function dense_memory
 

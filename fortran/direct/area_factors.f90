@@ -9,7 +9,7 @@
 !>
 !> the Schur complement of the core's two components, exactly. A sliding node has one of them, across its
 !> slip; a sticking one that is not of the core has two. So zones may change without a change of L. Nodes that come into contact
-!> get rows at its end; those that leave it keep theirs, and their pressure is held at 0, (F17).
+!> get rows at its end; those that leave it keep theirs, and their pressure is held at 0.
 !>
 !> Equations: docs/theory/friction.md, (F7) and "Direct method".
 module hc_area_factors

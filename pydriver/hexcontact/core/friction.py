@@ -21,6 +21,7 @@ from .contact import (
     Contact,
     ElasticPair,
     Interface,
+    Iteration,
     Method,
     NormalSolution,
     checked_field,
@@ -178,6 +179,8 @@ class FrictionalContact(Contact):
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
     method
         ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
+    iteration
+        Of the direct method: ``"newton"``, or ``"dissertation"``, as it is written there, for comparison.
     threads
         Threads to use; 0: the default of OpenMP.
     interface
@@ -199,6 +202,7 @@ class FrictionalContact(Contact):
         shear_limit: float = math.inf,
         coupling: Coupling = "full",
         method: Method = "fft",
+        iteration: Iteration = "newton",
         threads: int = 0,
         interface: Interface = UNILATERAL,
         rim_warning: bool = True,
@@ -208,7 +212,7 @@ class FrictionalContact(Contact):
         word(coupling, "coupling", ("full", "goodman"))
         self._create(
             _api.create_frictional_contact,
-            *(method_code(method), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
+            *(method_code(method, iteration), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
             *self._surfaces,
             *law.as_arguments(),
             checked_interface(interface),

@@ -7,9 +7,10 @@ Lattice arrays have shape (n_row, n_col).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
 from . import _core
@@ -19,6 +20,10 @@ from .estimators import Ellipse
 
 _api = _core.hc_f2py_edges
 
+_UNLIMITED, _LIMITED = 5, 13  # arrays of a traction field
+
+Source = Literal["edges", "nodes"]
+Limits = tuple[Array | float, Array | float]
 _Zone = tuple[Array, NDArray[np.int32], bool]  # fields and zones of the core; whether it is the stick area
 
 
@@ -98,6 +103,53 @@ class ZoneMesh:
         return [np.append(polygon, polygon[:1], axis=0) for polygon in polygons]
 
 
+class TractionField:
+    """Pressure and shear traction of a contact over the plane.
+
+    They vanish like square roots at the edge of the contact, and the reserve of friction does at the edge of
+    the stick area, both between the nodes; elsewhere they are linear.
+
+    Parameters
+    ----------
+    parts : ndarray
+        The field as the core holds it.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as columns, m.
+    start : tuple of float
+        Position of node [0, 0], m.
+
+    Attributes
+    ----------
+    source : str
+        ``"edges"``, or ``"nodes"``: the values of the solution at the nodes, joined linearly.
+    sheared : bool
+        Whether the shear traction goes to the edges, too; else it is that of the nodes.
+    """
+
+    def __init__(
+        self, parts: Array, basis: Array, start: tuple[float, float], source: Source = "edges"
+    ) -> None:
+        self._parts, self._basis, self._start = parts, basis, start
+        self.source, self.sheared = source, parts.shape[-1] == _LIMITED
+
+    @classmethod
+    def of_nodes(cls, tractions: Array, basis: Array, start: tuple[float, float]) -> Self:
+        """Return the field of p, q_x and q_y at the nodes, joined linearly; see `ContactEdges`."""
+        parts = np.stack([*tractions, tractions[0], np.full_like(tractions[0], np.nan)])
+        return cls(parts.T, basis.T, start, "nodes")
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return p, q_x and q_y (Pa) at points (m), shape (3, ...); 0 outside the window."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        where = self._basis, self._start, self._parts
+        found = called(_api.tractions_at_points, *where, x.ravel(), y.ravel())
+        return np.asarray(found).reshape(3, *x.shape)
+
+    def at_nodes(self) -> Array:
+        """Return p, q_x and q_y (Pa) at the nodes, shape (3, n_row, n_col)."""
+        return np.asarray(_api.tractions_at_nodes(self._parts).T)
+
+
 class ContactEdges:
     """The edges of a contact and of the stick area in it.
 
@@ -170,14 +222,32 @@ class ContactEdges:
         """Return the distances of the nodes from the edge of the part that sticks, see `stick`."""
         return self._distances(self._zone(stick, reserve, True))
 
-    def squares(self) -> Array:
-        """Return squares of the pressure (Pa^2) for linear interpolation, shape (n_row, n_col).
+    def field(
+        self, shear: Array | None = None, stick: Mask | None = None, limits: Limits | None = None
+    ) -> TractionField:
+        """Return pressure and shear traction between the nodes, to the edges.
 
-        At nodes in contact the layer of the lattice next to the edge is subtracted; beyond the edge the
-        squares are negative. They are NaN away from the edge, and where it is unknown.
+        Parameters
+        ----------
+        shear : ndarray, shape (2, n_row, n_col), optional
+            Shear traction along x and y, Pa.
+        stick : ndarray of bool, shape (n_row, n_col), optional
+            Nodes that stick, all in contact.
+        limits : tuple of array_like, optional
+            Finite coefficient of friction, and bound of the shear traction (Pa); by default they are unknown,
+            and the shear traction is linear between the nodes.
         """
-        fields, zones, _ = self._whole()
-        return np.asarray(called(_api.pressure_squares, self._basis, fields, zones).T)
+        pressure, gap = self._fields
+        none = np.zeros_like(pressure)
+        traction = np.stack([pressure, *((none, none) if shear is None else shear)])
+        limited = not (shear is None or stick is None or limits is None)
+        zones = np.stack([*self._zones, none if stick is None else stick]).astype(np.int32)
+        known = np.stack([none, none] if limits is None else [none + limit for limit in limits])
+        parts = called(
+            *(_api.field_of_tractions, self._basis, gap.T, zones.T, traction.T),
+            *(np.minimum(known, np.finfo(float).max).T, limited, _LIMITED if limited else _UNLIMITED),
+        )
+        return TractionField(parts, self._basis, self._start)
 
     def tractions(self, shear: Array, stick: Mask, friction: Array, pair: ElasticPair) -> Array:
         """Return pressure and shear tractions corrected at the edges of the contact and of the stick area.

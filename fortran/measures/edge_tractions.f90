@@ -61,8 +61,8 @@ contains
 
     n = merge(3, 1, sheared)
     solved = merge(2, 1, sheared)
-    ! edges: zones, places in the band; shape; change, hats, values at the nodes; cells
-    everywhere = 3*half + merge(8, 2, sheared)*field + 3*n*field + half
+    ! edges: zones, places in the band; shape and nodes that stick; change, hats, values at the nodes; cells
+    everywhere = 3*half + merge(11*field + half, 3*field, sheared) + 3*n*field + half
     ! displacements by the rest, and by the pressure; unknowns, product, right-hand side, constraints twice, active nodes
     everywhere = everywhere + merge(6, 1, sheared)*field + (3*solved + 2*solved**2)*field + solved*half
     ! vectors of conjugate gradients, constraints twice

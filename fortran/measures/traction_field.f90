@@ -5,7 +5,7 @@
 !> zero like square roots between the nodes, and the layer is off them. The shear traction is as large as friction allows where
 !> a contact slips, and at most that elsewhere. Away from the edges the field is linear between the nodal values.
 !>
-!> Equations: docs/theory/edges.md, (B6) and (B7).
+!> Equations: docs/theory/edges.md, (B7) and (B8).
 module hc_traction_field
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use hc_precision, only: wp
@@ -32,7 +32,7 @@ module hc_traction_field
     real(wp), allocatable :: pressure(:, :), squares(:, :)
     !> The limit of friction is known, min(mu p, bound): everything that follows is there
     logical :: limited = .false.
-    !> Coefficient of friction, and bound of the shear traction (n_col, n_row) [1], [Pa]
+    !> Coefficient of friction, and bound of the shear traction if there is one (n_col, n_row) [1], [Pa]
     real(wp), allocatable :: friction(:, :), bound(:, :)
     !> Shear traction over its limit; nodes next to the contact have the mean of their neighbors (n_col, n_row, direction)
     real(wp), allocatable :: direction(:, :, :)
@@ -52,7 +52,7 @@ module hc_traction_field
     procedure :: renew
     !> The field as plain arrays
     procedure :: arrays
-    procedure, private :: at_place
+    procedure, private :: at_place, limits
   end type traction_field_t
 
 contains
@@ -87,12 +87,11 @@ contains
     if (field%limited) then
       field%friction = friction
       if (present(bound)) then
-        field%bound = min(bound, no_bound)
-      else
-        allocate (field%bound(size(contact, 1), size(contact, 2)), source=no_bound)
+        if (any(bound < no_bound)) field%bound = min(bound, no_bound)
       end if
       field%stick = stick
-      limit = limit_of(field%friction, field%bound, traction(:, :, 1))
+      limit = friction*traction(:, :, 1)
+      if (allocated(field%bound)) limit = min(limit, field%bound)
       field%reserve = merge(max(limit - norm2(traction(:, :, 2:3), dim=3), 0.0_wp), 0.0_wp, stick)
       field%direction = directions(traction(:, :, 2:3), limit, contact)
       field%stick_squares = edges%stick_squares(stick, field%reserve)
@@ -121,7 +120,7 @@ contains
     field%limited = limited
     if (.not. limited) return
     field%friction = parts(:, :, 6)
-    field%bound = parts(:, :, 7)
+    if (any(parts(:, :, 7) < no_bound)) field%bound = parts(:, :, 7)
     field%direction = parts(:, :, 8:9)
     field%stick = parts(:, :, 10) > 0.5_wp
     field%reserve = parts(:, :, 11)
@@ -141,7 +140,8 @@ contains
     parts(:, :, 5) = self%squares
     if (.not. self%limited) return
     parts(:, :, 6) = self%friction
-    parts(:, :, 7) = self%bound
+    parts(:, :, 7) = no_bound
+    if (allocated(self%bound)) parts(:, :, 7) = self%bound
     parts(:, :, 8:9) = self%direction
     parts(:, :, 10) = merge(1.0_wp, 0.0_wp, self%stick)
     parts(:, :, 11) = self%reserve
@@ -152,6 +152,7 @@ contains
   !> Renew the values at the nodes after a change of the squares.
   pure subroutine renew(self)
     class(traction_field_t), intent(inout) :: self
+    real(wp) :: limit(2)
     integer :: col, row
 
     self%pressure = self%nodal(:, :, 1)
@@ -163,12 +164,11 @@ contains
         end associate
         if (.not. self%limited) cycle
         self%taken(col, row) = 0.0_wp
-        associate (square => self%stick_squares(col, row), p => [self%pressure(col, row), self%nodal(col, row, 1)])
+        associate (square => self%stick_squares(col, row))
           if (ieee_is_nan(square) .or. .not. self%stick(col, row)) cycle
-          associate (limit => limit_of(self%friction(col, row), self%bound(col, row), p))
-            self%taken(col, row) = sqrt(max(square, 0.0_wp)) - self%reserve(col, row) &
-                                   - (1.0_wp - norm2(self%direction(col, row, :)))*(limit(1) - limit(2))
-          end associate
+          limit = self%limits(place_at(col, row), [self%pressure(col, row), self%nodal(col, row, 1)])
+          self%taken(col, row) = sqrt(max(square, 0.0_wp)) - self%reserve(col, row) &
+                                 - (1.0_wp - norm2(self%direction(col, row, :)))*(limit(1) - limit(2))
         end associate
       end do
     end do
@@ -188,20 +188,16 @@ contains
   pure function at_nodes(self) result(traction)
     class(traction_field_t), intent(in) :: self
     real(wp) :: traction(size(self%nodal, 1), size(self%nodal, 2), size(self%nodal, 3))
-    type(place_t) :: place
     integer :: col, row
 
     traction = self%nodal
-    place%near = .true.
-    place%weight(1) = 1.0_wp
     do row = 1, size(traction, 2)
       do col = 1, size(traction, 1)
         if (ieee_is_nan(self%squares(col, row))) then
           if (.not. self%limited) cycle
           if (ieee_is_nan(self%stick_squares(col, row))) cycle
         end if
-        place%node(:, 1) = [col, row]
-        traction(col, row, :) = self%at_place(place)
+        traction(col, row, :) = self%at_place(place_at(col, row))
       end do
     end do
   end function at_nodes
@@ -219,7 +215,7 @@ contains
     more = self%at_place(place) - [(place%mean(self%nodal(:, :, k), 0.0_wp), k=1, size(more))]
   end function beyond_hats
 
-  !> Return pressure and shear traction at a place, (B6) and (B7) [Pa].
+  !> Return pressure and shear traction at a place, (B7) and (B8) [Pa].
   pure function at_place(self, place) result(traction)
     class(traction_field_t), intent(in) :: self
     !> The place
@@ -237,7 +233,7 @@ contains
     part = [root_at(place, self%pressure, self%squares), traction(1)]
     traction(1) = part(1)
     if (.not. self%limited) return
-    limit = limit_of(place%mean(self%friction, 0.0_wp), place%mean(self%bound, no_bound), part)
+    limit = self%limits(place, part)
     along = [(place%mean(self%direction(:, :, k), 0.0_wp), k=1, 2)]
     share = norm2(along)
     sticks = place%touches(self%stick)
@@ -256,12 +252,28 @@ contains
     if (length > limit(1) .or. (length > 0.0_wp .and. .not. sticks)) traction(2:3) = limit(1)/length*traction(2:3)
   end function at_place
 
-  !> Compute the largest shear traction that friction allows [Pa].
-  elemental real(wp) function limit_of(friction, bound, pressure)
-    !> Coefficient of friction, bound [Pa] and pressure [Pa]
-    real(wp), intent(in) :: friction, bound, pressure
-    limit_of = min(friction*pressure, bound)
-  end function limit_of
+  !> Compute the largest shear tractions that friction allows under pressures at a place [Pa].
+  pure function limits(self, place, pressure) result(limit)
+    class(traction_field_t), intent(in) :: self
+    !> The place
+    type(place_t), intent(in) :: place
+    !> Pressures [Pa]
+    real(wp), intent(in) :: pressure(2)
+    real(wp) :: limit(2)
+
+    limit = place%mean(self%friction, 0.0_wp)*pressure
+    if (allocated(self%bound)) limit = min(limit, place%mean(self%bound, no_bound))
+  end function limits
+
+  !> Return the place of a node.
+  pure type(place_t) function place_at(col, row) result(place)
+    !> Column and row, counted from 1
+    integer, intent(in) :: col, row
+
+    place%near = .true.
+    place%weight(1) = 1.0_wp
+    place%node(:, 1) = [col, row]
+  end function place_at
 
   !> Compute the shear traction over its limit at the nodes in contact, and the mean of them at those next to the contact.
   pure function directions(shear, limit, contact) result(direction)

@@ -1,4 +1,4 @@
-"""The public names of pressure and shear traction between the nodes, see `hexcontact.Result.traction_field`."""
+"""Public names of tractions between the nodes, see `hexcontact.Result.traction_field`."""
 
 from .core.edges import TractionField as TractionField
 from .core.interpolation import linear as linear

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
-from . import _core
+from . import _core, memory
 from .calls import called
 from .contact import ElasticPair
 from .estimators import Ellipse
@@ -21,7 +21,11 @@ from .estimators import Ellipse
 _api = _core.hc_f2py_edges
 
 _UNLIMITED, _LIMITED = 5, 13  # arrays of a traction field
+_GIVEN = 12  # arrays that it is made from, with copies and zones
+_LARGE = 250_000  # nodes from which their memory is checked
+_MARGIN = 6  # nodes about a contact from which its edge follows, at most, and one more
 
+_Part = tuple[slice, slice]
 Source = Literal["edges", "nodes"]
 Limits = tuple[Array | float, Array | float]
 _Zone = tuple[Array, NDArray[np.int32], bool]  # fields and zones of the core; whether it is the stick area
@@ -116,7 +120,11 @@ class TractionField:
     basis : ndarray, shape (2, 2)
         Basis vectors of the lattice as columns, m.
     start : tuple of float
-        Position of node [0, 0], m.
+        Position of its first node, m.
+    source : str
+        See below.
+    whole : tuple, optional
+        Shape of the window, and rows and columns of the field in it, if it is a part.
 
     Attributes
     ----------
@@ -127,9 +135,14 @@ class TractionField:
     """
 
     def __init__(
-        self, parts: Array, basis: Array, start: tuple[float, float], source: Source = "edges"
+        self,
+        parts: Array,
+        basis: Array,
+        start: tuple[float, float],
+        source: Source = "edges",
+        whole: tuple[tuple[int, ...], _Part] | None = None,
     ) -> None:
-        self._parts, self._basis, self._start = parts, basis, start
+        self._parts, self._basis, self._start, self._whole = parts, basis, start, whole
         self.source, self.sheared = source, parts.shape[-1] == _LIMITED
 
     @classmethod
@@ -147,7 +160,13 @@ class TractionField:
 
     def at_nodes(self) -> Array:
         """Return p, q_x and q_y (Pa) at the nodes, shape (3, n_row, n_col)."""
-        return np.asarray(_api.tractions_at_nodes(self._parts).T)
+        found = np.asarray(_api.tractions_at_nodes(self._parts).T)
+        if self._whole is None:
+            return found
+        shape, part = self._whole
+        whole = np.zeros((3, *shape))
+        whole[:, *part] = found
+        return whole
 
 
 class ContactEdges:
@@ -237,17 +256,33 @@ class ContactEdges:
             Finite coefficient of friction, and bound of the shear traction (Pa); by default they are unknown,
             and the shear traction is linear between the nodes.
         """
-        pressure, gap = self._fields
-        none = np.zeros_like(pressure)
-        traction = np.stack([pressure, *((none, none) if shear is None else shear)])
+        part = self._around_contact()
         limited = not (shear is None or stick is None or limits is None)
-        zones = np.stack([*self._zones, none if stick is None else stick]).astype(np.int32)
-        known = np.stack([none, none] if limits is None else [none + limit for limit in limits])
+        count = _LIMITED if limited else _UNLIMITED
+        none = np.zeros(self._zones[0][part].shape)
+        if none.size > _LARGE:
+            needed = 8 * none.size * (_GIVEN + 2 * count)
+            memory.require(needed, "the tractions to the edges", 'choose source = "nodes"')
+        pressure, gap, touching, candidate = (given[part] for given in (*self._fields, *self._zones))
+        along = (none, none) if shear is None else (component[part] for component in shear)
+        zones = np.stack([touching, candidate, none if stick is None else stick[part]]).astype(np.int32)
+        known = [
+            none + (np.asarray(limit)[part] if np.ndim(limit) else limit) for limit in limits or (0.0, 0.0)
+        ]
         parts = called(
-            *(_api.field_of_tractions, self._basis, gap.T, zones.T, traction.T),
-            *(np.minimum(known, np.finfo(float).max).T, limited, _LIMITED if limited else _UNLIMITED),
+            *(_api.field_of_tractions, self._basis, gap.T, zones.T, np.stack([pressure, *along]).T),
+            *(np.minimum(known, np.finfo(float).max).T, limited, count),
         )
-        return TractionField(parts, self._basis, self._start)
+        x, y = self._start + self._basis @ [part[1].start, part[0].start]
+        return TractionField(parts, self._basis, (float(x), float(y)), whole=(self._zones[0].shape, part))
+
+    def _around_contact(self) -> _Part:
+        """Return rows and columns of the contact and of the nodes about it, beyond which there is nothing."""
+        places = [np.flatnonzero(self._zones[0].any(axis=axis)) for axis in (1, 0)]
+        if not places[0].size:
+            return slice(0, 1), slice(0, 1)
+        rows, cols = (slice(max(k[0] - _MARGIN, 0), k[-1] + 1 + _MARGIN) for k in places)
+        return rows, cols
 
     def tractions(self, shear: Array, stick: Mask, friction: Array, pair: ElasticPair) -> Array:
         """Return pressure and shear tractions corrected at the edges of the contact and of the stick area.

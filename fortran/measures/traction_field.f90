@@ -5,7 +5,7 @@
 !> zero like square roots between the nodes, and the layer is off them. The shear traction is as large as friction allows where
 !> a contact slips, and at most that elsewhere. Away from the edges the field is linear between the nodal values.
 !>
-!> Equations: docs/theory/edges.md, (B7) and (B8).
+!> Equations: docs/theory/edges.md, (B6) and (B7).
 module hc_traction_field
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use hc_precision, only: wp
@@ -215,7 +215,7 @@ contains
     more = self%at_place(place) - [(place%mean(self%nodal(:, :, k), 0.0_wp), k=1, size(more))]
   end function beyond_hats
 
-  !> Return pressure and shear traction at a place, (B7) and (B8) [Pa].
+  !> Return pressure and shear traction at a place, (B6) and (B7) [Pa].
   pure function at_place(self, place) result(traction)
     class(traction_field_t), intent(in) :: self
     !> The place

@@ -60,7 +60,8 @@ class Step:
     sharp : bool
         Whether the bodies touch without a compliant layer, so that the contact has a sharp edge.
     limits : tuple of array_like or None
-        Coefficient of friction and bound of the shear traction (Pa), where these are the law of friction.
+        Coefficient of friction and bound of the shear traction (Pa), where these are the law of friction;
+        None for a step read from a file.
     """
 
     index: int

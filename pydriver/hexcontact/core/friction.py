@@ -79,6 +79,12 @@ class FrictionLaw:
         law = [min(self.shear_limit, most), self.power, self.ratio, self.angle]
         return np.minimum(np.ravel(self.coefficient), most), law
 
+    @property
+    def limits(self) -> tuple[float | Array, float] | None:
+        """Finite coefficient and bound, if the limit is min(mu p, bound) in each direction; else None."""
+        plain = self.power == self.ratio == 1.0 and bool(np.isfinite(self.coefficient).all())
+        return (self.coefficient, self.shear_limit) if plain else None
+
     def bound_at(self, row: int, col: int, pressure: float, traction: tuple[float, float]) -> float:
         """Return the largest traction of a node in the direction of a given one (Pa)."""
         mu = self.coefficient[row, col] if isinstance(self.coefficient, np.ndarray) else self.coefficient

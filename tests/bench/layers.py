@@ -4,9 +4,9 @@
     python tests/bench/layers.py --meshes 160 --steps cold-load,cold-approach
     python tests/bench/layers.py --exponents 2 --softness 0.01,0.1
 
-A layer p = c psi^m is as soft as its compression under Hertz's largest pressure says, here over Hertz's approach. Spheres with
-E* = R = 1 under P = 4/3, each on a window of 1.35 of its own contact radii; spacings count in Hertz's radius. Rows with several
-load steps count the last one.
+A layer p = c psi^m is as soft as its compression under Hertz's largest pressure says, here over Hertz's
+approach. Spheres with E* = R = 1 under P = 4/3, each on a window of 1.35 of its own contact radii; spacings
+count in Hertz's radius. Rows with several load steps count the last one.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
+
 from bench.problems import ALIKE, DISSIMILAR, LOAD, TOLERANCE, Material, parabola
 from hexcontact.core.contact import UNILATERAL, Interface, NormalContact
 from hexcontact.core.friction import FrictionalContact
@@ -36,7 +37,7 @@ WINDOW = 1.35
 
 @dataclass(frozen=True)
 class Steps:
-    """Load steps: normal load over `LOAD` and tangential load over mu P; or approaches in place of normal loads."""
+    """Load steps: normal load over `LOAD` and tangential load over mu P; by_approach: their approaches."""
 
     title: str
     material: Material | None
@@ -54,7 +55,9 @@ STEPS = {
     ),
     "friction-shear": Steps("μ = 0.5, Q from 0.45 to 0.50 μP", ALIKE, ((1, 0), (1, 0.45), (1, 0.5))),
     "coupled-load": Steps("β = −0.19, μ = 0.1, load at once", DISSIMILAR, ((1, 0),)),
-    "coupled-warm-load": Steps("β = −0.19, μ = 0.1, load from 0.8 to 0.9 P", DISSIMILAR, ((0.8, 0), (0.9, 0))),
+    "coupled-warm-load": Steps(
+        "β = −0.19, μ = 0.1, load from 0.8 to 0.9 P", DISSIMILAR, ((0.8, 0), (0.9, 0))
+    ),
 }
 
 

@@ -55,6 +55,7 @@ module hexcontact
                                 moment_ellipse, edge_ellipse, ellipse_t
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_zone_edge, only: zone_edge_t, zone_mesh_t
+  use hc_traction_field, only: traction_field_t, new_traction_field
   use hc_edge_tractions, only: correct_at_edges
   use hc_load_cycles, only: find_cycles, loop_area
   use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent, &

@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -52,10 +53,12 @@ def stiffening_interface() -> Figure:
     quantities = {
         "approach": "approach",
         "max_pressure": "largest pressure",
-        "contact_area": "contact area",
+        "contact_area_fit": "contact area",
         "shift_x": "shift",
-        "stick_area": "stick area",
+        "stick_area_fit": "stick area",
     }
+    looks = zip(("#0072B2", "#D55E00", "#009E73", "#56B4E9", "#CC79A7"), "osD^v", strict=True)
+    styles = dict(zip(quantities, ({"color": c, "marker": m} for c, m in looks), strict=True))
 
     def last(**interface: float) -> dict[str, float]:
         layer = {"interface": interface} if interface else {}
@@ -68,13 +71,13 @@ def stiffening_interface() -> Figure:
     for exponent, axes in zip((1, 2), parts, strict=True):
         found = [last(coefficient=c, exponent=exponent) for c in stiffness]
         for name, words in quantities.items():
-            errors = [abs(values[name] / rigid[name] - 1) or np.nan for values in found]
-            axes.loglog(stiffness, errors, "o-", ms=3, label=words)
+            errors = [abs(values[name] / rigid[name] - 1) for values in found]
+            axes.loglog(stiffness, errors, ms=3.5, label=words, **styles[name])
         first = exponent / (exponent + 1) * (2 / np.pi / stiffness) ** (1 / exponent)
         axes.loglog(stiffness, first, "k--", lw=1, label="approach, first order (C6)")
-        axes.set(title=f"m = {exponent}", xlabel="coefficient c (E* = R = 1)")
-    parts[0].set_ylabel("difference from c = ∞, relative")
-    parts[0].legend()
+        axes.set(title=f"exponent $m$ = {exponent}", xlabel="coefficient $c$ ($E^* = R = 1$)")
+    parts[0].set_ylabel("relative difference from $c = \\infty$")
+    parts[0].legend(frameon=False)
     return figure
 
 
@@ -96,26 +99,37 @@ def ends_of_paths(study: xarray.Dataset) -> Figure:
     share = incremental.tangential_load_x / sliding
     load = (study.normal_load_2 / normal).broadcast_like(share)
     quantities = (
-        ("shift: difference / largest shift", (incremental.shift_x - static.shift_x) / static.shift_x.max()),
         (
-            "stick area: difference / contact area",
+            "difference of shifts / largest shift",
+            (incremental.shift_x - static.shift_x) / static.shift_x.max(),
+        ),
+        (
+            "difference of stick areas / contact area",
             (incremental.stick_area - static.stick_area) / static.contact_area,
         ),
     )
-    figure, panels = plt.subplots(1, 2, figsize=(10, 4.4), sharey=True, layout="constrained")
-    line = np.array([0.0, 2.0])
+    figure, panels = plt.subplots(
+        1, 2, figsize=(10, 4.4), sharey=True, layout=ConstrainedLayoutEngine(wspace=0.06)
+    )
+    line, moved = np.array([0.0, 2.0]), (load - 1.0) ** 2 + (share - 0.5) ** 2 > 1e-6
     for axes, (title, values) in zip(panels, quantities, strict=True):
-        axes.fill_between(line, 0.5 + line - 1.0, 2.0, color="0.93", lw=0, zorder=0)
-        drawn = axes.scatter(
-            load, share, c=abs(values), s=70, cmap="viridis", edgecolor="0.3", lw=0.5, zorder=3
-        )
-        figure.colorbar(drawn, ax=axes)
+        axes.fill_between(line, line - 0.5, line, color="0.9", lw=0, zorder=0)
         for sign in (1.0, -1.0):
-            axes.plot(line, sign * line, color="0.5", lw=1)
-        axes.plot(line, 0.5 + line - 1.0, color="#d55e00", lw=1.2, ls="--")
+            axes.fill_between(
+                line, sign * line, sign * 3.0, fc="white", ec="0.75", hatch="///", lw=1, zorder=1
+            )
+        values = abs(values).where(moved)  # without a path there is nothing to compare
+        drawn = axes.scatter(load, share, c=values, s=70, cmap="viridis", edgecolor="0.3", lw=0.5, zorder=3)
+        figure.colorbar(drawn, ax=axes, label=title)
+        axes.plot(line, line - 0.5, color="#D55E00", lw=1.2, ls="--")
         axes.plot([0.0, 1.0, 1.0], [0.0, 0.0, 0.5], color="k", lw=1)
-        axes.plot(1.0, 0.5, "k+", ms=12, zorder=4)
-        axes.set(title=title, xlabel="$P/P_1$", xlim=(0.5, 1.7), ylim=(-0.7, 1.5))
+        axes.plot(1.0, 0.5, "ko", ms=5, zorder=4)
+        box = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
+        axes.text(0.55, 1.25, "sliding", fontsize=9, bbox=box)
+        axes.text(1.43, 1.34, "no memory", fontsize=9)
+        slope = {"rotation": 45, "rotation_mode": "anchor", "transform_rotates_text": True}
+        axes.text(1.235, 0.655, r"$dQ = \mu\,dP$", color="#D55E00", fontsize=9, **slope)
+        axes.set(xlabel="$P/P_1$", xlim=(0.5, 1.7), ylim=(-0.7, 1.5))
     panels[0].set_ylabel(r"$Q/\mu P_1$")
     return figure
 

@@ -158,6 +158,8 @@ module hc_options
 
   !> Explicit matrices (docs/theory/friction.md, "Direct method").
   type :: direct_options_t
+    !> The iteration as the dissertation writes it, for comparison
+    logical :: as_written = .false.
     !> Exchanges of whole sets that may fail to lower the number of wrong nodes, before Murty's rule exchanges one by one
     integer :: stalled_exchanges = 10
     !> Accuracy at which a compliant interface is not linearised any more, relative to the tolerance
@@ -188,6 +190,10 @@ module hc_options
     integer :: max_corrections = 40
     !> Nodes in contact up to which the whole matrix is factorized for every area: kept factors save nothing there
     integer :: most_explicit = 60
+    !> Share of the rows of a factor that may come or go before it is made anew
+    real(wp) :: most_exchanged = 0.1_wp
+    !> Change of a direction of slip, and of a spring across it, that its factor serves for, too
+    real(wp) :: largest_turn = 0.1_wp
     !> Solutions with kept factors: accuracy relative to the last residuals, and to the tolerance; the accuracy of the first one;
     !> directions of GMRES after which the whole matrix is factorized
     real(wp) :: inner_accuracy = 1.0e-3_wp, last_accuracy = 0.05_wp, first_accuracy = 1.0e-4_wp

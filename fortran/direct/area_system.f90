@@ -93,7 +93,7 @@ contains
     if (allocated(error)) return
 
     right = rhs(:, 0)
-    largest = maxval(abs(x(:size(factors%order))))
+    largest = maxval(abs(x), mask=abs(weight(normal, :)) > 0.0_wp)
     if (.not. largest > 0.0_wp) largest = maxval(abs(right))
     scale = largest
     if (problem%friction%is_bounded()) then

@@ -3,10 +3,12 @@
 !> The outer iteration sorts the nodes in contact into stick and slip, the inner
 !> one finds the contact area with these frozen (section 8.6 and chapter 12,
 !> Figures 8.3 and 12.1): it solves one linear system for the tractions and the
-!> rigid motions, nodes in tension leave and nodes that penetrate enter. The
-!> area of a step starts from the last one with a ring of nodes around it. Stick and
+!> rigid motions, nodes in tension leave and nodes that penetrate enter. Stick and
 !> slip follow from q - r ds, and slip is linearised as in hc_coulomb, so
 !> that the whole is a Newton method for pressure, traction and motions at once.
+!>
+!> A step starts from what the same method finds on the lattice of every second node (hc_coarse_change), or from the last
+!> contact area with a ring of nodes around it.
 !>
 !> Equations: docs/theory/friction.md, (F7).
 module hc_direct_friction
@@ -15,18 +17,23 @@ module hc_direct_friction
   use hc_options, only: direct_options_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
-  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, separated, stick, slip, &
+  use hc_contact_state, only: contact_state_t, load_target_t, new_friction_state, copy_tractions, separated, stick, slip, &
     normal, along_x, force_control, displacement_control, loads_not_carried
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
+  use hc_coarse_change, only: restrict_state, balance, add_change, prolong_state
+  use hc_transfer, only: restrict_vector
   use hc_load_constraints, only: overloads, fix_in_stick
   use hc_direct_contact, only: first_guess, exchange
   use hc_area_factors, only: area_factors_t
-  use hc_direct_system, only: direct_iterate_t, infinite, unloaded, solve_area
+  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, classify, enter, is_unsupported, &
+    linearize_law, evaluate, record
+  use hc_written_iteration, only: iterate_as_written
+  use hc_direct_system, only: solve_area
   implicit none
   private
 
-  public :: direct_friction_t, new_direct_friction, ring
+  public :: direct_friction_t, new_direct_friction
 
   !> A contact problem with friction and its flexibility.
   type, extends(friction_solver_t) :: direct_friction_t
@@ -37,6 +44,8 @@ module hc_direct_friction
     type(fft_flexibility_t) :: operator
     !> Factors of the last contact area
     type(area_factors_t) :: factors
+    !> The same on the lattice of every second node, set up when it is first of use
+    class(friction_solver_t), allocatable :: coarser
   contains
     procedure :: solve_step
     procedure :: displacements
@@ -68,9 +77,160 @@ contains
     call self%problem%displacements(self%operator, pressure, traction, displacement, error)
   end subroutine displacements
 
-  subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
+  recursive subroutine solve_step(self, start, reference, target, tolerance, max_sweeps, state, error)
     class(direct_friction_t), intent(inout), target :: self
     type(contact_state_t), intent(in) :: start
+    real(wp), intent(in), contiguous :: reference(:, :, :)
+    type(load_target_t), intent(in) :: target
+    real(wp), intent(in) :: tolerance
+    integer, intent(in) :: max_sweeps
+    type(contact_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: guess
+    real(wp) :: work
+    integer :: sweeps
+    logical :: guessed
+
+    if (.not. self%problem%is_pressed(target)) then
+      call self%problem%separate(start, reference, target, tolerance, state)
+      return
+    end if
+    if (self%problem%options%direct%as_written) then
+      call iterate_as_written(self%problem, self%flexibility, self%operator, self%factors, start, reference, target, tolerance, &
+                              max_sweeps, state, error)
+      return
+    end if
+    call find_start(self, start, reference, target, max_sweeps, guess, guessed, work, error)
+    if (allocated(error)) return
+    sweeps = 0
+    if (guessed) then
+      call attempt(guess)
+      if (allocated(error)) return
+    end if
+    ! the start by coarse lattices may not converge where the old state does
+    if (.not. state%converged) call attempt(start)
+    state%sweeps = sweeps
+    state%operator_applications = work
+
+  contains
+
+    !> Iterate on this lattice, and count what it takes.
+    subroutine attempt(from)
+      !> State to start from
+      type(contact_state_t), intent(in) :: from
+
+      call iterate(self, from, guessed .and. sweeps == 0, reference, target, tolerance, max_sweeps, state, error)
+      sweeps = sweeps + state%sweeps
+      work = work + state%operator_applications
+    end subroutine attempt
+
+  end subroutine solve_step
+
+  !> Find tractions and motions to start from by the lattice of every second node.
+  recursive subroutine find_start(self, start, reference, target, max_sweeps, guess, guessed, work, error)
+    class(direct_friction_t), intent(inout), target :: self
+    !> State to start from otherwise
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in), contiguous :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> State to start from
+    type(contact_state_t), intent(out) :: guess
+    !> There is one
+    logical, intent(out) :: guessed
+    !> Work, in applications of the operator of this lattice
+    real(wp), intent(out) :: work
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    type(contact_state_t) :: before, after
+    type(load_target_t) :: coarse_target
+    real(wp), allocatable :: displacement(:, :, :), origin(:, :, :), gap(:, :)
+    logical :: touching
+
+    guessed = .false.
+    work = 0.0_wp
+    touching = any(start%pressure > 0.0_wp)
+    if (.not. is_worth_coarsening(self, touching, start, target)) return
+    if (.not. allocated(self%coarser)) call set_up_coarser(self, error)
+    if (allocated(error)) return
+    call copy_tractions(start, guess, self%problem%space)
+    associate (model => self%coarser%problem, options => self%problem%options%multilevel)
+      if (.not. any(model%candidate)) return
+      if (touching) then
+        call restrict_state(self%problem, start, model, before)
+        allocate (displacement(model%lattice%extent(1), model%lattice%extent(2), 3))
+        call self%coarser%displacements(before%pressure, before%traction, displacement, error)
+        if (allocated(error)) return
+        gap = model%initial_gap
+        call balance(self%problem, start, reference, target, before, displacement, model, origin, coarse_target)
+        call self%coarser%solve_step(before, origin, coarse_target, options%change_tolerance, options%change_sweeps, after, error)
+        model%initial_gap = gap
+        if (allocated(error)) return
+        guessed = after%converged
+        if (guessed) call add_change(model, before, after, self%problem, guess)
+      else
+        call new_friction_state(before, model%lattice, model%space)
+        before%motion = start%motion
+        call self%coarser%solve_step(before, restrict_vector(self%problem%lattice, reference, model%lattice), target, &
+                                     options%nested_tolerance, max_sweeps, after, error)
+        if (allocated(error)) return
+        guessed = after%converged
+        if (guessed) call prolong_state(model, after, self%problem, guess)
+      end if
+      work = after%operator_applications*model%lattice%size()/self%problem%lattice%size()
+    end associate
+    if (guessed) guessed = any(guess%pressure > 0.0_wp)
+  end subroutine find_start
+
+  !> Tell whether the contact has nodes enough for a coarser lattice to help.
+  logical function is_worth_coarsening(self, touching, start, target) result(worth)
+    type(direct_friction_t), intent(in) :: self
+    !> There is a contact already
+    logical, intent(in) :: touching
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    logical, allocatable :: nodes(:)
+
+    associate (problem => self%problem, options => self%problem%options%multilevel)
+      worth = minval(problem%lattice%extent) >= 2*options%smallest_side
+      if (.not. worth) return
+      if (touching) then
+        nodes = reshape(start%pressure > 0.0_wp, [problem%lattice%size()])
+      else
+        nodes = first_guess(problem%lattice, problem%pair, target%control(normal), target%value(normal), &
+                            reshape(problem%initial_gap, [problem%lattice%size()]), &
+                            reshape(problem%candidate, [problem%lattice%size()]))
+      end if
+      worth = count(nodes) >= 4*options%least_contact
+    end associate
+  end function is_worth_coarsening
+
+  !> Set up the problem on the lattice of every second node.
+  subroutine set_up_coarser(self, error)
+    type(direct_friction_t), intent(inout) :: self
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: problem
+    type(direct_friction_t), allocatable :: coarser
+
+    call self%problem%coarsen(problem)
+    allocate (coarser)
+    call new_direct_friction(coarser, problem, error)
+    if (.not. allocated(error)) call move_alloc(coarser, self%coarser)
+  end subroutine set_up_coarser
+
+  !> Iterate from a state until the residuals are within the tolerance.
+  subroutine iterate(self, start, is_near, reference, target, tolerance, max_sweeps, state, error)
+    class(direct_friction_t), intent(inout), target :: self
+    !> State to start from
+    type(contact_state_t), intent(in) :: start
+    !> Its contact area needs no ring around it
+    logical, intent(in) :: is_near
     real(wp), intent(in), contiguous :: reference(:, :, :)
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
@@ -80,29 +240,18 @@ contains
     type(direct_iterate_t) :: it, before
     type(direct_options_t) :: options
     real(wp) :: share
-    integer :: n, sweep, unsupported
+    integer :: sweep, unsupported
 
-    if (.not. self%problem%is_pressed(target)) then
-      call self%problem%separate(start, reference, target, tolerance, state)
-      return
-    end if
     options = self%problem%options%direct
     ! with rows of the step before, the last bits would depend on whether the run was interrupted
     call self%factors%clear()
     call new_friction_state(state, self%problem%lattice)
     self%operator%applications = 0.0_wp
-    n = self%problem%lattice%size()
-    it%initial_gap = reshape(self%problem%initial_gap, [n])
-    it%candidate = reshape(self%problem%candidate, [n])
-    it%reference = reshape(reference, [n, 2])
+    call new_direct_iterate(it, self%problem, start, reference, target)
     it%accuracy = options%first_accuracy
-    it%motion = merge(target%value, start%motion, target%control == displacement_control)
-    allocate (it%p(n), it%compliance(n), it%spring(n), it%offset(n), source=0.0_wp)
-    allocate (it%q(n, 2), it%direction(2, n), source=0.0_wp)
-    allocate (it%zone(n), source=separated)
 
     if (any(start%pressure > 0.0_wp)) then
-      call continue_from(self, start, it, error)
+      call continue_from(self, start, is_near, it, error)
     else
       call set_start(self, target, it, error)
     end if
@@ -112,7 +261,7 @@ contains
       if (allocated(error)) return
       before = it
       ! while stick and slip are wrong, iterating the contact area to its end costs more than it saves
-      call find_area(self, target, sweep, it, error)
+      call find_area(self, target, merge(1, sweep, is_near), it, error)
       if (allocated(error)) return
       if (is_unsupported(self%problem, it)) then
         unsupported = unsupported + 1
@@ -125,7 +274,7 @@ contains
           if (allocated(error)) return
         end if
       end if
-      call record(self, reference, target, tolerance, it, state, error)
+      call record(self%problem, self%operator, reference, target, tolerance, it, state, error)
       if (allocated(error) .or. state%converged) exit
       it%accuracy = min(it%accuracy, max(options%last_accuracy*tolerance, options%inner_accuracy* &
                                          max(state%residual_normal, state%residual_tangential)))
@@ -137,7 +286,7 @@ contains
       call classify(self%problem, share, it)
     end do
     if (state%sliding) state%stopped = loads_not_carried
-  end subroutine solve_step
+  end subroutine iterate
 
   !> First contact: without shear traction, and then against the slip that its pressure causes.
   subroutine set_start(self, target, it, error)
@@ -171,10 +320,12 @@ contains
   end subroutine set_start
 
   !> Tractions, and contact with a ring around it, of the state to start from.
-  subroutine continue_from(self, start, it, error)
+  subroutine continue_from(self, start, is_near, it, error)
     class(direct_friction_t), intent(inout) :: self
     !> State to start from
     type(contact_state_t), intent(in) :: start
+    !> Its contact area needs no ring around it
+    logical, intent(in) :: is_near
     !> Iterate
     type(direct_iterate_t), intent(inout) :: it
     !> Allocated on failure
@@ -182,80 +333,15 @@ contains
     integer :: n
 
     n = size(it%p)
-    it%contact = it%candidate .and. reshape(ring(start%pressure > 0.0_wp), [n])
+    it%contact = reshape(start%pressure > 0.0_wp, [n])
+    if (.not. is_near) it%contact = reshape(ring(start%pressure > 0.0_wp), [n])
+    it%contact = it%candidate .and. it%contact
     if (.not. any(it%contact)) it%contact = it%candidate
     it%p = merge(reshape(start%pressure, [n]), 0.0_wp, it%contact)
     it%q = reshape(start%traction, [n, 2])
-    call evaluate(self, it, error)
+    call evaluate(self%problem, self%operator, it, error)
     if (.not. allocated(error)) call classify(self%problem, self%problem%options%direct%cautious_share, it)
   end subroutine continue_from
-
-  !> An area with the ring of lattice neighbours around it.
-  pure function ring(area) result(wider)
-    !> Area (n_col, n_row)
-    logical, intent(in) :: area(:, :)
-    logical :: wider(size(area, 1), size(area, 2))
-    integer :: sign
-
-    wider = area
-    do sign = -1, 1, 2
-      wider = wider .or. eoshift(area, sign, dim=1) .or. eoshift(area, sign, dim=2) &
-              .or. eoshift(eoshift(area, sign, dim=1), -sign, dim=2)
-    end do
-  end function ring
-
-  !> Stick or slip at every node in contact.
-  pure subroutine classify(problem, share, it)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Share of the classification parameter to use
-    real(wp), intent(in) :: share
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    logical :: pressed(size(it%p))
-    real(wp) :: r
-    integer :: i
-
-    r = share*problem%classification_parameter(count(it%contact .and. it%p > 0.0_wp))
-    pressed = it%contact .and. it%p > 0.0_wp .and. problem%friction%resists() .and. problem%friction%is_bounded()
-    call problem%friction%linearize(1, maxval(it%p), r, pressed, it%p, it%q(:, 1), it%q(:, 2), it%ds(:, 1), it%ds(:, 2), &
-                                    it%zone, it%direction, it%compliance)
-    do i = 1, size(it%p)
-      if (it%contact(i) .and. .not. pressed(i)) call enter(problem, it, i)
-    end do
-  end subroutine classify
-
-  !> State of a node that comes into contact: its traction, if any, will oppose its slip.
-  pure subroutine enter(problem, it, node)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    !> Node
-    integer, intent(in) :: node
-    real(wp) :: length
-
-    it%zone(node) = merge(slip, stick, problem%friction%is_bounded())
-    it%compliance(node) = merge(infinite, 0.0_wp, problem%friction%is_bounded())
-    it%direction(:, node) = 0.0_wp
-    length = norm2(it%ds(node, :))
-    if (length > problem%options%direct%negligible_slip*problem%tangential_compliance*maxval(it%p)) then
-      it%direction(:, node) = -it%ds(node, :)/length
-    end if
-  end subroutine enter
-
-  !> Is there nothing to carry the loads, or no more than the directions of slip, with tractions to match?
-  pure logical function is_unsupported(problem, it)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Iterate
-    type(direct_iterate_t), intent(in) :: it
-
-    is_unsupported = .not. it%carried
-    if (is_unsupported .or. any(it%zone == stick)) return
-    is_unsupported = sqrt(maxval(sum(it%q**2, dim=2)))/problem%options%direct%most_across &
-                     > problem%friction%largest_bound(maxval(it%p))
-  end function is_unsupported
 
   !> Contact area under a frozen state of stick and slip, and its tractions.
   subroutine find_area(self, target, max_tries, it, error)
@@ -279,7 +365,7 @@ contains
       call solve_area(self%problem, self%flexibility, self%operator, self%factors, target, it, error)
       if (allocated(error)) return
       it%solves = it%solves + 1
-      call evaluate(self, it, error)
+      call evaluate(self%problem, self%operator, it, error)
       if (allocated(error)) return
       if (self%problem%normal_law%is_compliant()) then
         violation = 0.0_wp
@@ -299,76 +385,5 @@ contains
       end do
     end do
   end subroutine find_area
-
-  !> Nodes in contact, and springs of a compliant law, that the present pressure and gap call for.
-  pure subroutine linearize_law(problem, it)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    logical :: before(size(it%p))
-    real(wp) :: r
-    integer :: i
-
-    before = it%contact
-    r = problem%normal_classification_parameter(count(it%contact))
-    call problem%normal_law%find_contact(r, it%p, it%gap, it%candidate, it%contact)
-    if (.not. any(it%contact)) it%contact = it%candidate .and. it%gap <= minval(it%gap, mask=it%candidate)
-    call problem%normal_law%linearize(1, r, problem%softest_spring(maxval(abs(it%p))), it%p, it%gap, it%contact, &
-                                      it%spring, it%offset)
-    do i = 1, size(it%p)
-      if (it%contact(i) .and. .not. before(i)) call enter(problem, it, i)
-    end do
-  end subroutine linearize_law
-
-  !> Gap and slip under the tractions and motions of an iterate.
-  subroutine evaluate(self, it, error)
-    class(direct_friction_t), intent(inout) :: self
-    !> Iterate
-    type(direct_iterate_t), intent(inout) :: it
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    real(wp), dimension(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3) :: traction, displacement
-    real(wp) :: conditions(size(it%p), 3)
-
-    traction = reshape([it%p, it%q], shape(traction))
-    call self%displacements(traction(:, :, normal), traction(:, :, along_x:), displacement, error)
-    if (allocated(error)) return
-    conditions = unloaded(self%problem, it) + reshape(displacement, shape(conditions))
-    it%gap = conditions(:, normal)
-    it%ds = conditions(:, along_x:)
-  end subroutine evaluate
-
-  !> The state that an iterate stands for: with its tractions projected on p >= 0 and on the cone.
-  subroutine record(self, reference, target, tolerance, it, state, error)
-    class(direct_friction_t), intent(inout) :: self
-    !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
-    real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> Loads or motions to be reached
-    type(load_target_t), intent(in) :: target
-    !> Bound of all residuals
-    real(wp), intent(in) :: tolerance
-    !> Iterate
-    type(direct_iterate_t), intent(in) :: it
-    !> State to be filled
-    type(contact_state_t), intent(inout) :: state
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    real(wp) :: displacement(self%problem%lattice%extent(1), self%problem%lattice%extent(2), 3)
-    real(wp) :: p(size(it%p)), q(size(it%p), 2), unit
-
-    call self%problem%normal_law%project(it%p, p)
-    unit = maxval(p)
-    if (unit > 0.0_wp) unit = 1.0_wp/unit
-    call self%problem%friction%project(1, unit, p, it%q(:, 1), it%q(:, 2), q(:, 1), q(:, 2))
-    state%pressure = reshape(p, shape(state%pressure))
-    state%traction = reshape(q, shape(state%traction))
-    state%motion = it%motion
-    call self%displacements(state%pressure, state%traction, displacement, error)
-    if (allocated(error)) return
-    call self%problem%complete_state(target, tolerance, reference, displacement, state)
-    state%sweeps = it%solves
-    state%operator_applications = self%operator%applications
-  end subroutine record
 
 end module hc_direct_friction

@@ -11,6 +11,7 @@ module hc_direct_system
   use hc_flexibility, only: flexibility_t
   use hc_flexibility_dense, only: dense_flexibility_t
   use hc_area_factors, only: area_factors_t
+  use hc_direct_iterate, only: direct_iterate_t, infinite, unloaded, ring
   use hc_area_system, only: solve_with_factors
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
   use hc_disc_law, only: normal_to
@@ -19,53 +20,12 @@ module hc_direct_system
   implicit none
   private
 
-  public :: direct_iterate_t, infinite, unloaded, solve_area
-
-  !> A compliance that leaves no traction across the direction of slip.
-  real(wp), parameter :: infinite = huge(1.0_wp)
+  public :: solve_area
 
   character(len=*), parameter :: no_memory = &
     'not enough memory for the matrix of the contact area: use method "fft"'
 
-  !> An iterate; over the nodes of the window.
-  type :: direct_iterate_t
-    !> Nodes that may come into contact, nodes in contact
-    logical, allocatable :: candidate(:), contact(:)
-    !> Initial gap (n) and relative displacement at the beginning of the step (n, 2) [m]
-    real(wp), allocatable :: initial_gap(:), reference(:, :)
-    !> Pressure (n) and shear traction (n, 2) [Pa]
-    real(wp), allocatable :: p(:), q(:, :)
-    !> Gap (n) and slip of the step (n, 2) under them [m]
-    real(wp), allocatable :: gap(:), ds(:, :)
-    !> Approach, shifts [m] and twist [rad]
-    real(wp) :: motion(n_motion) = 0.0_wp
-    !> Frozen state of the nodes in contact: stick or slip, its direction (2, n) and
-    !> compliance across it; a node with an infinite one has no traction across
-    integer, allocatable :: zone(:)
-    real(wp), allocatable :: direction(:, :), compliance(:)
-    !> Under a compliant law of contact: compliance [m/Pa] and offset [m] of the spring along the normal, 0 off the contact
-    real(wp), allocatable :: spring(:), offset(:)
-    !> The tractions carry all prescribed loads
-    logical :: carried = .true.
-    !> Linear systems solved so far
-    integer :: solves = 0
-    !> Residual that the next one may leave, relative to the largest pressure or traction
-    real(wp) :: accuracy = 0.0_wp
-  end type direct_iterate_t
-
 contains
-
-  !> Gap and slip that the motions alone would cause, without tractions (n, 3) [m].
-  pure function unloaded(problem, it)
-    !> What is given
-    type(friction_problem_t), intent(in) :: problem
-    !> Iterate
-    type(direct_iterate_t), intent(in) :: it
-    real(wp) :: unloaded(size(it%p), 3)
-
-    unloaded(:, normal) = it%initial_gap - it%motion(normal)
-    unloaded(:, along_x:) = -reshape(problem%rigid_displacement(it%motion), [size(it%p), 2]) - it%reference
-  end function unloaded
 
   !> Tractions and motions with g = 0 on the contact, ds = 0 in stick, t.ds + D tau = 0 in slip.
   !>
@@ -107,10 +67,6 @@ contains
     if (solved) then
       call factorize_area(problem, flexibility, contact, stuck, sliding, it, factors, solved, error)
       if (allocated(error)) return
-    end if
-    if (solved) then
-      contact = factors%order
-      stuck = contact(:size(stuck))
     end if
     allocate (node, source=[contact, stuck, stuck, sliding])
     allocate (place(size(it%p)), source=0)
@@ -208,25 +164,21 @@ contains
     logical, intent(out) :: done
     !> Allocated if there is not enough memory
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: key(size(stuck)), bound(size(it%p)), side(2, size(sliding))
-    logical :: other(size(it%p))
+    real(wp) :: side(2, size(sliding))
+    logical :: sticks(size(it%p)), edge(size(it%p))
     integer :: i
 
-    call problem%friction%find_bounds(1, it%p, bound)
-    do i = 1, size(stuck)
-      ! how far a node is from slip and from the edge of the contact
-      key(i) = it%p(stuck(i))/max(maxval(it%p), tiny(1.0_wp))
-      if (bound(stuck(i)) > 0.0_wp) key(i) = min(key(i), 1.0_wp - norm2(it%q(stuck(i), :))/bound(stuck(i)))
-    end do
+    sticks = .false.
+    sticks(stuck) = .true.
+    ! those next to a node that does not stick may be the next to slip or to leave
+    edge = reshape(ring(reshape(.not. sticks, problem%lattice%extent)), [size(it%p)])
     do i = 1, size(sliding)
       side(:, i) = normal_to(it%direction(:, sliding(i)))
     end do
-    other = it%contact
-    other(stuck) = .false.
-    other(sliding) = .false.
     associate (pair => problem%pair, unit => problem%normal_compliance)
-      call factors%factorize(flexibility, unit, 1.0_wp + 0.5_wp*pair%lambda_5/pair%lambda_1, stuck, key, sliding, &
-                             pack(contact, other(contact)), side, it%compliance(sliding)/unit, done, error)
+      call factors%factorize(flexibility, unit, 1.0_wp + 0.5_wp*pair%lambda_5/pair%lambda_1, &
+                             problem%options%direct, contact, stuck, .not. edge(stuck), sliding, side, &
+                             it%compliance(sliding)/unit, done, error)
     end associate
   end subroutine factorize_area
 

@@ -66,17 +66,25 @@ contains
     end if
   end subroutine coupled_product
 
-  !> Precondition pressure and shear traction each by its own preconditioner.
+  !> Precondition pressure and shear traction each by its own preconditioner, the shear traction after the pressure: where a
+  !> law has a direction, the pressure moves the rest of springs, which are stiff where a node has slipped far.
   subroutine coupled_precondition(self, x, y, error)
     class(coupled_system_t), intent(inout) :: self
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable, target :: shear(:)
     integer :: n
 
     n = size(x)/3
     call self%operators%normal%apply(x(:n), y(:n), self%operators%preconditioning)
-    call self%shear%precondition(x(n + 1:), y(n + 1:), error)
+    if (allocated(self%tilt)) then
+      shear = x(n + 1:)
+      shear(:n) = shear(:n) + self%shear%compliance*self%tilt*y(:n)
+      call self%shear%precondition(shear, y(n + 1:), error)
+    else
+      call self%shear%precondition(x(n + 1:), y(n + 1:), error)
+    end if
   end subroutine coupled_precondition
 
 end module hc_coupled_system

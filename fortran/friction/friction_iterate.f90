@@ -279,13 +279,18 @@ contains
   end function pressure_unit
 
   !> Compute the residuals of the present tractions, without a product.
-  subroutine find_residuals(self)
+  subroutine find_residuals(self, tangential_known)
     class(friction_iterate_t), intent(inout) :: self
+    !> R_t has been computed; default: it has not
+    logical, intent(in), optional :: tangential_known
     real(wp), allocatable :: gap(:)
+    logical :: known
 
     call self%find_gap(gap)
     self%residual_normal = self%gap_residual(gap)
-    call self%find_tangential_residual()
+    known = .false.
+    if (present(tangential_known)) known = tangential_known
+    if (.not. known) call self%find_tangential_residual()
   end subroutine find_residuals
 
   !> Compute R_t alone.

@@ -17,9 +17,10 @@ module hc_frictional_contact
   use hc_contact_solver, only: friction_solver_t
   use hc_elastic_operators, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_on_lattice
+  use hc_coarse_change, only: prolong_state
   use hc_fas_predictor, only: predict
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_transfer, only: prolong_edge, prolong_shear, restrict_vector
+  use hc_transfer, only: restrict_vector
   implicit none
   private
 
@@ -263,19 +264,5 @@ contains
     end do
     if (allocated(coarser%pressure)) call prolong_state(self%coarse(2), coarser, self%problem, guess)
   end subroutine coarse_guess
-
-  !> Prolong tractions and motions of a coarse state, to start on the finer lattice.
-  subroutine prolong_state(coarse_problem, coarse, problem, state)
-    type(friction_problem_t), intent(in) :: coarse_problem
-    type(contact_state_t), intent(in) :: coarse
-    type(friction_problem_t), intent(in) :: problem
-    type(contact_state_t), intent(inout) :: state
-    if (any(shape(coarse%pressure) /= coarse_problem%lattice%extent)) return
-    if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
-    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%space)
-    call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
-                       state%traction, problem%space)
-    state%motion = coarse%motion
-  end subroutine prolong_state
 
 end module hc_frictional_contact

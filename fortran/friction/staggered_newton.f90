@@ -45,6 +45,7 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: q(:)
+    logical :: judged
 
     now%outcome = solution_accurate
     ! the pressure is found under the shear traction: what each of them causes has to be known
@@ -60,7 +61,7 @@ contains
     ! R_t of the old shear traction under the new pressure: what the step has to reduce
     if (.not. now%first) call now%find_tangential_residual()
     ! 2. and 3.
-    call solve_shear(now, error)
+    call solve_shear(now, judged, error)
     if (allocated(error)) return
     ! 4.
     if (now%pressure_feels_shear) then
@@ -69,7 +70,7 @@ contains
       if (allocated(error)) return
       now%cut = .true.
     end if
-    call now%find_residuals()
+    call now%find_residuals(judged)
     now%first = .false.
   end subroutine staggered_sweep
 
@@ -161,9 +162,11 @@ contains
   end subroutine solve_pressure
 
   !> Solve for the shear traction under the present pressure, (F10).
-  subroutine solve_shear(now, error)
+  subroutine solve_shear(now, judged, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout), target :: now
+    !> R_t is that of the traction found
+    logical, intent(out) :: judged
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -178,6 +181,7 @@ contains
 
     n = size(now%p)
     options = now%problem%options%newton
+    judged = .false.
     if (.not. now%problem%friction%resists()) then
       now%q = 0.0_wp
       return
@@ -240,8 +244,10 @@ contains
     call now%shear%subtract_springs(x, ax)
     call now%shear%to_plane(ax, now%u)
     call now%find_tangential_residual()
+    judged = .true.
     call now%globalization%step_share(now%residual_tangential, options, share)
     if (share < 1.0_wp) then
+      judged = .false.
       ! Newton's method oscillates: any iterate between carries the same loads
       now%q = merge(q + share*(now%q - q), 0.0_wp, [now%contact, now%contact])
       now%motion = motion + share*(now%motion - motion)
@@ -251,7 +257,10 @@ contains
       call now%shear%subtract_springs(x, ax)
       call now%shear%to_plane(ax, now%u)
     end if
-    if (now%shear%spring_rounding(x) > options%displacement_rounding*scale) call now%refresh(error)
+    if (now%shear%spring_rounding(x) > options%displacement_rounding*scale) then
+      judged = .false.
+      call now%refresh(error)
+    end if
   end subroutine solve_shear
 
   !> Compute the displacements by a shear traction and the pressure together, springs included.

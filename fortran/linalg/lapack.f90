@@ -7,7 +7,7 @@ module hc_lapack
   implicit none
   private
 
-  public :: dgemm, dposv, dsgesv, dgelss, spotrf, spotrs, sgemv, ssyrk, strsm, strsv
+  public :: dgemm, dposv, dsgesv, dgelss, spotrf, spotrs, sgemm, sgemv, ssyrk, strsm, strsv
   public :: prepare_lapack, eliminate, least_squares
 
   !> Bytes of address space that OpenBLAS takes for a buffer when it is first called, and a reserve.
@@ -23,6 +23,16 @@ module hc_lapack
       real(wp), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
       real(wp), intent(inout) :: c(ldc, *)
     end subroutine dgemm
+
+    !> Compute C = alpha A B + beta C, in single precision
+    subroutine sgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+      import :: real32
+      implicit none
+      character(len=1), intent(in) :: transa, transb
+      integer, intent(in) :: m, n, k, lda, ldb, ldc
+      real(real32), intent(in) :: alpha, beta, a(lda, *), b(ldb, *)
+      real(real32), intent(inout) :: c(ldc, *)
+    end subroutine sgemm
 
     !> Compute y <- alpha A x + beta y, or with A^T, in single precision
     subroutine sgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)

@@ -50,8 +50,8 @@ module hc_contact_edges
   type :: one_sided_t
     !> Distances from the edge, slopes there, and directions inwards
     real(wp), allocatable :: distance(:), slope(:), direction(:, :)
-    !> Nodes where they are known
-    logical, allocatable :: has_distance(:), has_slope(:), has_direction(:)
+    !> Nodes where they are known; the direction may be none, in the middle of few nodes
+    logical, allocatable :: has_distance(:), has_slope(:), has_direction(:), is_guessed(:)
   end type one_sided_t
 
 contains
@@ -221,7 +221,8 @@ contains
     class(contact_edges_t), intent(in) :: self
     real(wp) :: field(size(self%contact, 1), size(self%contact, 2))
 
-    field = squares_in_band(self%band, self%options, self%contact, self%candidate, self%pressure**2, self%distance)
+    field = squares_in_band(self%band, self%options, self%contact, self%candidate, self%pressure**2, self%distance, &
+                            known_beyond=.true.)
   end function squares
 
   !> Return squares of the reserve of friction that are good to interpolate linearly, see `squares`.
@@ -235,11 +236,12 @@ contains
     real(wp), allocatable :: distance(:)
 
     call self%from_stick(stick, reserve, band, distance)
-    field = squares_in_band(band, self%options, stick, self%contact .or. self%candidate, band%values_of(reserve)**2, distance)
+    field = squares_in_band(band, self%options, stick, self%contact .or. self%candidate, band%values_of(reserve)**2, distance, &
+                            known_beyond=.false.)
   end function stick_squares
 
   !> Compute squares, good to interpolate, of what vanishes at the edge of a zone.
-  pure function squares_in_band(band, options, zone, around, square, distance) result(field)
+  pure function squares_in_band(band, options, zone, around, square, distance, known_beyond) result(field)
     !> Nodes about the edge
     type(edge_band_t), intent(in) :: band
     type(edge_options_t), intent(in) :: options
@@ -247,6 +249,8 @@ contains
     logical, intent(in) :: zone(:, :), around(:, :)
     !> Squares at the nodes of the band, and their distances from the edge
     real(wp), intent(in) :: square(:), distance(:)
+    !> Distances of nodes beyond the edge are known by themselves, and not by the direction of the edge from those inside
+    logical, intent(in) :: known_beyond
     real(wp) :: field(size(zone, 1), size(zone, 2))
     type(one_sided_t) :: seen
     real(wp) :: inwards(2, band%n), rises(band%n)
@@ -264,7 +268,7 @@ contains
     field = ieee_value(1.0_wp, ieee_quiet_nan)
     do k = 1, band%n
       if (.not. (known(k) .and. seen%has_slope(k)) .or. any(band%node(:, k) < 1 .or. band%node(:, k) > shape(field))) cycle
-      if (rises(k) >= 0.5_wp) cycle
+      if (rises(k) >= 0.5_wp .or. (seen%is_guessed(k) .and. .not. known_beyond)) cycle
       associate (there => field(band%node(1, k), band%node(2, k)))
         if (inside(k)) then
           there = square(k)
@@ -311,7 +315,7 @@ contains
     !> What is found
     type(one_sided_t), intent(out) :: seen
     logical :: whole(band%n), known(band%n)
-    real(wp) :: slope(band%n), smooth(band%n), flat(band%n), steepness, bend, to(2, 6)
+    real(wp) :: slope(band%n), smooth(band%n), flat(band%n), guessed(band%n), steepness, bend, to(2, 6)
     integer :: k
 
     to = to_neighbors()
@@ -329,6 +333,7 @@ contains
 
     seen%direction = band%gradient(smooth, whole)
     flat = 0.0_wp
+    guessed = 0.0_wp
     seen%has_slope = whole
     seen%has_direction = whole
     known = whole
@@ -340,6 +345,7 @@ contains
       else
         ! but a rounding error, as in the middle of few nodes: one direction is as good as another
         seen%direction(:, k) = [1.0_wp, 0.0_wp]
+        guessed(k) = 1.0_wp
       end if
       ! second derivative along n from those along the three lines of nodes at angles t to n, with weights 1 + 2 cos 2t
       bend = sum((4.0_wp*matmul(seen%direction(:, k), to)**2 - 1.0_wp)*(smooth(band%beside(:, k)) - smooth(k)))/3.0_wp
@@ -348,6 +354,10 @@ contains
       slope(k) = sqrt(max(slope(k), options%least_slope*steepness**2))
       seen%has_slope(k) = slope(k) > 0.0_wp
     end do
+    known = whole
+    call band%extend(guessed, known)
+    seen%is_guessed = guessed > 0.5_wp
+    known = whole
     call band%extend(flat, whole)
     call band%extend(slope, seen%has_slope)
     call band%extend(seen%direction(1, :), known)

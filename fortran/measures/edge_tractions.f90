@@ -13,7 +13,7 @@ module hc_edge_tractions
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_options, only: edge_options_t
-  use hc_lattice, only: lattice_t, neighbors
+  use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal, along_x, along_y
@@ -21,26 +21,14 @@ module hc_edge_tractions
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_linear_system, only: linear_system_t, solution_accurate, precondition_constraints, satisfy_constraints
   use hc_projected_cg, only: projected_cg
-  use hc_interpolation, only: interpolate, interpolate_pressure
   use hc_contact_edges, only: contact_edges_t
+  use hc_traction_field, only: traction_field_t, new_traction_field
   use hc_edge_residue, only: edge_residue_t, new_edge_residue, edge_residue_memory, not_found
   use hc_edge_fit, only: fit_squares
   implicit none
   private
 
   public :: correct_at_edges, edge_tractions_memory
-
-  !> Shape of the tractions at the nodes of a contact (n_col, n_row).
-  type :: edge_shape_t
-    type(lattice_t) :: lattice
-    !> Pressure and reserve of friction [Pa], and their squares near the edges [Pa^2]
-    real(wp), allocatable :: pressure(:, :), reserve(:, :), squares(:, :), stick_squares(:, :)
-    !> Coefficient of friction, and direction of the shear traction (n_col, n_row, direction)
-    real(wp), allocatable :: friction(:, :), direction(:, :, :)
-  contains
-    !> What the shape has beyond the hats at a point
-    procedure, private :: beyond_hats
-  end type edge_shape_t
 
   !> The elastic operator of some components, without a preconditioner: what changes is local.
   type, extends(linear_system_t) :: elastic_part_t
@@ -73,8 +61,8 @@ contains
 
     n = merge(3, 1, sheared)
     solved = merge(2, 1, sheared)
-    ! edges: zones, places in the band; shape; change, hats, values at the nodes; cells
-    everywhere = 3*half + merge(8, 2, sheared)*field + 3*n*field + half
+    ! edges: zones, places in the band; shape and nodes that stick; change, hats, values at the nodes; cells
+    everywhere = 3*half + merge(11*field + half, 3*field, sheared) + 3*n*field + half
     ! displacements by the rest, and by the pressure; unknowns, product, right-hand side, constraints twice, active nodes
     everywhere = everywhere + merge(6, 1, sheared)*field + (3*solved + 2*solved**2)*field + solved*half
     ! vectors of conjugate gradients, constraints twice
@@ -107,24 +95,19 @@ contains
     type(edge_options_t), intent(in), optional :: options
 
     type(edge_options_t) :: tuning
-    type(edge_shape_t) :: edge_shape
+    type(traction_field_t) :: edge_shape
     type(edge_residue_t) :: residue
     type(fft_flexibility_t), target :: flexibility
-    real(wp), allocatable :: hats(:, :, :), change(:, :, :), size_of(:, :), at_nodes(:, :, :)
+    real(wp), allocatable :: hats(:, :, :), change(:, :, :), at_nodes(:, :, :)
     integer :: pass, k, n
 
     if (present(options)) tuning = options
     n = 1
     if (all(friction > 0.0_wp .and. friction <= huge(1.0_wp))) n = 3
-    edge_shape%lattice = lattice
-    edge_shape%pressure = traction(:, :, 1)
-    edge_shape%squares = edges%squares()
     if (n == 3) then
-      edge_shape%friction = friction
-      size_of = norm2(traction(:, :, 2:3), dim=3)
-      edge_shape%reserve = merge(max(friction*traction(:, :, 1) - size_of, 0.0_wp), 0.0_wp, stick)
-      edge_shape%stick_squares = edges%stick_squares(stick, edge_shape%reserve)
-      edge_shape%direction = directions(traction(:, :, 2:3), size_of, contact)
+      call new_traction_field(edge_shape, lattice, edges, traction, contact, stick, friction, options=tuning)
+    else
+      call new_traction_field(edge_shape, lattice, edges, traction(:, :, 1:1), contact, stick, options=tuning)
     end if
     call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=n == 1, space=space, cache=cache)
     if (allocated(error)) return
@@ -144,6 +127,7 @@ contains
                          merge(friction*at_nodes(:, :, 1) - norm2(at_nodes(:, :, 2:3), dim=3), 0.0_wp, stick), &
                          edges%stick_distances(stick, edge_shape%reserve), tuning)
       end if
+      call edge_shape%renew()
     end do
     do k = 1, n
       traction(:, :, k) = traction(:, :, k) + change(:, :, k)
@@ -153,14 +137,14 @@ contains
   !> Sample what the shape has beyond the hats, between the nodes and at them.
   pure subroutine sample(shape_of, samples, n, residue, at_nodes)
     !> The shape
-    type(edge_shape_t), intent(in) :: shape_of
+    type(traction_field_t), intent(in) :: shape_of
     !> Points along a spacing, and number of components
     integer, intent(in) :: samples, n
     !> What it has between the nodes
     type(edge_residue_t), intent(out) :: residue
     !> The same at the nodes (n_col, n_row, component) [Pa]
     real(wp), allocatable, intent(out) :: at_nodes(:, :, :)
-    logical :: near(size(shape_of%pressure, 1), size(shape_of%pressure, 2))
+    logical :: near(size(shape_of%squares, 1), size(shape_of%squares, 2))
     integer :: col, row, i, k
 
     do row = 1, size(near, 2)
@@ -175,7 +159,7 @@ contains
         if (.not. near(node(1), node(2))) cycle
         do i = 1, samples**2
           residue%values(i, :, k) = shape_of%beyond_hats(matmul(shape_of%lattice%basis, &
-            real(shape_of%lattice%first + node - 1, wp) + residue%point(i)) + shape_of%lattice%origin, n)
+            real(shape_of%lattice%first + node - 1, wp) + residue%point(i)) + shape_of%lattice%origin)
         end do
         at_nodes(node(1), node(2), :) = residue%values(1, :, k)
       end associate
@@ -197,7 +181,7 @@ contains
     !> Coefficient of friction
     real(wp), intent(in) :: friction(:, :)
     !> The shape
-    type(edge_shape_t), intent(in) :: shape_of
+    type(traction_field_t), intent(in) :: shape_of
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Hats that stand for the shape (n_col, n_row, component) [Pa]
@@ -290,59 +274,10 @@ contains
     end associate
   end subroutine elastic_product
 
-  !> Compute the direction of the shear traction at the nodes in contact, and at those next to them.
-  pure function directions(shear, size_of, contact) result(direction)
-    !> Shear traction (n_col, n_row, direction) and its size [Pa]
-    real(wp), intent(in) :: shear(:, :, :), size_of(:, :)
-    !> Nodes in contact
-    logical, intent(in) :: contact(:, :)
-    real(wp) :: direction(size(shear, 1), size(shear, 2), 2)
-    real(wp) :: total(2)
-    integer :: col, row, k
-
-    do k = 1, 2
-      direction(:, :, k) = merge(shear(:, :, k)/max(size_of, tiny(1.0_wp)), 0.0_wp, contact)
-    end do
-    do row = 1, size(contact, 2)
-      do col = 1, size(contact, 1)
-        if (contact(col, row)) cycle
-        total = 0.0_wp
-        do k = 1, size(neighbors, 2)
-          associate (at => [col, row] + neighbors(:, k))
-            if (any(at < 1 .or. at > shape(contact))) cycle
-            if (contact(at(1), at(2))) total = total + shear(at(1), at(2), :)/max(size_of(at(1), at(2)), tiny(1.0_wp))
-          end associate
-        end do
-        if (any(abs(total) > 0.0_wp)) direction(col, row, :) = total/norm2(total)
-      end do
-    end do
-  end function directions
-
-  !> Compute what the shape has beyond the hats at a point: pressure and shear traction [Pa], (I16).
-  pure function beyond_hats(self, point, n) result(more)
-    class(edge_shape_t), intent(in) :: self
-    !> x and y [m]
-    real(wp), intent(in) :: point(2)
-    !> Number of components, 1 or 3
-    integer, intent(in) :: n
-    real(wp) :: more(n), shear
-    integer :: k
-
-    associate (at => self%lattice)
-      more(1) = interpolate_pressure(at, self%pressure, self%squares, point) - interpolate(at, self%pressure, point, 0.0_wp)
-      if (n == 1) return
-      shear = interpolate(at, self%friction, point, 0.0_wp)*more(1) &
-              - interpolate_pressure(at, self%reserve, self%stick_squares, point) + interpolate(at, self%reserve, point, 0.0_wp)
-      do k = 2, n
-        more(k) = shear*interpolate(at, self%direction(:, :, k - 1), point, 0.0_wp)
-      end do
-    end associate
-  end function beyond_hats
-
   !> Return whether a triangle at a node may have squares.
   pure logical function near_edge(shape_of, col, row, n)
     !> The shape
-    type(edge_shape_t), intent(in) :: shape_of
+    type(traction_field_t), intent(in) :: shape_of
     !> Column and row, counted from 1
     integer, intent(in) :: col, row
     !> Number of components

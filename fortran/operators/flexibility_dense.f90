@@ -99,17 +99,24 @@ contains
     integer(long), parameter :: buffers = 5500000
     !> Vectors of a node in contact with friction: rows and columns of its unknowns, 2.5 as a rule, and ten directions of GMRES
     integer(long), parameter :: vectors = 1800
-    integer(long) :: n, n_window, n_first
+    !> Pages at the ends of columns of which half is touched, and fifths of the bytes for a pair of nodes: the complement of the
+    !> sliding nodes is the larger one of unlike materials
+    integer(long), parameter :: pages(2) = [6500, 8700], fifths(2) = [21, 24]
+    integer(long) :: n, n_window
+    logical :: slides
 
     n = n_contact
     n_window = int(extent(1), long)*extent(2)
     dense_memory = buffers + 8*n_block*4*n_window
-    n_first = min(7*n/5, n_window) ! the first guess is larger than the contact
     if (normal_only) then
-      dense_memory = dense_memory + 8*n_first**2/2 ! half of the matrix is touched
+      ! the first guess is larger than the contact; half of the matrix is touched
+      dense_memory = dense_memory + 8*min(7*n/5, n_window)**2/2
     else
-      ! in single precision; then the complement of the sliding nodes and its factor, often of half the nodes
-      dense_memory = dense_memory + fft_memory(extent, .false., 1, unlike) + 4*n_first**2/2 + 2*n**2 + vectors*n
+      slides = .true.
+      if (present(unlike)) slides = unlike
+      ! with those of the coarse lattice; in single precision the factor, and the complement of the sliding nodes, half touched
+      dense_memory = dense_memory + 2*n_block*4*n_window + 5*fft_memory(extent, .false., 1, unlike)/4 &
+                     + merge(fifths(2), fifths(1), slides)*n**2/5 + (vectors + merge(pages(2), pages(1), slides))*n
     end if
   end function dense_memory
 

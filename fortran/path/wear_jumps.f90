@@ -10,7 +10,7 @@
 !>
 !> Equations: docs/theory/wear.md, (V1) to (V4).
 module hc_wear_jumps
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_options, only: step_options_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t
@@ -19,7 +19,7 @@ module hc_wear_jumps
   implicit none
   private
 
-  public :: archard_depth, wear_by, jump_change
+  public :: archard_depth, wear_by, jump_change, expect_end, remember_end
 
 contains
 
@@ -84,5 +84,50 @@ contains
                                                               /(normal_self_compliance(lattice, pair)*p_max)
     end associate
   end subroutine jump_change
+
+  !> Expect the end of a load step of the next cycle, to start it from: the end in the cycle before, extrapolated linearly in the
+  !> cycles. Given the load step before it, whose end is known by now, the pressure is the one there and what should
+  !> change between the two, since an error of the extrapolation is about the same for both. The shear traction, which
+  !> turns round in a cycle, is the extrapolated one.
+  pure subroutine expect_end(last, ahead, expected, traction, pressure, expected_before)
+    !> Pressure and tractions along x and y at the end of the load step (n, 3) [Pa], and their rates by cycle (n, 3)
+    real(sp), intent(in) :: last(:, :, :)
+    !> Cycles since then
+    real(wp), intent(in) :: ahead
+    !> Extrapolated pressure [Pa]
+    real(sp), intent(out) :: expected(:)
+    !> Pressure and tractions to start from (n, 3) [Pa]
+    real(wp), intent(out) :: traction(:, :)
+    !> Pressure at the end of the load step before, and the extrapolated one there [Pa]
+    real(wp), intent(in), optional :: pressure(:)
+    real(sp), intent(in), optional :: expected_before(:)
+    real(sp) :: cycles
+    integer :: i
+
+    cycles = real(ahead, sp)
+    do i = 1, size(traction, 1)
+      traction(i, :) = last(i, :, 1)
+      if (last(i, 1, 1) > 0.0_sp) traction(i, :) = last(i, :, 1) + cycles*last(i, :, 2)
+      expected(i) = max(real(traction(i, 1), sp), 0.0_sp)
+      traction(i, 1) = expected(i)
+      if (.not. present(pressure)) cycle
+      traction(i, 1) = max(pressure(i) + (traction(i, 1) - expected_before(i)), 0.0_wp)
+      if (.not. traction(i, 1) > 0.0_wp) traction(i, :) = 0.0_wp
+    end do
+  end subroutine expect_end
+
+  !> Remember tractions at the end of a load step, and how they have changed since the cycle before.
+  pure subroutine remember_end(traction, passed, last)
+    !> Pressure and tractions along x and y (n, 3) [Pa]
+    real(wp), intent(in) :: traction(:, :)
+    !> Cycles since those at hand were found, 0: never
+    real(wp), intent(in) :: passed
+    !> Tractions and their rates by cycle, as in `expect_end`
+    real(sp), intent(inout) :: last(:, :, :)
+
+    last(:, :, 2) = 0.0_sp
+    if (passed > 0.0_wp) last(:, :, 2) = real((traction - last(:, :, 1))/passed, sp)
+    last(:, :, 1) = real(traction, sp)
+  end subroutine remember_end
 
 end module hc_wear_jumps

@@ -15,12 +15,13 @@ module hc_f2py_edges
   use hc_lattice, only: lattice_t, new_lattice
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_edge_tractions, only: correct_at_edges, edge_tractions_memory
+  use hc_traction_field, only: traction_field_t, new_traction_field, field_of_arrays
   use hc_zone_edge, only: zone_edge_t, zone_mesh_t, cut_triangles
   implicit none
   private
 
-  public :: count_cut_triangles, edge_of_zone, mesh_of_zone, distances_of_zone, pressure_squares, tractions_to_edges, &
-            memory_of_edges
+  public :: count_cut_triangles, edge_of_zone, mesh_of_zone, distances_of_zone, tractions_to_edges, memory_of_edges, &
+            field_of_tractions, tractions_at_points, tractions_at_nodes
 
 contains
 
@@ -87,31 +88,97 @@ contains
     call report(error, code, message)
   end subroutine edge_of_zone
 
-  !> Return squares of the pressure near the edge of the contact, good to interpolate.
-  subroutine pressure_squares(n_col, n_row, basis, fields, zones, squares, code, message)
+  !> Set up the tractions between the nodes, for `tractions_at_points` and `tractions_at_nodes`.
+  subroutine field_of_tractions(n_col, n_row, basis, gap, zones, traction, limits, limited, n_part, parts, code, message)
     !f2py threadsafe
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
-    !> Basis vectors as columns [m]
-    real(c_double), intent(in) :: basis(2, 2)
-    !> Pressure, gap, reserve of friction; nodes in contact, that can touch, that stick
-    real(c_double), intent(in) :: fields(n_col, n_row, 3)
+    !> Basis vectors as columns, gap [m]
+    real(c_double), intent(in) :: basis(2, 2), gap(n_col, n_row)
+    !> Nodes in contact, that can touch, that stick
     integer(c_int), intent(in) :: zones(n_col, n_row, 3)
-    !> Squares; NaN away from the edge [Pa^2]
-    real(c_double), intent(out) :: squares(n_col, n_row)
+    !> Pressure and shear traction [Pa]
+    real(c_double), intent(in) :: traction(n_col, n_row, 3)
+    !> Coefficient of friction, and bound of the shear traction [Pa]
+    real(c_double), intent(in) :: limits(n_col, n_row, 2)
+    !> Not zero: these are known
+    integer(c_int), intent(in) :: limited
+    !> Number of arrays: 5, or 13 with limits
+    integer(c_int), intent(in) :: n_part
+    !> The field as arrays
+    real(c_double), intent(out) :: parts(n_col, n_row, n_part)
     !> Status and its message
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
     type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
     type(contact_edges_t) :: edges
+    type(traction_field_t) :: field
 
-    squares = 0.0_c_double
-    call set_edges(basis, [0.0_c_double, 0.0_c_double], fields, zones, edges, error)
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
     if (.not. allocated(error)) then
-      squares = edges%squares()
+      call new_contact_edges(edges, lattice, traction(:, :, 1), gap, zones(:, :, 1) /= 0, zones(:, :, 2) /= 0)
+      if (limited /= 0) then
+        call new_traction_field(field, lattice, edges, traction, zones(:, :, 1) /= 0, zones(:, :, 3) /= 0, limits(:, :, 1), &
+                                limits(:, :, 2))
+      else
+        call new_traction_field(field, lattice, edges, traction, zones(:, :, 1) /= 0, zones(:, :, 3) /= 0)
+      end if
+      call field%arrays(parts)
+    else
+      parts = 0.0_c_double
     end if
     call report(error, code, message)
-  end subroutine pressure_squares
+  end subroutine field_of_tractions
+
+  !> Return pressure and shear traction at points.
+  subroutine tractions_at_points(n_col, n_row, n_part, basis, start, parts, n, x, y, found, code, message)
+    !f2py threadsafe
+    !> Number of columns, rows and arrays
+    integer(c_int), intent(in) :: n_col, n_row, n_part
+    !> Basis vectors as columns, position of the first node [m]
+    real(c_double), intent(in) :: basis(2, 2), start(2)
+    !> The field, see `field_of_tractions`
+    real(c_double), intent(in) :: parts(n_col, n_row, n_part)
+    !> Number of points
+    integer(c_int), intent(in) :: n
+    !> Points [m]
+    real(c_double), intent(in) :: x(n), y(n)
+    !> Pressure and shear traction there [Pa]
+    real(c_double), intent(out) :: found(3, n)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+    type(traction_field_t) :: field
+    integer :: i
+
+    found = 0.0_c_double
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
+    if (.not. allocated(error)) then
+      call field_of_arrays(field, lattice, parts, n_part > 5)
+      do i = 1, n
+        found(:, i) = field%at([x(i), y(i)])
+      end do
+    end if
+    call report(error, code, message)
+  end subroutine tractions_at_points
+
+  !> Return pressure and shear traction at all nodes.
+  subroutine tractions_at_nodes(n_col, n_row, n_part, parts, found)
+    !f2py threadsafe
+    !> Number of columns, rows and arrays
+    integer(c_int), intent(in) :: n_col, n_row, n_part
+    !> The field, see `field_of_tractions`
+    real(c_double), intent(in) :: parts(n_col, n_row, n_part)
+    !> Pressure and shear traction [Pa]
+    real(c_double), intent(out) :: found(n_col, n_row, 3)
+    type(traction_field_t) :: field
+
+    call field_of_arrays(field, lattice_t(), parts, n_part > 5)
+    found = field%at_nodes()
+  end subroutine tractions_at_nodes
 
   !> Correct tractions at the edges of the contact and of the stick area.
   subroutine tractions_to_edges(n_col, n_row, basis, lambda, gap, zones, friction, traction, threads, corrected, code, message)

@@ -23,8 +23,8 @@ module hc_f2py_friction
 
   public :: create_frictional_contact, set_guess, advance_friction, record_steps, relative_displacement, friction_memory_needed
 
-  !> The method of explicit matrices and LAPACK; any other number means FFT.
-  integer, parameter :: direct = 0
+  !> Methods: FFT; explicit matrices and LAPACK with the iteration of the dissertation; 0: with Newton's.
+  integer, parameter :: fft_based = 1, as_written = 2
   !> Bytes of its fields over the nodes; matrices are checked where they are allocated
   integer(c_int64_t), parameter :: dense_fields = 500
   !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path,
@@ -39,7 +39,7 @@ contains
 
   !> Count the bytes that a problem takes while a step is solved.
   subroutine friction_memory_needed(method, extent, n_contact, n_force, coupled, unlike, n_threads, bytes)
-    !> 0: direct (LAPACK), else FFT
+    !> 0: direct (LAPACK), 1: FFT, 2: direct with the iteration of the dissertation
     integer(c_int), intent(in) :: method
     !> Number of columns and rows of the window
     integer(c_int), intent(in) :: extent(2)
@@ -54,7 +54,7 @@ contains
     !> Bytes
     integer(c_int64_t), intent(out) :: bytes
 
-    if (method == direct) then
+    if (method /= fft_based) then
       bytes = dense_memory(extent, n_contact, normal_only=.false., unlike=unlike /= 0)
     else
       bytes = windowed_friction_memory(extent, n_contact, n_force, coupled /= 0, n_threads, unlike /= 0)
@@ -65,7 +65,7 @@ contains
   subroutine create_frictional_contact(method, basis, first, extent, origin, lambda, n_node, initial_gap, candidate, &
                                        n_coefficient, coefficient, law, interface, goodman, n_threads, handle, code, &
                                        message)
-    !> 0: direct (LAPACK), else FFT
+    !> 0: direct (LAPACK), 1: FFT, 2: direct with the iteration of the dissertation
     integer(c_int), intent(in) :: method
     !> Basis vectors as columns [m]
     real(c_double), intent(in) :: basis(2, 2)
@@ -111,7 +111,7 @@ contains
       slot%space = space_over(extent, n_threads)
       bytes = dense_fields*product(int(extent, c_int64_t))
       ! of the largest contact there can be, with all loads prescribed
-      if (method /= direct) bytes = windowed_friction_memory(extent, n_node, n_load, goodman == 0, slot%space%threads, &
+      if (method == fft_based) bytes = windowed_friction_memory(extent, n_node, n_load, goodman == 0, slot%space%threads, &
                                                                 abs(lambda(2)) > 0.0_c_double)
       call secure(slot, bytes, n_threads, error)
     end if
@@ -121,9 +121,10 @@ contains
                                 reshape(candidate /= 0, extent), friction, goodman /= 0, error, normal_law_of(interface))
     end if
     if (.not. allocated(error)) then
-      if (method == direct) then
+      if (method /= fft_based) then
         allocate (dense)
         slot%solver => dense
+        problem%options%direct%as_written = method == as_written
         call new_direct_friction(dense, problem, error)
       else
         allocate (fft)

@@ -9,7 +9,7 @@ module hc_f2py_measures
   use hc_elastic_pair, only: material_t, find_bulk_strain
   use hc_field_space, only: field_space_t
   use hc_lattice, only: lattice_t, new_lattice
-  use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
+  use hc_interpolation, only: interpolate, nearest_node
   use hc_zone_estimators, only: boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, &
     edge_ellipse, circle_fit_t, ellipse_t
   use hc_friction_law, only: friction_law_t
@@ -22,7 +22,7 @@ module hc_f2py_measures
 
   public :: zone_boundary, circle_of_zone, radius_of_area, radius_of_pressure, center_of_pressure, ellipse_of_zone
   public :: ellipse_of_pressure, turns_of_history, cycles_of_history
-  public :: field_between_nodes, pressure_between_nodes, nodes_next_to, errors_of_limits, unresolved_slip_zones
+  public :: field_between_nodes, nodes_next_to, errors_of_limits, unresolved_slip_zones
   public :: nodal_residuals, measures_of_state
   public :: strain_of_bulk
 
@@ -156,34 +156,6 @@ contains
     if (.not. allocated(error)) found = [(interpolate(lattice, values, [x(i), y(i)], outside), i=1, n)]
     call report(error, code, message)
   end subroutine field_between_nodes
-
-  !> Interpolate the pressure at points, like a square root at the edge of the contact.
-  subroutine pressure_between_nodes(n_col, n_row, basis, start, pressure, squares, n, x, y, found, code, message)
-    !f2py threadsafe
-    !> Number of columns and rows
-    integer(c_int), intent(in) :: n_col, n_row
-    !> Basis vectors as columns, position of the first node [m]
-    real(c_double), intent(in) :: basis(2, 2), start(2)
-    !> Pressure [Pa], and its squares near the edge [Pa^2]
-    real(c_double), intent(in) :: pressure(n_col, n_row), squares(n_col, n_row)
-    !> Number of points
-    integer(c_int), intent(in) :: n
-    !> Points [m]
-    real(c_double), intent(in) :: x(n), y(n)
-    !> Pressure there [Pa]
-    real(c_double), intent(out) :: found(n)
-    !> Status and its message
-    integer(c_int), intent(out) :: code
-    character(len=512), intent(out) :: message
-    type(error_t), allocatable :: error
-    type(lattice_t) :: lattice
-    integer :: i
-
-    found = 0.0_c_double
-    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
-    if (.not. allocated(error)) found = [(interpolate_pressure(lattice, pressure, squares, [x(i), y(i)]), i=1, n)]
-    call report(error, code, message)
-  end subroutine pressure_between_nodes
 
   !> Find the nodes next to points.
   subroutine nodes_next_to(basis, start, extent, n, x, y, col, row, inside, code, message)

@@ -1,15 +1,15 @@
 !> Wear by fretting cycles for Python: flat procedures for f2py, no mathematics.
 module hc_f2py_wear
-  use iso_c_binding, only: c_double, c_int
+  use iso_c_binding, only: c_double, c_float, c_int
   use hc_error, only: error_t
   use hc_f2py_handles, only: report, pair_of
   use hc_lattice, only: lattice_t, new_lattice
   use hc_step_error, only: step_change_t
-  use hc_wear_jumps, only: archard_depth, wear_by, jump_change
+  use hc_wear_jumps, only: archard_depth, wear_by, jump_change, expect_end, remember_end
   implicit none
   private
 
-  public :: depth_of_energy, wear_of_cycles, change_by_jump
+  public :: depth_of_energy, wear_of_cycles, change_by_jump, expected_end, remembered_end
 
 contains
 
@@ -89,5 +89,47 @@ contains
     end if
     call report(error, code, message)
   end subroutine change_by_jump
+
+  !> Expect the end of a load step of the next cycle.
+  subroutine expected_end(n_node, last, ahead, follows, pressure, expected, traction)
+    !f2py threadsafe
+    !> Number of nodes
+    integer(c_int), intent(in) :: n_node
+    !> Pressure and tractions along x and y when the step was solved last [Pa], and their rates by cycle
+    real(c_float), intent(in) :: last(n_node, 3, 2)
+    !> Cycles since then
+    real(c_double), intent(in) :: ahead
+    !> Not zero: `pressure` and `expected` are those of the load step before
+    integer(c_int), intent(in) :: follows
+    !> Pressure at the end of the load step before [Pa]
+    real(c_double), intent(in) :: pressure(n_node)
+    !> Pressure that was expected there; then the one that is expected of this step [Pa]
+    real(c_float), intent(inout) :: expected(n_node)
+    !> Tractions to start from [Pa]
+    real(c_double), intent(out) :: traction(n_node, 3)
+    real(c_float) :: before(n_node)
+
+    before = expected
+    if (follows /= 0) then
+      call expect_end(last, ahead, expected, traction, pressure, before)
+    else
+      call expect_end(last, ahead, expected, traction)
+    end if
+  end subroutine expected_end
+
+  !> Remember the end of a load step in single precision, with its change since the cycle before.
+  subroutine remembered_end(n_node, pressure, traction_x, traction_y, passed, last)
+    !f2py threadsafe
+    !> Number of nodes
+    integer(c_int), intent(in) :: n_node
+    !> Pressure and tractions [Pa]
+    real(c_double), intent(in) :: pressure(n_node), traction_x(n_node), traction_y(n_node)
+    !> Cycles since those at hand were found, 0: never
+    real(c_double), intent(in) :: passed
+    !> Tractions and their rates by cycle [Pa]
+    real(c_float), intent(inout) :: last(n_node, 3, 2)
+
+    call remember_end(reshape([pressure, traction_x, traction_y], [n_node, 3]), passed, last)
+  end subroutine remembered_end
 
 end module hc_f2py_wear

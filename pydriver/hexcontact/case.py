@@ -68,7 +68,7 @@ class Case(Problem):
         Bound of the shear traction (Pa).
     bulk : mapping, optional
         Keys of [bulk]: which body carries the bulk stress of the loads.
-    algorithm, method, tolerance, coupling, entry, step_tolerance : optional
+    algorithm, method, iteration, tolerance, coupling, entry, step_tolerance : optional
         Keys of [solver].
     accuracy : float or mapping, optional
         Target of [accuracy], or all its keys: the lattice is refined until it is reached.
@@ -130,6 +130,7 @@ class Case(Problem):
         bulk: Mapping[str, Any] | None = None,
         algorithm: str | None = None,
         method: str | None = None,
+        iteration: str | None = None,
         tolerance: float | None = None,
         coupling: str | None = None,
         entry: str | None = None,

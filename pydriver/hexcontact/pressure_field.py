@@ -1,4 +1,5 @@
-"""The public name of the pressure between the nodes, of `hexcontact.result.interpolate`."""
+"""Public names of tractions between the nodes, see `hexcontact.Result.traction_field`."""
 
+from .core.edges import TractionField as TractionField
 from .core.interpolation import linear as linear
 from .result.interpolate import PressureField as PressureField

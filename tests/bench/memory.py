@@ -41,7 +41,7 @@ PROBLEMS = {
     "wear": "[friction]\ncoefficient = 0.3\n"
     '[wear]\ncoefficient_1 = 1e-14\ncycle = "cycle"\ncycles = 30\njump = 10\n',
 }
-LARGEST_DIRECT = 80  # nodes along a side
+LARGEST_DIRECT = 128  # nodes along a side
 
 
 class Memory(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,45 +13,91 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench import problems
-from bench.square_window import HertzContact, best_of, clock, main, peak_memory, shear_errors
+from bench.square_window import (
+    Array,
+    HertzContact,
+    best_of,
+    clock,
+    main,
+    peak_memory,
+    relative_difference,
+    shear_errors,
+)
 from hexcontact.core import kernel_cache
-from hexcontact.core.contact import ElasticPair, NormalContact
+from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
+from hexcontact.core.edges import ContactEdges
 from hexcontact.core.friction import FrictionalContact
 from hexcontact.core.lattice import Lattice
 
 
-def rhombic_window(side: int, fraction: float) -> tuple[Lattice, HertzContact]:
-    """Return side x side lattice nodes with a fraction of them in contact, contact radius 1."""
+def rhombic_window(
+    side: int, fraction: float, shift: Sequence[float] = (0.0, 0.0)
+) -> tuple[Lattice, HertzContact]:
+    """Return side x side lattice nodes with a fraction of them in contact, contact radius 1.
+
+    `shift` moves the nodes, in parts of the spacing along x and y.
+    """
     spacing = float(np.sqrt(np.pi / (fraction * side**2 * np.sqrt(3) / 2)))
-    lattice = Lattice(spacing, -(side // 2), -(side // 2), side, side)
+    origin = spacing * shift[0], spacing * shift[1]
+    lattice = Lattice(spacing, -(side // 2), -(side // 2), side, side, origin=origin)
     # K1(0) of the pyramid: 3 sqrt(3)/2 ln 3 spacings
     own = 1.5 * np.sqrt(3) * np.log(3) * spacing / np.pi
     return lattice, HertzContact(lattice.x, lattice.y, 1.0, lattice.cell_area, float(own))
 
 
-def hertz(side: int, fraction: float, tolerance: float, repeats: int, threads: int = 1) -> dict[str, Any]:
+def to_edges(
+    lattice: Lattice, solution: NormalSolution, shear: Sequence[Array] = (), mu: float = 0.0
+) -> Array:
+    """Return p, q_x and q_y at the nodes, to the edges."""
+    everywhere = np.ones(lattice.shape, dtype=bool)
+    zones = solution.zone > 0, everywhere
+    edges = ContactEdges(solution.pressure, solution.gap, *zones, lattice.basis, lattice.start)
+    limits = (mu, np.inf) if shear else None
+    return edges.field(np.stack(shear) if shear else None, solution.zone == 1, limits).at_nodes()
+
+
+def hertz(
+    side: int,
+    fraction: float,
+    tolerance: float,
+    repeats: int,
+    threads: int = 1,
+    shift: Sequence[float] = (0.0, 0.0),
+) -> dict[str, Any]:
     """Frictionless, from nothing each time."""
-    lattice, contact = rhombic_window(side, fraction)
+    lattice, contact = rhombic_window(side, fraction, shift)
     pair = ElasticPair(1 / np.pi, 0.0, 0.0)
     gap = contact.gap
     setup, problem = best_of(repeats, lambda: NormalContact(lattice, pair, gap, threads=threads))
     solve, solution = best_of(repeats, lambda: problem.solve(normal_load=contact.load, tolerance=tolerance))
     if not solution.converged:
         raise RuntimeError(f"not converged, R_n = {solution.residual_normal:.1e}")
+    correct, shown = best_of(repeats, lambda: to_edges(lattice, solution))
+    errors = contact.errors(solution.pressure, solution.gap, solution.approach)
     return {
         "setup": setup,
         "solve": solve,
         "iterations": solution.sweeps,
         "products": 3 * solution.operator_applications,
-        **contact.errors(solution.pressure, solution.gap, solution.approach),
+        "correct": correct,
+        "l2_to_edges": relative_difference(shown[0], contact.pressure),
+        "l2_nodes": errors["l2_pressure"],
+        **errors,
     }
 
 
 def cattaneo_mindlin(
-    side: int, fraction: float, tolerance: float, repeats: int, mu: float, share: float, poisson_ratio: float
+    side: int,
+    fraction: float,
+    tolerance: float,
+    repeats: int,
+    mu: float,
+    share: float,
+    poisson_ratio: float,
+    shift: Sequence[float] = (0.0, 0.0),
 ) -> dict[str, Any]:
     """Press, then shear, both by force; alike bodies of that Poisson's ratio."""
-    lattice, contact = rhombic_window(side, fraction)
+    lattice, contact = rhombic_window(side, fraction, shift)
     pair = ElasticPair(1 / np.pi, 0.0, poisson_ratio / (1 - poisson_ratio) / np.pi)
     setup, problem = best_of(
         1, lambda: FrictionalContact(lattice, pair, contact.gap, friction_coefficient=mu, threads=1)
@@ -66,13 +113,21 @@ def cattaneo_mindlin(
     )
     if not sheared.converged:
         raise RuntimeError(f"not converged, R_t = {sheared.residual_tangential:.1e}")
+    tractions = sheared.traction_x, sheared.traction_y
+    correct, shown = best_of(repeats, lambda: to_edges(lattice, sheared, tractions, mu))
+    errors, better = (
+        shear_errors(contact, sheared.zone == 1, q, mu, share) for q in (tractions[0], shown[1])
+    )
     return {
         "setup": setup,
         "press": press,
         "shear": shear,
         "iterations": sheared.sweeps,
         "residual": sheared.residual_tangential,
-        **shear_errors(contact, sheared.zone == 1, sheared.traction_x, mu, share),
+        "correct": correct,
+        "l2_to_edges": better["l2_traction"],
+        "l2_nodes": errors["l2_traction"],
+        **errors,
     }
 
 

@@ -25,7 +25,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from bench import counts, machine, peers, profiling, report, speed
+from bench import accuracy, counts, machine, peers, profiling, report, speed
 
 ROOT = Path(__file__).parents[2]
 STORE = ROOT / "build" / "bench" / "results.json"
@@ -46,6 +46,7 @@ def main() -> int:
         "operator": partial(speed.operator, program, quick=quick, sizes=sizes),
         "solves": partial(speed.solves, program, quick=quick, sizes=sizes),
         "setups": partial(speed.setups, quick=quick, sizes=sizes),
+        "accuracy": partial(accuracy.measure, quick=quick, sizes=sizes),
         "peers": partial(peers.measure, options.peers, quick=quick, sizes=sizes, names=options.codes),
         "command": partial(speed.command, quick=quick),
         "direct": partial(speed.direct, quick=quick),
@@ -87,7 +88,9 @@ def parse() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--only", type=words, help="sections: counts,operator,solves,setups,peers,command,direct,profile"
+        "--only",
+        type=words,
+        help="sections: counts,operator,solves,setups,accuracy,peers,command,direct,profile",
     )
     parser.add_argument("--sizes", type=numbers, help="nodes on a side of the windows that are timed")
     parser.add_argument("--meshes", type=numbers, help="spacings in the contact radius for the counts")

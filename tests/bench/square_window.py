@@ -13,7 +13,7 @@ import re
 import resource
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,11 +74,14 @@ def relative_difference(values: Array, exact: Array) -> float:
     return float(np.linalg.norm(values - exact) / np.linalg.norm(exact))
 
 
-def square_window(n: int, fraction: float) -> HertzContact:
-    """Return the problem on n x n square cells of a window of side 1, a `fraction` of it in contact."""
+def square_window(n: int, fraction: float, shift: Sequence[float] = (0.0, 0.0)) -> HertzContact:
+    """Return the problem on n x n square cells of a window of side 1, a `fraction` of it in contact.
+
+    `shift` moves the cells, in parts of one along x and y.
+    """
     h = 1.0 / n
     middle = (np.arange(n) + 0.5) * h - 0.5
-    x, y = np.meshgrid(middle, middle, indexing="ij")
+    x, y = np.meshgrid(middle + shift[0] * h, middle + shift[1] * h, indexing="ij")
     # uniform pressure 1 on a square, at its center (Love)
     own = 4 * np.log(1 + np.sqrt(2)) * h / np.pi
     return HertzContact(x, y, float(np.sqrt(fraction / np.pi)), h * h, float(own))

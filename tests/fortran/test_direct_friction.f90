@@ -8,17 +8,19 @@ module test_direct_friction
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
-    stick, slip, normal, along_x, along_y, about_z
+    stick, slip, normal, along_x, along_y, about_z, no_progress
   use hc_coulomb, only: coulomb_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_solver, only: friction_solver_t
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact, exchange
   use hc_block_cholesky, only: solve_blocks
-  use hc_direct_friction, only: direct_friction_t, new_direct_friction, ring
+  use hc_direct_friction, only: direct_friction_t, new_direct_friction
+  use hc_direct_iterate, only: ring
   use hc_area_factors, only: area_factors_t
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_lapack, only: dposv
+  use hc_options, only: direct_options_t
   use testing, only: test_t, new_test, check, check_true, largest
   implicit none
   private
@@ -52,6 +54,7 @@ contains
       new_test('units', test_units), &
       new_test('strong_coupling', test_strong_coupling), &
       new_test('methods_agree', test_methods_agree), &
+      new_test('as_written', test_as_written), &
       new_test('gross_sliding', test_gross_sliding), &
       new_test('nothing_touches', test_nothing_touches), &
       new_test('few_nodes', test_few_nodes), &
@@ -230,18 +233,17 @@ contains
     call check_true(error, .not. solved, 'first block not positive definite')
   end subroutine test_blocks
 
-  !> Factors of an area, and of one in which few nodes changed: they invert the matrix of equal shear compliances to single
-  !> precision, and most rows are those of the first area.
+  !> Factors of an area, of one with other zones in which nodes have come and gone, and of one that has lost a node of the core:
+  !> they invert the matrix of equal shear compliances to single precision, and the rows of the first serve the second.
   subroutine test_kept_factors(error)
     type(error_t), allocatable, intent(out) :: error
-    integer, parameter :: side = 15, n = 120
+    integer, parameter :: side = 15
     real(wp), parameter :: shear = 1.3_wp
     type(lattice_t) :: lattice
     type(dense_flexibility_t) :: flexibility
     type(area_factors_t) :: factors
-    real(wp) :: unit, key(side**2), across(2, side**2), spring(side**2)
-    integer :: try, i, n_stuck(3)
-    logical :: done
+    real(wp) :: unit, across(2, side**2), spring(side**2)
+    integer :: i
 
     call new_lattice(lattice, equilateral_basis(0.1_wp), [0, 0], [side, side], error)
     if (allocated(error)) return
@@ -249,59 +251,65 @@ contains
     if (allocated(error)) return
     unit = maxval(flexibility%normal_influence([1], 1))
     call random_number(spring)
-    key = [(1.0_wp - real(i, wp)/n, i=1, side**2)]
     across(1, :) = cos([(0.1_wp*i, i=1, side**2)])
     across(2, :) = sin([(0.1_wp*i, i=1, side**2)])
-    n_stuck = [80, 75, 75]
-    do try = 1, 3
-      ! the third area has lost a node that stuck, early in the order
-      associate (s => n_stuck(try), first => merge(3, 1, try == 3))
-        call factors%factorize(flexibility, unit, shear, [(i, i=first, s)], key(first:s), [(i, i=s + 1, 100)], [(i, i=101, n)], &
-                               across(:, s + 1:100), spring(s + 1:100), done, error)
-        if (allocated(error)) return
-        call check_true(error, done, 'positive definite')
-        if (allocated(error)) return
-        call check_inverse(s - first + 1, 100 - s)
-        if (allocated(error)) return
-      end associate
-      if (try == 2) call check(error, factors%factorized, n + (n - 75), 'rows of both areas that were factorized')
-      if (allocated(error)) return
-    end do
-    call check(error, factors%wanted, 3*n - 2, 'rows of all areas')
+    call check_area([(i, i=1, 120)], [(i, i=1, 80)], 70, 120, 'first area')
+    if (allocated(error)) return
+    call check_area([(i, i=1, 115), (i, i=121, 124)], [(i, i=1, 75), 121], 60, 124, 'others come, go and slip')
+    if (allocated(error)) return
+    call check_area([(i, i=1, 115), (i, i=121, 124)], [(i, i=3, 75)], 60, 124 + 119, 'the core has lost a node')
+    if (allocated(error)) return
+    call check(error, factors%wanted, 120 + 2*119, 'rows of all areas')
 
   contains
 
     !> Solve for random displacements, and compare with LAPACK in double precision.
-    subroutine check_inverse(s, m)
-      !> Nodes that stick, and that slide
-      integer, intent(in) :: s, m
-      real(wp) :: k(size(factors%order), size(factors%order)), t(2*s + m, 2*s + m), x(2*s + m, 1), y(size(k, 1), 1)
-      real(wp) :: given(size(k, 1) + 2*s + m), found(size(given)), axis(2, 2*s + m)
-      integer :: place(2*s + m), a, b, info
+    subroutine check_area(contact, stuck, last_sure, factorized, what)
+      !> Nodes in contact, and those that stick; the others up to 100 slide
+      integer, intent(in) :: contact(:), stuck(:)
+      !> Last node that is of the core if L is made anew; rows that have been factorized by then
+      integer, intent(in) :: last_sure, factorized
+      character(len=*), intent(in) :: what
+      real(wp), allocatable :: k(:, :), t(:, :), x(:, :), y(:, :), given(:), found(:), axis(:, :)
+      integer, allocatable :: sliding(:), node(:)
+      integer :: a, b, n, s, info
+      logical :: done
 
-      do a = 1, size(k, 1)
-        k(:, a) = flexibility%normal_influence(factors%order, factors%order(a))/unit
+      sliding = pack(contact, contact <= 100 .and. [(all(stuck /= contact(a)), a=1, size(contact))])
+      n = size(contact)
+      s = size(stuck)
+      call factors%factorize(flexibility, unit, shear, direct_options_t(), contact, stuck, stuck <= last_sure, sliding, &
+                             across(:, sliding), spring(sliding), done, error)
+      if (allocated(error)) return
+      call check_true(error, done, what//': positive definite')
+      if (allocated(error)) return
+      call check(error, factors%factorized, factorized, what//': rows')
+      if (allocated(error)) return
+      node = [stuck, stuck, sliding]
+      allocate (k(n, n), t(size(node), size(node)), axis(2, size(node)), given(n + size(node)), found(n + size(node)))
+      do a = 1, n
+        k(:, a) = flexibility%normal_influence(contact, contact(a))/unit
       end do
-      place = [(a, a=1, s), (a, a=1, s), (s + a, a=1, m)]
       axis = 0.0_wp
       axis(1, :s) = 1.0_wp
       axis(2, s + 1:2*s) = 1.0_wp
-      axis(:, 2*s + 1:) = across(:, factors%order(s + 1:s + m))
-      do a = 1, size(t, 1)
-        do b = 1, size(t, 1)
-          t(b, a) = shear*k(place(b), place(a))*dot_product(axis(:, a), axis(:, b))
+      axis(:, 2*s + 1:) = across(:, sliding)
+      do a = 1, size(node)
+        t(:, a) = shear*flexibility%normal_influence(node, node(a))/unit
+        do b = 1, size(node)
+          t(b, a) = t(b, a)*dot_product(axis(:, a), axis(:, b))
         end do
-        if (a > 2*s) t(a, a) = t(a, a) + spring(factors%order(place(a)))
+        if (a > 2*s) t(a, a) = t(a, a) + spring(node(a))
       end do
       call random_number(given)
       call factors%apply(given, found)
-      y(:, 1) = given(:size(y))
-      x(:, 1) = given(size(y) + 1:)
-      call dposv('U', size(k, 1), 1, k, size(k, 1), y, size(k, 1), info)
-      call dposv('U', size(t, 1), 1, t, size(t, 1), x, size(t, 1), info)
+      y = reshape(given(:n), [n, 1])
+      x = reshape(given(n + 1:), [size(node), 1])
+      call dposv('U', n, 1, k, n, y, n, info)
+      call dposv('U', size(node), 1, t, size(node), x, size(node), info)
       ! condition 30, single precision
-      call check(error, found, [y(:, 1), x(:, 1)], 3.0e-5_wp*largest(found), 'unknowns')
-    end subroutine check_inverse
+      call check(error, found, [y(:, 1), x(:, 1)], 3.0e-5_wp*largest(found), what//': unknowns')
+    end subroutine check_area
 
   end subroutine test_kept_factors
 
@@ -658,12 +666,48 @@ contains
     call check(error, largest(state%slip_increment), 0.0_wp, 1.0e-9_wp, 'no motion, no slip')
   end subroutine test_strong_coupling
 
-  !> A history through both methods, solved to 1e-10: tractions to 1e-9 mu p_max, motions likewise.
+  !> The iteration as the dissertation writes it: with gamma = 0, where slip is parallel to the load, it ends where Newton's
+  !> does; with gamma > 0 directions stand, and it says so.
+  subroutine test_as_written(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(friction_problem_t) :: problem
+    type(direct_friction_t) :: newton, written
+    type(contact_state_t) :: start, one, other
+    real(wp), parameter :: gamma(2) = [0.0_wp, 0.49_wp], mu = 0.5_wp, value(4) = [load, 0.4_wp*mu*load, 0.0_wp, 0.0_wp]
+    integer :: i
+
+    do i = 1, 2
+      call sphere(problem, 12, 9, 0.0_wp, gamma(i), coulomb_t(mu), error)
+      if (allocated(error)) return
+      call new_direct_friction(newton, problem, error)
+      if (allocated(error)) return
+      problem%options%direct%as_written = .true.
+      call new_direct_friction(written, problem, error)
+      if (allocated(error)) return
+      one = contact_state_t()
+      other = contact_state_t()
+      call step(newton, one, [f, f, f, d], value, error)
+      if (allocated(error)) return
+      call new_friction_state(start, problem%lattice)
+      call written%solve_step(start, start%relative_displacement, load_target_t([f, f, f, d], value), tight, 40, other, error)
+      if (allocated(error)) return
+      call check_true(error, other%converged .eqv. i == 1, 'converged')
+      if (allocated(error)) return
+      call check(error, difference(one, other), 0.0_wp, merge(1.0e-9_wp, 0.05_wp*mu, i == 1), 'tractions')
+      if (allocated(error)) return
+    end do
+    call check_true(error, other%stopped == no_progress, 'zones and directions stand')
+    if (allocated(error)) return
+    call check(error, other%residual_normal, 0.0_wp, 1.0e-10_wp, 'alike bodies: the pressure does not feel it')
+  end subroutine test_as_written
+
+  !> A history through both methods, solved to 1e-10: tractions to 1e-9 mu p_max, motions likewise; with 650 nodes in contact it
+  !> starts from the coarse lattice.
   subroutine test_methods_agree(error)
     type(error_t), allocatable, intent(out) :: error
     type(friction_problem_t) :: problem
-    type(direct_friction_t) :: direct
-    type(frictional_contact_t) :: fft
+    type(direct_friction_t), allocatable :: direct
+    type(frictional_contact_t), allocatable :: fft
     type(contact_state_t) :: one, other
     real(wp), parameter :: mu = 0.3_wp
     real(wp), parameter :: value(4, 5) = reshape([ &
@@ -672,23 +716,29 @@ contains
       load, 0.2_wp, 0.1_wp, 0.0_wp, &
       0.9_wp*load, -0.1_wp, 0.2_wp, 0.02_wp, &
       1.1_wp*load, 0.0_wp, 0.0_wp, -0.04_wp], [4, 5])
-    integer :: i
+    integer :: i, a_nodes
 
-    call sphere(problem, 12, 9, -0.19_wp, 0.47_wp, coulomb_t(mu), error)
-    if (allocated(error)) return
-    call new_direct_friction(direct, problem, error)
-    if (allocated(error)) return
-    call new_frictional_contact(fft, problem, error)
-    if (allocated(error)) return
-    do i = 1, size(value, 2)
-      call step(direct, one, [f, f, f, f], value(:, i), error)
+    do a_nodes = 9, 15, 6
+      call sphere(problem, 4*a_nodes/3, a_nodes, -0.19_wp, 0.47_wp, coulomb_t(mu), error)
       if (allocated(error)) return
-      call step(fft, other, [f, f, f, f], value(:, i), error)
+      allocate (direct, fft)
+      call new_direct_friction(direct, problem, error)
       if (allocated(error)) return
-      call check(error, difference(one, other), 0.0_wp, 1.0e-9_wp*mu, 'tractions')
+      call new_frictional_contact(fft, problem, error)
       if (allocated(error)) return
-      call check(error, one%motion, other%motion, 1.0e-9_wp*mu, 'motions')
-      if (allocated(error)) return
+      do i = 1, size(value, 2)
+        call step(direct, one, [f, f, f, f], value(:, i), error)
+        if (allocated(error)) return
+        call step(fft, other, [f, f, f, f], value(:, i), error)
+        if (allocated(error)) return
+        call check(error, difference(one, other), 0.0_wp, 1.0e-9_wp*mu, 'tractions')
+        if (allocated(error)) return
+        call check(error, one%motion, other%motion, 1.0e-9_wp*mu, 'motions')
+        if (allocated(error)) return
+      end do
+      deallocate (direct, fft)
+      one = contact_state_t()
+      other = contact_state_t()
     end do
   end subroutine test_methods_agree
 

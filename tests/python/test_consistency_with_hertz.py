@@ -192,7 +192,7 @@ def test_flat_punch() -> None:
 
 @pytest.mark.parametrize("ratio", [1.0, 4.0])
 def test_the_error_of_the_approach_is_known(ratio: float) -> None:
-    """It is -l_e^2 (1/R_x + 1/R_y)/32 in the mean over places on the lattice (docs/theory/edges.md, (B6))."""
+    """It is -l_e^2 (1/R_x + 1/R_y)/32 in the mean over places on the lattice (docs/theory/edges.md, (B8))."""
     e_star = modulus(STEEL, RIGID)
     hertz = analytic.hertz_ellipse(e_star, np.diag([1 / (0.02 * ratio), 1 / 0.02]), normal_load=50.0)
     rng = np.random.default_rng(5)

@@ -413,7 +413,7 @@ def test_a_deck_with_every_key_written_out_is_the_same_case(text: str) -> None:
 def test_every_default_is_written(folder: Path) -> None:
     tables = tomllib.loads(written(Case.from_text(DECK + PRESS).deck))
     solver = {"method": "auto", "tolerance": 1e-8, "coupling": "full", "entry": "implicit"}
-    assert tables["solver"] == {**solver, "step_tolerance": 0.01}
+    assert tables["solver"] == {**solver, "iteration": "newton", "step_tolerance": 0.01}
     assert tables["output"] == {"every": 1}
     assert tables["grid"] == {"nodes_in_radius": 8.0, "extent": "auto", "origin": [0.0, 0.0]}
     assert tables["load"] == [{"normal_load": 10.0, "ramp": "linear", "label": ""}]

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 from hexcontact import Case, open_result
 from hexcontact.cli.app import app
+from hexcontact.result.interpolate import with_shown
 from hexcontact.result.journal import journal_of
 from hexcontact.result.mesh import triangles
 from hexcontact.result.step import Step
@@ -74,7 +75,8 @@ def test_series_lists_the_steps_that_were_kept(folder: Path, tmp_path: Path) -> 
 
 def test_vtk_file_holds_the_step(folder: Path, tmp_path: Path) -> None:
     assert export(folder / "sheared.nc", "--vtk", "-s", "4", "-o", tmp_path)[0] == 0
-    read, data = meshio.read(tmp_path / "sheared_0004.vtu"), open_result(folder / "sheared.nc").step(4)
+    read, result = meshio.read(tmp_path / "sheared_0004.vtu"), open_result(folder / "sheared.nc")
+    data = with_shown(result.step(4), result.lattice)
     np.testing.assert_array_equal(read.points[:, 0], data.x.values.ravel())
     np.testing.assert_array_equal(read.points[:, 1], data.y.values.ravel())
     np.testing.assert_array_equal(read.cells_dict["triangle"], triangles(*data.x.shape))
@@ -196,8 +198,9 @@ def test_fields_on_a_mesh(folder: Path, tmp_path: Path) -> None:
     own = open_result(folder / "sheared.nc")
     with xarray.open_dataset(tmp_path / "sheared_ugrid.nc") as data:
         assert data.step.values.tolist() == [2, 4, 5]
+        shown = with_shown(own.step(4), own.lattice)
         for name in ("pressure", "zone", "traction_x"):
-            np.testing.assert_array_equal(data[name].sel(step=4), own.step(4)[name].values.ravel())
+            np.testing.assert_array_equal(data[name].sel(step=4), shown[name].values.ravel())
         assert data.initial_gap.dims == ("mesh_node",)
 
 
@@ -205,7 +208,7 @@ def test_fields_on_a_mesh(folder: Path, tmp_path: Path) -> None:
 
 
 def test_history_and_fields_as_tables(folder: Path, tmp_path: Path) -> None:
-    code, out, _ = export(folder / "sheared.nc", "--csv", "-s", "4", "-o", tmp_path)
+    code, out, _ = export(folder / "sheared.nc", "--csv", "-s", "4", "--source", "nodes", "-o", tmp_path)
     assert code == 0 and len(out.splitlines()) == 2
     own = open_result(folder / "sheared.nc")
     history = pd.read_csv(tmp_path / "sheared_history.csv", index_col="step")

@@ -110,7 +110,8 @@ def test_along_a_row_the_corners_are_the_nodes() -> None:
 
 def test_a_profile_of_a_result(result: Result, tmp_path: Path) -> None:
     a = float(result.contact_radius[-1])
-    found = result.profile("pressure", "traction_x", start=(-2 * a, 0.1 * a), end=(a, 0.2 * a))
+    ends = {"start": (-2 * a, 0.1 * a), "end": (a, 0.2 * a)}
+    found = result.profile("pressure", "traction_x", **ends, source="nodes")
     assert set(found.data_vars) == {"pressure", "traction_x"}
     assert found.pressure.attrs["units"] == "Pa"
     assert found.attrs["step"] == 4
@@ -118,7 +119,9 @@ def test_a_profile_of_a_result(result: Result, tmp_path: Path) -> None:
     data = result.step(4).pressure.values
     expected = [hats(result.lattice, data, float(x), float(y)) for x, y in zip(found.x, found.y, strict=True)]
     assert_allclose(found.pressure.values, expected, atol=1e-8 * data.max())
-    assert_allclose(found.pressure.values, result.at("pressure", found.x, found.y), rtol=1e-12)
+    assert_allclose(
+        found.pressure.values, result.at("pressure", found.x, found.y, source="nodes"), rtol=1e-12
+    )
     even = result.profile("pressure", start=(-a, 0.0), end=(a, 0.0), points=7)
     assert_allclose(np.diff(even.distance.values), a / 3)
 

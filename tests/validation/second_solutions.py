@@ -1,6 +1,8 @@
 """Search for second solutions of a load step with much friction between unlike bodies.
 
-python tests/validation/second_solutions.py [STARTS]    a table (a minute); default: 40 starts
+python tests/validation/second_solutions.py [STARTS [SPACINGS]]    a table (a minute)
+
+By default 40 starts, four spacings in the contact radius.
 
 One load applied at once to undeformed bodies, from many random starts (tractions anywhere in the cone, on
 random nodes, any rigid motions), by both methods. Solutions that differ by more than 1e-5 of the largest
@@ -24,7 +26,7 @@ from hexcontact.core.lattice import Lattice
 
 Array = NDArray[np.float64]
 
-SPACING, HALF = 0.25, 7  # of a sphere with E* = R = 1, P = 4/3, a = 1: four spacings in the radius
+REACH = 1.75  # of the window, over the contact radius of a sphere with E* = R = 1, P = 4/3, a = 1
 LOAD = 4 / 3
 APART, TOLERANCE = 1e-5, 1e-9
 METHODS: tuple[Literal["fft", "direct"], ...] = ("fft", "direct")
@@ -50,7 +52,9 @@ class Found:
     sweeps: set[int]
 
 
-def search(beta: float, friction: float, share: float, starts: int = 40, surface: str = "sphere") -> Found:
+def search(
+    beta: float, friction: float, share: float, starts: int = 40, surface: str = "sphere", spacings: int = 4
+) -> Found:
     """Solve one load from many starts.
 
     Parameters
@@ -61,16 +65,18 @@ def search(beta: float, friction: float, share: float, starts: int = 40, surface
         Random starts by each method.
     surface : str
         "sphere", or "bumps" for a rough one.
+    spacings : int
+        Lattice spacings in the radius.
     """
     random = np.random.default_rng(7)
-    side = 2 * HALF + 1
-    lattice = Lattice(SPACING, -HALF, -HALF, side, side)
+    spacing, half = 1 / spacings, round(REACH * spacings)
+    lattice = Lattice(spacing, -half, -half, 2 * half + 1, 2 * half + 1)
     lambda_1 = 1 / np.pi
     pair = ElasticPair(lambda_1, beta * lambda_1, max(0.0, min(0.4, 1 - 2 * abs(beta))) * lambda_1)
     gap = (lattice.x**2 + lattice.y**2) / 2
     if surface == "bumps":
         gap = gap + 0.2 * random.random(gap.shape)
-    inside = np.hypot(lattice.x, lattice.y) < (HALF - 0.5) * SPACING * np.sqrt(0.75)
+    inside = np.hypot(lattice.x, lattice.y) < (half - 0.5) * spacing * np.sqrt(0.75)
     target = [LOAD, share * min(friction, 1.0) * LOAD, 0.0, 0.0]
     control = ["force", "force", "force", "displacement"]
     solutions: list[ContactState] = []
@@ -123,14 +129,14 @@ def difference(one: ContactState, other: ContactState) -> float:
     )
 
 
-def main(starts: int = 40) -> None:
+def main(starts: int = 40, spacings: int = 4) -> None:
     """Print what is found over friction, mismatch, load and surface."""
     print("surface  beta   mu   mu|beta|  Q/muP  converged  solutions")
     for surface in ("sphere", "bumps"):
         for beta in (0.19, 0.3, 0.5):
             for friction in (0.3, 1.0, 3.0, 10.0):
                 for share in (0.0, 0.5):
-                    found = search(beta, friction, share, starts, surface)
+                    found = search(beta, friction, share, starts, surface, spacings)
                     print(
                         f"{surface:7s} {beta:5g} {friction:5g} {beta * friction:8.3g} {share:6g} "
                         f"{found.converged:5d}/{found.starts} {len(found.solutions):9d}",
@@ -140,4 +146,4 @@ def main(starts: int = 40) -> None:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 40)
+    main(*map(int, sys.argv[1:]))

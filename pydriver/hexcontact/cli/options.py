@@ -57,6 +57,17 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but er
 AsJson = Annotated[bool, flag("json", "Print one JSON object for programs, errors too; docs/running.md.")]
 
 
+Source = enum.StrEnum("Source", ["edges", "nodes"])
+"""Where pressure and shear traction come from."""
+
+Shown = Annotated[
+    Source | None,
+    typer.Option(
+        "--source", help="Tractions to the edges between the nodes (default if known), or as solved at nodes."
+    ),
+]
+
+
 LogLevel = enum.StrEnum("LogLevel", ["debug", "info", "warning", "error"])
 """Levels of a log."""
 

@@ -16,7 +16,7 @@ from ..errors import DeckError
 from ..files import MADE_BY, require_replaceable
 from ..text import did_you_mean, listed
 from .guard import command, print_output
-from .options import argument, beside, labels_of, output_to, steps_of, steps_option
+from .options import Shown, argument, beside, labels_of, output_to, steps_of, steps_option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,6 +102,7 @@ def plot(
     arrows: Annotated[
         Arrows | None, typer.Option(help="Arrows on zone maps: shear traction, or slip in the step.")
     ] = None,
+    source: Shown = None,
     output: Annotated[
         Path | None, output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE.")
     ] = None,
@@ -129,6 +130,7 @@ def plot(
         "through": None if through is None else point_of(through),
         "over": over,
         "arrows": None if arrows is None else arrows.value,
+        "source": None if source is None else source.value,
     }
     chosen = {name: value for name, value in given.items() if value is not None}
     if output and format:

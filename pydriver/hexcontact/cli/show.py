@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..errors import DeckError
 from .guard import Content, command, print_output
-from .options import AsJson, ResultFile, beside, flag, labels_of, output_to, steps_of, steps_option
+from .options import AsJson, ResultFile, Shown, beside, flag, labels_of, output_to, steps_of, steps_option
 
 
 @command("hexcontact info hertz_spheres.nc")
@@ -54,6 +54,7 @@ def export(
     step: Annotated[
         str | None, steps_option("Only these load steps, as 10,20 or 10-30 or a label; -1: the last.")
     ] = None,
+    source: Shown = None,
     output: Annotated[
         Path | None, output_to("Folder to write into; default: FILE_export beside FILE.")
     ] = None,
@@ -67,9 +68,9 @@ def export(
     result, folder = open_result(file), output or beside(file, "_export")
     stem = beside(file, "").name
     steps = None if step is None else steps_of(step, labels_of(result))
-    written = [write.to_vtk(result, folder, stem, steps)] if vtk else []
+    written = [write.to_vtk(result, folder, stem, steps, source)] if vtk else []
     written += write.volumes_to_vtk(result, folder, stem) if vtk else []
-    written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps)] if ugrid else []
-    written += write.to_csv(result, folder, stem, steps) if csv else []
+    written += [write.to_ugrid(result, folder / f"{stem}_ugrid.nc", steps, source)] if ugrid else []
+    written += write.to_csv(result, folder, stem, steps, source) if csv else []
     written += write.histories_to_csv(result, folder, stem) if histories else []
     print_output("\n".join(f"written: {path}" for path in written))

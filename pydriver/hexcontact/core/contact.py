@@ -18,6 +18,7 @@ from .lattice import Lattice
 _api = _core.hc_f2py_normal
 
 Method = Literal["direct", "fft"]
+Iteration = Literal["newton", "dissertation"]
 Interface = tuple[float, float, float]
 """Coefficient c (Pa/m^m) and exponent m of an interface, p = c (-gap)^m, and the stiffness (Pa/m) of its
 tangential springs, 0 without."""
@@ -25,6 +26,7 @@ UNILATERAL: Interface = (0.0, 0.0, 0.0)  # bodies that do not penetrate
 MOST_IN_CONTACT = 10**8  # largest number of nodes for estimates of memory, whose square does not overflow
 _SHAPE = " (rows, columns)"
 _METHODS = {"direct": 0, "fft": 1}
+_AS_WRITTEN = 2  # direct, with the iteration of the dissertation
 _STOPPED = (  # in the order of fortran/contact_state.f90
     "nothing was solved",
     "",  # converged
@@ -76,9 +78,14 @@ def checked_tolerance(tolerance: float) -> None:
     number(tolerance, "tolerance", "a number between 0 and 1", lambda found: 0 < found < 1)
 
 
-def method_code(name: str) -> int:
-    """Return the number of a method in the core."""
-    return _METHODS[word(name, "method", _METHODS)]
+def method_code(name: str, iteration: Iteration = "newton") -> int:
+    """Return the number of a method with its iteration in the core."""
+    code = _METHODS[word(name, "method", _METHODS)]
+    if word(iteration, "iteration", ("newton", "dissertation")) == "newton":
+        return code
+    if name != "direct":
+        raise DeckError(f'iteration = "{iteration}" needs method = "direct", not "{name}"')
+    return _AS_WRITTEN
 
 
 def thread_count(threads: int) -> int:

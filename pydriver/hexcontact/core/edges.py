@@ -7,18 +7,27 @@ Lattice arrays have shape (n_row, n_col).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
-from . import _core
+from . import _core, memory
 from .calls import called
 from .contact import ElasticPair
 from .estimators import Ellipse
 
 _api = _core.hc_f2py_edges
 
+_UNLIMITED, _LIMITED = 5, 13  # arrays of a traction field
+_GIVEN = 12  # arrays that it is made from, with copies and zones
+_LARGE = 250_000  # nodes from which their memory is checked
+_MARGIN = 6  # nodes about a contact from which its edge follows, at most, and one more
+
+_Part = tuple[slice, slice]
+Source = Literal["edges", "nodes"]
+Limits = tuple[Array | float, Array | float]
 _Zone = tuple[Array, NDArray[np.int32], bool]  # fields and zones of the core; whether it is the stick area
 
 
@@ -98,6 +107,68 @@ class ZoneMesh:
         return [np.append(polygon, polygon[:1], axis=0) for polygon in polygons]
 
 
+class TractionField:
+    """Pressure and shear traction of a contact over the plane.
+
+    They vanish like square roots at the edge of the contact, and the reserve of friction does at the edge of
+    the stick area, both between the nodes; elsewhere they are linear.
+
+    Parameters
+    ----------
+    parts : ndarray
+        The field as the core holds it.
+    basis : ndarray, shape (2, 2)
+        Basis vectors of the lattice as columns, m.
+    start : tuple of float
+        Position of its first node, m.
+    source : str
+        See below.
+    whole : tuple, optional
+        Shape of the window, and rows and columns of the field in it, if it is a part.
+
+    Attributes
+    ----------
+    source : str
+        ``"edges"``, or ``"nodes"``: the values of the solution at the nodes, joined linearly.
+    sheared : bool
+        Whether the shear traction goes to the edges, too; else it is that of the nodes.
+    """
+
+    def __init__(
+        self,
+        parts: Array,
+        basis: Array,
+        start: tuple[float, float],
+        source: Source = "edges",
+        whole: tuple[tuple[int, ...], _Part] | None = None,
+    ) -> None:
+        self._parts, self._basis, self._start, self._whole = parts, basis, start, whole
+        self.source, self.sheared = source, parts.shape[-1] == _LIMITED
+
+    @classmethod
+    def of_nodes(cls, tractions: Array, basis: Array, start: tuple[float, float]) -> Self:
+        """Return the field of p, q_x and q_y at the nodes, joined linearly; see `ContactEdges`."""
+        parts = np.stack([*tractions, tractions[0], np.full_like(tractions[0], np.nan)])
+        return cls(parts.T, basis.T, start, "nodes")
+
+    def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return p, q_x and q_y (Pa) at points (m), shape (3, ...); 0 outside the window."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        where = self._basis, self._start, self._parts
+        found = called(_api.tractions_at_points, *where, x.ravel(), y.ravel())
+        return np.asarray(found).reshape(3, *x.shape)
+
+    def at_nodes(self) -> Array:
+        """Return p, q_x and q_y (Pa) at the nodes, shape (3, n_row, n_col)."""
+        found = np.asarray(_api.tractions_at_nodes(self._parts).T)
+        if self._whole is None:
+            return found
+        shape, part = self._whole
+        whole = np.zeros((3, *shape))
+        whole[:, *part] = found
+        return whole
+
+
 class ContactEdges:
     """The edges of a contact and of the stick area in it.
 
@@ -170,14 +241,48 @@ class ContactEdges:
         """Return the distances of the nodes from the edge of the part that sticks, see `stick`."""
         return self._distances(self._zone(stick, reserve, True))
 
-    def squares(self) -> Array:
-        """Return squares of the pressure (Pa^2) for linear interpolation, shape (n_row, n_col).
+    def field(
+        self, shear: Array | None = None, stick: Mask | None = None, limits: Limits | None = None
+    ) -> TractionField:
+        """Return pressure and shear traction between the nodes, to the edges.
 
-        At nodes in contact the layer of the lattice next to the edge is subtracted; beyond the edge the
-        squares are negative. They are NaN away from the edge, and where it is unknown.
+        Parameters
+        ----------
+        shear : ndarray, shape (2, n_row, n_col), optional
+            Shear traction along x and y, Pa.
+        stick : ndarray of bool, shape (n_row, n_col), optional
+            Nodes that stick, all in contact.
+        limits : tuple of array_like, optional
+            Finite coefficient of friction, and bound of the shear traction (Pa); by default they are unknown,
+            and the shear traction is linear between the nodes.
         """
-        fields, zones, _ = self._whole()
-        return np.asarray(called(_api.pressure_squares, self._basis, fields, zones).T)
+        part = self._around_contact()
+        limited = not (shear is None or stick is None or limits is None)
+        count = _LIMITED if limited else _UNLIMITED
+        none = np.zeros(self._zones[0][part].shape)
+        if none.size > _LARGE:
+            needed = 8 * none.size * (_GIVEN + 2 * count)
+            memory.require(needed, "the tractions to the edges", 'choose source = "nodes"')
+        pressure, gap, touching, candidate = (given[part] for given in (*self._fields, *self._zones))
+        along = (none, none) if shear is None else (component[part] for component in shear)
+        zones = np.stack([touching, candidate, none if stick is None else stick[part]]).astype(np.int32)
+        known = [
+            none + (np.asarray(limit)[part] if np.ndim(limit) else limit) for limit in limits or (0.0, 0.0)
+        ]
+        parts = called(
+            *(_api.field_of_tractions, self._basis, gap.T, zones.T, np.stack([pressure, *along]).T),
+            *(np.minimum(known, np.finfo(float).max).T, limited, count),
+        )
+        x, y = self._start + self._basis @ [part[1].start, part[0].start]
+        return TractionField(parts, self._basis, (float(x), float(y)), whole=(self._zones[0].shape, part))
+
+    def _around_contact(self) -> _Part:
+        """Return rows and columns of the contact and of the nodes about it, beyond which there is nothing."""
+        places = [np.flatnonzero(self._zones[0].any(axis=axis)) for axis in (1, 0)]
+        if not places[0].size:
+            return slice(0, 1), slice(0, 1)
+        rows, cols = (slice(max(k[0] - _MARGIN, 0), k[-1] + 1 + _MARGIN) for k in places)
+        return rows, cols
 
     def tractions(self, shear: Array, stick: Mask, friction: Array, pair: ElasticPair) -> Array:
         """Return pressure and shear tractions corrected at the edges of the contact and of the stick area.

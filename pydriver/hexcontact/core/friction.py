@@ -21,6 +21,7 @@ from .contact import (
     Contact,
     ElasticPair,
     Interface,
+    Iteration,
     Method,
     NormalSolution,
     checked_field,
@@ -77,6 +78,12 @@ class FrictionLaw:
         most = np.finfo(float).max
         law = [min(self.shear_limit, most), self.power, self.ratio, self.angle]
         return np.minimum(np.ravel(self.coefficient), most), law
+
+    @property
+    def limits(self) -> tuple[float | Array, float] | None:
+        """Finite coefficient and bound, if the limit is min(mu p, bound) in each direction; else None."""
+        plain = self.power == self.ratio == 1.0 and bool(np.isfinite(self.coefficient).all())
+        return (self.coefficient, self.shear_limit) if plain else None
 
     def bound_at(self, row: int, col: int, pressure: float, traction: tuple[float, float]) -> float:
         """Return the largest traction of a node in the direction of a given one (Pa)."""
@@ -178,6 +185,8 @@ class FrictionalContact(Contact):
         ``"full"``, or ``"goodman"``: shear tractions do not move the pressure.
     method
         ``"fft"``: conjugate gradients on convolutions; ``"direct"``: active sets on LAPACK solves.
+    iteration
+        Of the direct method: ``"newton"``, or ``"dissertation"``, as it is written there, for comparison.
     threads
         Threads to use; 0: the default of OpenMP.
     interface
@@ -199,6 +208,7 @@ class FrictionalContact(Contact):
         shear_limit: float = math.inf,
         coupling: Coupling = "full",
         method: Method = "fft",
+        iteration: Iteration = "newton",
         threads: int = 0,
         interface: Interface = UNILATERAL,
         rim_warning: bool = True,
@@ -208,7 +218,7 @@ class FrictionalContact(Contact):
         word(coupling, "coupling", ("full", "goodman"))
         self._create(
             _api.create_frictional_contact,
-            *(method_code(method), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
+            *(method_code(method, iteration), lattice.basis.T, lattice.first, lattice.extent, lattice.origin),
             *self._surfaces,
             *law.as_arguments(),
             checked_interface(interface),

@@ -53,13 +53,6 @@ def nearest(
     return np.where(inside, values[row, col], outside).astype(float).reshape(np.shape(x))
 
 
-def pressure_between(
-    pressure: Array, squares: Array, basis: Array, start: Point, x: ArrayLike, y: ArrayLike
-) -> Array:
-    """Return the pressure (Pa) at points: the root of its squares, itself where those are NaN."""
-    return _at_points(_api.pressure_between_nodes, basis, start, (pressure.T, squares.T), x, y)
-
-
 def section_ends(
     lattice: Lattice, pressure: Array, angle: float, through: Point | None
 ) -> tuple[Point, Point, float]:

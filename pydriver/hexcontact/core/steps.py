@@ -25,6 +25,7 @@ LEAST = 1e-3
 """Smallest adaptive load step, as a part of its segment."""
 
 _FIELDS = ("pressure", "gap", "traction_x", "traction_y")
+_TRACTIONS = ("pressure", "traction_x", "traction_y")
 
 
 class Change(NamedTuple):
@@ -137,6 +138,46 @@ def worn(
     mu = np.broadcast_to(friction.coefficient, lattice.shape)
     found = _wear.wear_of_cycles(energy.T, coefficient, mu.T, cycles, lattice.cell_area, depth.T)
     return np.ascontiguousarray(found[0].T), float(found[1]), float(found[2])
+
+
+def expected_end(
+    last: Array, ahead: float, before: Array | None = None, pressure: Array | None = None
+) -> tuple[Array, Array]:
+    """Expect the end of a load step of the next cycle of wear, to start it from.
+
+    Parameters
+    ----------
+    last : ndarray of float32, (2, 3, n_row, n_col)
+        Tractions when the load step was solved last (Pa), and their rates by cycle.
+    ahead : float
+        Cycles since then.
+    before, pressure : ndarray, (n_row, n_col)
+        Pressure that was expected at the end of the load step before, and that at its end (Pa).
+
+    Returns
+    -------
+    tractions : ndarray, (3, n_row, n_col)
+        Pressure and tractions along x and y (Pa).
+    expected : ndarray of float32, (n_row, n_col)
+        The pressure without the correction by the load step before.
+    """
+    shape = last.shape[2:]
+    follows = before is not None and pressure is not None
+    expected = np.zeros(shape, np.float32) if before is None else before.copy()
+    known = np.zeros(shape) if pressure is None else pressure
+    tractions = _wear.expected_end(_columns(last), ahead, follows, known.ravel(), expected.reshape(-1))
+    return tractions.T.reshape(3, *shape), expected
+
+
+def remember_end(state: ContactState, passed: float, last: Array) -> None:
+    """Put the tractions of a state, and their change by cycle since `passed` cycles, in the place of `last`."""
+    tractions = (getattr(state, name).ravel() for name in _TRACTIONS)
+    _wear.remembered_end(*tractions, passed, _columns(last))
+
+
+def _columns(fields: Array) -> Array:
+    """Return fields as Fortran has them, in the same memory."""
+    return fields.reshape(*fields.shape[:-2], -1).T
 
 
 def change_by_jump(

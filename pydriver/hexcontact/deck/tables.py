@@ -41,6 +41,7 @@ from .wear import Wear
 
 ALGORITHMS = ("frictionless", "static", "incremental")
 METHODS = ("auto", "direct", "fft")
+ITERATIONS = ("newton", "dissertation")
 FINENESS = ("spacing", "nodes_across", "nodes_in_radius")
 
 YoungModulus = Annotated[float, Quantity(PRESSURE, above=0)]
@@ -170,6 +171,11 @@ class Solver(Table):
         "auto",
         "direct: LAPACK on the matrix of the contact; fft: matrix-free; "
         "auto: fft, but direct on a small window without friction",
+    )
+    iteration: Annotated[str, Word(ITERATIONS)] = meaning(
+        "newton",
+        'of method = "direct" with friction; dissertation: as it is written there, which mostly '
+        "misses the tolerance (for comparison)",
     )
     tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-14, at_most=0.1)] = meaning(
         1e-8, "bound on every residual at the end of every load step", "1e-10"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from ..arrays import has_entries, integer
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stage, cycle_of
 from ..deck.faults import NOWHERE
-from ..errors import DeckError
+from ..errors import DeckError, PathWarning
 from ..variables import INTERFACE
 from .fatigue import SLIPS, histories, parameters_below, tabulated
 from .region import region
@@ -21,6 +22,8 @@ from .stress import EDGES, LOADED, TRACTIONS, below, bodies_of, nodal_tractions
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
+
+_FEW_STEPS = 8  # load steps of a cycle below which extremes in time, and paths of the shear, may be missed
 
 
 class BelowSurface(ABC):
@@ -118,6 +121,14 @@ class BelowSurface(ABC):
         constants = {key: given.pop(key) for key in [*given] if key in Criteria.model_fields}
         criteria = Criteria.parse({"parameters": parameters, **constants}, NOWHERE)
         numbers = self.cycle_steps(segment, steps)
+        if steps is None and len(numbers) < _FEW_STEPS:
+            warnings.warn(
+                f"fatigue: the cycle {segment!r} has only {len(numbers)} load steps, between which extremes and "
+                f"phases are lost: give its segments more steps, at least {_FEW_STEPS} in all, or with adaptive "
+                "steps a smaller solver.step_tolerance",
+                PathWarning,
+                stacklevel=2,
+            )
         loaded = self._loaded(numbers, SLIPS if "ruiz" in parameters else (), edges=True)
         where = given or Fatigue.default_region
         bodies, friction = bodies_of(self.deck), self._friction

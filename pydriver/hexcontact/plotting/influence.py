@@ -76,7 +76,7 @@ def _map(canvas: Figure, axes: Axes, x: Array, y: Array, value: Array) -> None:
     axes.contour(x, y, value, levels=levels[1:-1:2], colors="black", linewidths=0.25, linestyles="solid")
     axes.plot(np.cos(_HEXAGON), np.sin(_HEXAGON), color="black" if signed else "white", lw=0.8)
     axes.set_aspect("equal")
-    bar = canvas.colorbar(drawn, ax=axes, shrink=0.8, pad=0.02)
+    bar = canvas.colorbar(drawn, cax=axes.inset_axes((1.04, 0.0, 0.05, 1.0)))  # as high as the map
     bar.locator = matplotlib.ticker.MaxNLocator(5)
     bar.update_ticks()
     bar.ax.tick_params(labelsize=7)
@@ -85,6 +85,7 @@ def _map(canvas: Figure, axes: Axes, x: Array, y: Array, value: Array) -> None:
 # --- elements -------------------------------------------------------------------------------------
 
 
+_LABEL = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
 _HALF = (1, 2, 6)  # elements of Figure 5.5; their mirror images complete the pyramid
 
 
@@ -108,7 +109,7 @@ def load_elements(poisson_ratio: float = 0.3) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    canvas = new_figure(9.6, 5.4)
+    canvas = new_figure(9.6, 4.5)
     solid = (True, False, True, True, False, False, False, False)
     panels = [canvas.add_subplot(2, 4, k + 1, projection="3d" if solid[k] else None) for k in range(8)]
     everything = (1, 2, 3, 4, 5, 6)
@@ -153,13 +154,13 @@ def _draw_solid(axes: Any, numbers: tuple[int, ...], along: str) -> None:
         axes.plot_trisurf(*top.T, triangles=[[0, 1, 2]], color=COMPUTED, alpha=0.35, lw=0.8, edgecolor="0.2")
         axes.plot(*np.vstack([foot, foot[:1]]).T, color="0.4", lw=0.6, ls="--")
         middle = corners.mean(axis=0)
-        axes.text(*(1.45 * middle), 0.0, str(number), ha="center", va="center", fontsize=8)
+        axes.text(*(1.5 * middle), 0.0, str(number), ha="center", va="center", fontsize=7, bbox=_LABEL)
         if along:
             axes.quiver(*middle, 1 / 3, 0.35, 0.0, 0.0, color=EXACT, lw=1.2, arrow_length_ratio=0.4)
         else:
             axes.quiver(*middle, 0.75, 0.0, 0.0, -0.4, color=EXACT, lw=1.2, arrow_length_ratio=0.35)
     axes.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0), zlim=(0.0, 1.0), xticks=[], yticks=[], zticks=[])
-    axes.set_box_aspect((2.0, 2.0, 1.0), zoom=1.35)
+    axes.set_box_aspect((2.0, 2.0, 1.0), zoom=1.5)
     axes.view_init(elev=32.0, azim=-70.0)
     axes.set_xlabel("x", labelpad=-14)
     axes.set_ylabel("y", labelpad=-14)
@@ -200,7 +201,7 @@ def load_models(nodes: int = 9) -> Figure:
         "(a) forces $a\\,p_i$ (7.3a)",
         "(b) constant between nodes (7.3b)",
         "(c) continuous, and smooth in gray (7.3c, d)",
-        f"(d) overlapping triangles and their sum (7.4)\n(7.2): area {100 * sums:+.1f} % off",
+        f"(d) overlapping triangles and their sum (7.4)\narea by (7.2): {-100 * sums:.1f} % too small",
     )
     for axes, title in zip(panels, titles, strict=True):
         axes.set(title=title, xlim=(-1.15, 1.15), ylim=(0.0, 1.1))
@@ -272,7 +273,8 @@ def _draw_errors(axes: Axes, a: int) -> None:
     x = np.linspace(0.0, 0.9, 721)
     for name, look in LOOKS.items():
         error = 100 * displacement_errors(name, a, x * a, 0.0)
-        axes.plot(x, error, **look, zorder=1 if name == "point force" else 2)
+        infinite = name == "point force"  # at each node: behind the others, and thin
+        axes.plot(x, error, **look, zorder=2 - infinite, **({"lw": 0.7} if infinite else {}))
     axes.axhline(0.0, color=GUIDE, lw=0.6, zorder=0)
     axes.set(title="error of $u_z$ inside the contact", xlabel="$x/a$", ylabel="error (% of the approach)")
     axes.set(xlim=(0.0, 0.9), ylim=(-0.25, 0.25))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
@@ -11,10 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import TriMesh
 from matplotlib.figure import Figure, FigureBase
-from matplotlib.tri import Triangulation
+from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefiner
 
 from ..arrays import Array
 from ..core.edges import ZoneMesh
+from ..core.interpolation import linear
 from ..result.result import Result
 from ..result.view import StepView
 from ..text import scaled
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 
 DRAWN_NODES = 60_000  # above this number, fields are drawn from every second, third, ... node
+_DIVIDED = 30_000, 8_000  # triangles up to which each is cut into four, into sixteen
 _WITH_ARROWS = 9  # maps in a picture up to which arrows are visible
 
 
@@ -47,6 +49,25 @@ def mesh_of(view: StepView, values: Array, vanishes: bool) -> ZoneMesh:
     return view.edges(stride).contact_mesh(values[::stride, ::stride], vanishes)
 
 
+def finer(mesh: ZoneMesh, view: StepView, field: Callable[[Array, Array], Array]) -> ZoneMesh:
+    """Return a mesh with smaller triangles, and a traction there, which is curved near edges.
+
+    Where the contact ends at nodes that can never touch, and in contacts of many nodes, it stays as it is.
+    """
+    depth = next((depth for depth, most in enumerate(_DIVIDED, 1) if mesh.triangles.shape[0] > most), 3) - 1
+    if not (depth and mesh.triangles.size and view.tractions.source == "edges"):
+        return mesh
+    coarse = Triangulation(mesh.x, mesh.y, mesh.triangles)
+    fine = UniformTriRefiner(coarse).refine_triangulation(subdiv=depth)
+    values = field(fine.x, fine.y)
+    cannot = 1.0 - np.isfinite(view.field("gap"))
+    beside = linear(cannot, view.basis, view.start, fine.x, fine.y, 1.0) > 0.0
+    if beside.any():
+        joined = LinearTriInterpolator(coarse, mesh.values)(fine.x[beside], fine.y[beside])
+        values[beside] = np.ma.filled(joined, 0.0)
+    return ZoneMesh(fine.x, fine.y, values, fine.triangles)
+
+
 # --- the fields -----------------------------------------------------------------------------------
 
 
@@ -60,9 +81,15 @@ class _Field:
     vector: tuple[str, str] | None = None
 
     def values(self, view: StepView, name: str) -> Array:
-        if self.vector is None:
-            return view.pressure if name == "pressure" else view.field(name)
-        return np.asarray(np.hypot(*(view.field(part) for part in self.vector)))
+        """Return the field at the nodes."""
+        return self._joined([view.shown(part) for part in self.vector or (name,)])
+
+    def at(self, view: StepView, name: str, x: Array, y: Array) -> Array:
+        """Return the field at points (m)."""
+        return self._joined([view.at(x, y, part) for part in self.vector or (name,)])
+
+    def _joined(self, parts: Sequence[Array]) -> Array:
+        return parts[0] if self.vector is None else np.asarray(np.hypot(*parts))
 
 
 _FIELDS = {
@@ -124,6 +151,8 @@ def draw_field(
     shades: TriMesh | None = None
     for axes, view, field_values in zip(panels, views, values, strict=True):
         mesh = mesh_of(view, field_values, field.unit == "Pa")
+        if field.unit == "Pa":
+            mesh = finer(mesh, view, partial(field.at, view, name))
         if not mesh.triangles.size:
             axes.text(0.5, 0.5, "no contact", transform=axes.transAxes, ha="center", va="center")
         else:
@@ -136,7 +165,7 @@ def draw_field(
             )
             shades.set_clim(-largest * factor if signed else 0.0, (largest or 1.0) * factor)
         if arrows and field.vector is not None:
-            vector = view.field(field.vector[0]), view.field(field.vector[1])
+            vector = view.shown(field.vector[0]), view.shown(field.vector[1])
             part.arrows(axes, view, vector, "white", ARROWS if len(panels) == 1 else FEWER_ARROWS)
         if view.hertz is not None:
             part.outline(axes, view.hertz, view.center, label="Hertz contact area", lw=1.0)
@@ -159,8 +188,9 @@ def field_map(
     steps: int | Sequence[int] = -1,
     with_arrows: bool | None = None,
     ax: Axes | None = None,
+    source: str | None = None,
 ) -> Figure:
-    """Draw a field over the contact area, linear on the triangles of the lattice as in the solver.
+    """Draw a field over the contact area: tractions to the edges, others linear between the nodes.
 
     Parameters
     ----------
@@ -174,6 +204,8 @@ def field_map(
         Whether vectors are also drawn as arrows; by default if there are few maps.
     ax : matplotlib.axes.Axes, optional
         Axes to draw into; by default those of a new figure.
+    source : {"edges", "nodes"}, optional
+        Where tractions come from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -186,7 +218,7 @@ def field_map(
     ValueError
         If the field of that step was not kept, or does not exist without friction.
     """
-    views, labels, title = views_of(result, steps)
+    views, labels, title = views_of(result, steps, source)
     single = len(views) == 1
     part = Part.around(views)
     canvas, panels = map_panels(part, labels, ax)
@@ -200,9 +232,12 @@ def field_map(
 
 @figure("pressure", _FIELDS["pressure"].help)
 def pressure_field(
-    result: Result | xarray.Dataset, steps: int | Sequence[int] = -1, ax: Axes | None = None
+    result: Result | xarray.Dataset,
+    steps: int | Sequence[int] = -1,
+    ax: Axes | None = None,
+    source: str | None = None,
 ) -> Figure:
-    """Draw the contact pressure, linear on the triangles of the lattice as in the solver.
+    """Draw the contact pressure.
 
     Parameters
     ----------
@@ -212,6 +247,8 @@ def pressure_field(
         Numbers of the load steps, from 1; -1 is the last one.
     ax : matplotlib.axes.Axes, optional
         Axes to draw into; by default those of a new figure.
+    source : {"edges", "nodes"}, optional
+        Where it comes from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -224,7 +261,7 @@ def pressure_field(
     ValueError
         If the pressure of that step was not kept.
     """
-    return field_map("pressure", result, steps, ax=ax)
+    return field_map("pressure", result, steps, ax=ax, source=source)
 
 
 for _name, _field in _FIELDS.items():

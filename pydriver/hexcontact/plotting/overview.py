@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @figure("overview", "pressure and a section; with friction shear, zones", first=True)
-def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
+def overview(result: Result | xarray.Dataset, step: int = -1, source: str | None = None) -> Figure:
     """Draw maps, a section and the history of a load step.
 
     Without friction: the pressure over the plane and along x; with friction also the shear traction, the
@@ -35,6 +35,8 @@ def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
         Output of `Case.run` or `open_result`.
     step : int
         Number of the load step, from 1; -1 is the last one.
+    source : {"edges", "nodes"}, optional
+        Where tractions come from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -47,7 +49,7 @@ def overview(result: Result | xarray.Dataset, step: int = -1) -> Figure:
     ValueError
         If the pressure of that step was not kept.
     """
-    view = StepView.of(result, step)
+    view = StepView.of(result, step, source)
     with_friction = view.friction != 0.0 and {"traction_x", "traction_y", "zone"} <= set(view.data)
     canvas = _frictional(dataset_of(result), view) if with_friction else _frictionless(view)
     set_title(canvas, view.title)

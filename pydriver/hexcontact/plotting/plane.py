@@ -155,11 +155,13 @@ def step_label(view: StepView) -> str:
     return f"step {view.number}, $Q/\\mu P$ = {load / bound:.2f}".replace("-", "−")
 
 
-def views_of(results: Results, steps: int | Sequence[int]) -> tuple[list[StepView], list[str], str]:
+def views_of(
+    results: Results, steps: int | Sequence[int], source: str | None = None
+) -> tuple[list[StepView], list[str], str]:
     """Return views of steps of one or several results, a label for each, and the title of the figure."""
     several = as_list(results)
     chosen = [steps] if isinstance(steps, int) else list(steps)
-    views = [StepView.of(result, step) for result in several for step in chosen]
+    views = [StepView.of(result, step, source) for result in several for step in chosen]
     titles = [title_of(dataset_of(result)) for result in several]
     if len(set(titles)) < len(titles) and all(getattr(result, "path", "") for result in several):
         titles = [Path(cast("Result", result).path).stem for result in several]

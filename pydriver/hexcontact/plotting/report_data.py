@@ -14,6 +14,7 @@ import matplotlib
 import numpy as np
 
 from ..arrays import Array, Mask
+from ..interior.stress import TRACTIONS
 from ..result.history import step_rows
 from ..result.raster import Plane, png_of
 from ..result.result import Result
@@ -124,7 +125,8 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
         for title, names in known.items():
             entry, slip = shown[title], VARIABLES[names[0]].units == "m"
             values = [np.nan_to_num(view.data[name].values) for name in names]
-            size = np.sqrt(sum(view.at(*plane.points, component) ** 2 for component in values))
+            parts = [_at(view, *plane.points, name) for name in names]
+            size = np.sqrt(sum(component**2 for component in parts))
             if slip:  # not zero at the edge: nodes beyond it do not count
                 size = size / weight
             largest = float(np.sqrt(sum(component**2 for component in values))[view.contact].max(initial=0.0))
@@ -133,7 +135,7 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
             entry["images"].append(_gray(size, largest, contact))
             entry["max"].append(largest)
             if len(names) == 2:
-                entry["arrows"].append(_arrows(view, part.limits, values, largest) if largest else [])
+                entry["arrows"].append(_arrows(view, part.limits, names, largest) if largest else [])
         if view.friction and "zone" in view.data:
             zone = np.where(view.sticks(*fine.points), 1, 2) * view.touches(*fine.points)
             zones.append(png_of(zone.astype("u1")))
@@ -155,12 +157,17 @@ def maps_of(result: Result, numbers: Sequence[int]) -> dict[str, Any]:
     }
 
 
+def _at(view: StepView, x: Array, y: Array, name: str) -> Array:
+    """Return a field at points, 0 where it was not kept."""
+    return view.at(x, y, name if name in TRACTIONS else np.nan_to_num(view.data[name].values))
+
+
 def _gray(values: Array, largest: float, contact: Mask) -> str:
     shades = np.zeros(values.shape) if largest == 0.0 else np.clip(values / largest, 0.0, 1.0)
     return png_of(np.where(contact, 1 + np.round(254 * shades), 0).astype("u1"))
 
 
-def _arrows(view: StepView, limits: Limits, components: Sequence[Array], largest: float) -> list[int]:
+def _arrows(view: StepView, limits: Limits, names: Sequence[str], largest: float) -> list[int]:
     """Return arrows on a triangular pattern, four whole numbers for each.
 
     These are x and y in thousandths of the map from its upper left corner, and the components in percent of
@@ -174,7 +181,7 @@ def _arrows(view: StepView, limits: Limits, components: Sequence[Array], largest
     y = np.asarray(0.5 * (y0 + y1) + 0.866 * pitch * j, dtype=np.float64)
     inside = (x > x0) & (x < x1) & (y > y0) & (y < y1)
     x, y = x[inside], y[inside]
-    u, v = (view.at(x, y, part) for part in components)
+    u, v = (_at(view, x, y, name) for name in names)
     size = np.hypot(u, v)
     seen = (view.at(x, y) > 0.0) & (size > 0.03 * largest)
     if not seen.any():
@@ -190,7 +197,7 @@ def _section(view: StepView, x: Array, y: Array) -> dict[str, Array]:
     mu = view.friction
     if mu != 0.0 and {"traction_x", "traction_y"} <= set(view.data):
         for axis in "xy":
-            curves[f"q_{axis}"] = view.at(x, y, np.nan_to_num(view.data[f"traction_{axis}"].values))
+            curves[f"q_{axis}"] = view.at(x, y, f"traction_{axis}")
         if math.isfinite(mu):
             curves["μp"] = mu * curves["p"]
             curves["−μp"] = -curves["μp"]

@@ -43,7 +43,7 @@ _SIDES = {(False, True): r"$\mu p$", (True, False): r"$-\mu p$", (True, True): r
 _COMPARED = 10  # steps up to which closed solutions are drawn
 _JOINED: dict[str, Any] = {"ls": "-", "lw": 1.1}  # curves of several steps
 _THIN: dict[str, Any] = {"color": "black", "ls": (0, (4, 3)), "lw": 0.7}  # closed solutions with them
-_FINER = 8  # points between nodes where the line misses them, since closed solutions are curved
+_FINER = 8  # points along a spacing where values are joined, since tractions are curved at edges
 
 
 def line_of(views: Iterable[StepView], angle: float, through: Point | None = None) -> Line:
@@ -69,10 +69,11 @@ class Cut:
     angle : float
         Its direction from x, rad.
     place : ndarray
-        Distances (m) from its start at which values are drawn: of the nodes if enough lie on the line, else
-        of its crossings with lattice lines, between which fields are linear, and of points between them.
+        Distances (m) from its start at which values are drawn: of the nodes if enough lie on the line, but
+        not too many, and of one step; else of its crossings with lattice lines, between which fields are
+        linear away from edges, and of points between them.
     at_nodes : bool
-        Whether the places are nodes.
+        Whether the places are nodes, drawn as circles.
     through : tuple of float, optional
         Given point of the line, m.
     """
@@ -90,12 +91,13 @@ class Cut:
         corners = line.corners(lattice)
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
         nodes = corners[(abs(index - np.round(index)) < 1e-6).all(axis=1)]
-        at_nodes = nodes.size > 0.4 * (corners.size - 2)  # at multiples of 30 degrees
+        on_nodes = nodes.size > 0.4 * (corners.size - 2)  # at multiples of 30 degrees
+        at_nodes = on_nodes and nodes.size < _APART and len(views) == 1
         between = np.arange(0.0, line.length, lattice.spacing / _FINER)
         return cls(line, angle, nodes if at_nodes else np.union1d(corners, between), at_nodes, through)
 
-    def values(self, view: StepView, field: Array | None = None) -> Array:
-        """Return the pressure, or a field, at `place`."""
+    def values(self, view: StepView, field: str | Array = "pressure") -> Array:
+        """Return a field, see `StepView.at`, at `place`."""
         return view.at(*self.line.points(self.place), field)
 
     def hertz(self, view: StepView, place: Array) -> Array:
@@ -151,7 +153,9 @@ class Cut:
 
     def tractions(self, view: StepView) -> tuple[Array, Array]:
         """Return the shear traction along and across the line."""
-        parts = (self.values(view, view.field(f"traction_{axis}")) for axis in "xy")
+        for axis in "xy":
+            view.field(f"traction_{axis}")  # an error if it was not kept
+        parts = (self.values(view, f"traction_{axis}") for axis in "xy")
         return self.components(*parts)
 
     def exact_tractions(self, exact: PartialSlip) -> tuple[Array, Array]:
@@ -166,7 +170,7 @@ class Cut:
     @property
     def few(self) -> bool:
         """Whether nodes are distinguishable."""
-        return self.at_nodes and self.place.size < _APART
+        return self.at_nodes
 
     def look(self) -> dict[str, Any]:
         """Return the style of values: circles at nodes if they are distinguishable."""
@@ -220,11 +224,12 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
 
     bottom.axhline(0.0, color=GUIDE, lw=0.7)
     dots = {"marker": "o" if cut.few else "", "ms": 2.5}
-    draw_difference(cut.values(view), color=COMPUTED, label="as solved", **dots)
-    if view.pressure_field is not None:
-        squares: dict[str, Any] = {"marker": "s" if cut.few else "", "mfc": "none", "ms": 3.5}
-        to_edge = view.pressure_field(*cut.line.points(cut.place))
-        draw_difference(to_edge, color=THIRD, label="to the edge", **squares)
+    squares: dict[str, Any] = {"marker": "s" if cut.few else "", "mfc": "none", "ms": 3.5}
+    edges = view.tractions.source == "edges"
+    color = THIRD if edges else COMPUTED
+    draw_difference(cut.values(view, view.pressure), color=color, label="as solved", **squares)
+    if edges:
+        draw_difference(cut.values(view), color=COMPUTED, label="to the edge", **dots)
         bottom.legend(fontsize=8, ncols=2, loc="lower center", handlelength=1.2)
     bottom.set_ylabel(f"{'error' if view.hertz_holds else 'difference'}\n(% of $p_0$)")
     cut.show(bottom)
@@ -237,6 +242,7 @@ def section(
     angle: float = 0.0,
     through: Point | None = None,
     ax: Axes | None = None,
+    source: str | None = None,
 ) -> Figure:
     """Draw the pressure along a line through the contact, with Hertz if the initial gap is quadratic.
 
@@ -252,6 +258,8 @@ def section(
         A point of the line, m; by default the node nearest to the center.
     ax : matplotlib.axes.Axes, optional
         Axes for the pressure, without its difference from Hertz; by default those of a new figure.
+    source : {"edges", "nodes"}, optional
+        Where the pressure comes from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -264,7 +272,7 @@ def section(
     ValueError
         If the pressure of that step was not kept.
     """
-    view = StepView.of(result, step)
+    view = StepView.of(result, step, source)
     if ax is not None:
         draw_pressures(ax, [view], Cut.of([view], angle, through), always=True)
         ax.legend(loc="lower center")
@@ -285,6 +293,7 @@ def tractions(
     angle: float = 0.0,
     through: Point | None = None,
     ax: Axes | None = None,
+    source: str | None = None,
 ) -> Figure:
     """Draw pressure and shear traction along a line, of one load step or of several.
 
@@ -303,6 +312,8 @@ def tractions(
     ax : matplotlib.axes.Axes, optional
         Axes for the shear traction of one load step; by default those of a new figure, with the pressure
         above.
+    source : {"edges", "nodes"}, optional
+        Where tractions come from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -315,7 +326,7 @@ def tractions(
     ValueError
         If the contact is frictionless, or the tractions of that step were not kept.
     """
-    views, labels, title = views_of(result, steps)
+    views, labels, title = views_of(result, steps, source)
     exact = closed_solutions(result, views)
     cut = Cut.of(views, angle, through)
     if ax is not None:
@@ -340,7 +351,9 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
     """Draw the shear traction of a step along a line: components, size, and the bound mu p."""
     along, across = cut.tractions(view)
     size = np.hypot(along, across)
-    bound = view.friction * cut.values(view) if np.isfinite(view.friction) else np.zeros(size.shape)
+    bound = np.zeros(cut.fine.shape)
+    if np.isfinite(view.friction):
+        bound = view.friction * view.at(*cut.line.points(cut.fine))
     largest = max(float(bound.max()), float(size.max()))
     to_stress, stress = scaled(largest, "Pa")
     place = cut.along(cut.place)
@@ -355,8 +368,15 @@ def draw_shear(axes: Axes, view: StepView, exact: PartialSlip | None, cut: Cut) 
         name = _SIDES[-1.0 in used, 1.0 in used]
         for sign in used:
             edge = sign * bound * to_stress
-            axes.fill_between(place, edge, color="0.92", lw=0, zorder=0)
-            axes.plot(place, edge, color=GUIDE, lw=0.8, label=name if sign == used[0] else None, zorder=1)
+            axes.fill_between(cut.along(cut.fine), edge, color="0.92", lw=0, zorder=0)
+            axes.plot(
+                cut.along(cut.fine),
+                edge,
+                color=GUIDE,
+                lw=0.8,
+                label=name if sign == used[0] else None,
+                zorder=1,
+            )
     axes.axhline(0.0, color=GUIDE, lw=0.5, zorder=1)
     for values, color, name in zip((along, across), (COMPUTED, THIRD), cut.names(), strict=True):
         axes.plot(place, values * to_stress, color=color, label=name, zorder=4, **cut.look())

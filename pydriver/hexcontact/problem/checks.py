@@ -8,7 +8,7 @@ from typing import Any
 
 from ..deck.below import Fatigue, Stage, cycle_of
 from ..deck.faults import MISSING, Mistake, deck_error
-from ..deck.interface import TwoCoefficients, coulomb
+from ..deck.interface import Friction, Interface, TwoCoefficients, coulomb
 from ..deck.read import Assembled
 from ..deck.surfaces import Separation, principal_curvatures
 from ..deck.tables import Deck, Output, Solver
@@ -63,6 +63,7 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, tuple[Load
         algorithm, against = _algorithm(given_mu, solver)
         solver = solver.model_copy(update={"algorithm": algorithm})
         found += against
+        found += _iteration_problems(solver, friction, layer)
         if "load" in tables:
             mu = None if algorithm == "frictionless" else 0.0 if given_mu is None else given_mu
             steps, against = load_steps(tables["load"], mu, tables.get("bulk"))
@@ -103,6 +104,22 @@ def _algorithm(mu: float | None, solver: Solver) -> tuple[str, list[Mistake]]:
         )
         problems.append(Mistake(("friction", "coefficient"), MISSING, sentence))
     return algorithm, problems
+
+
+def _iteration_problems(solver: Solver, friction: Friction | None, layer: Interface | None) -> list[Mistake]:
+    """Return what the iteration of the dissertation cannot do: it is for comparison only."""
+    if solver.iteration == "newton":
+        return []
+    needed = 'since solver.iteration = "dissertation"'
+    if solver.method != "direct":
+        return [Mistake(("solver", "method"), solver.method, f'expected "direct", {needed}')]
+    if solver.algorithm == "frictionless":
+        return [Mistake(("solver", "iteration"), solver.iteration, 'expected "newton" without friction')]
+    if layer:
+        return [Mistake(("interface",), MISSING, f"expected nothing, {needed}")]
+    if friction and isinstance(friction.coefficient, TwoCoefficients):
+        return [Mistake(("friction", "coefficient"), MISSING, f"expected one coefficient, {needed}")]
+    return []
 
 
 def _wear_problems(tables: dict[str, Any], solver: Solver) -> list[Mistake]:

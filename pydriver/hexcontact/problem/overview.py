@@ -34,6 +34,7 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         "algorithm": case.solver.algorithm,
         "coupling": case.solver.coupling,
         "entry": case.solver.entry,
+        **({"iteration": case.solver.iteration} if case.solver.iteration != "newton" else {}),
         "tolerance": case.solver.tolerance,
         **({"bulk_state": case.deck.bulk.state} if case.deck.bulk else {}),
         **({"step_tolerance": case.solver.step_tolerance} if case.adaptive else {}),
@@ -91,7 +92,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
         *([("bulk stress", _bulk(case.deck.bulk, case.load_steps))] if case.deck.bulk else []),
         ("load steps", _history(case)),
         ("largest load", _largest(case)),
-        ("method", f"{case.method_for(lattice)}, tolerance {case.solver.tolerance:g}"),
+        ("method", f"{_method(case, lattice)}, tolerance {case.solver.tolerance:g}"),
         *([("memory", _memory(case, memory))] if memory else []),
         ("work", work(case)),
     ]  # fmt: skip
@@ -130,6 +131,12 @@ def law_in_words(case: Problem) -> str:
     if friction is None or friction.shear_limit is None:
         return law
     return f"{law}, shear traction of at most {quantity(friction.shear_limit, 'Pa')}"
+
+
+def _method(case: Problem, lattice: Lattice) -> str:
+    """Return the method, and whose iteration it is if not ours."""
+    written = case.solver.iteration == "dissertation"
+    return case.method_for(lattice) + ", iteration of the dissertation" * written
 
 
 def _friction(case: Problem) -> str:

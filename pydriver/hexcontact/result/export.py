@@ -20,7 +20,7 @@ from ..interior.tables import as_volume, computed, tables_of
 from ..text import escaped, visible
 from ..variables import CONVENTIONS, FIELDS, VARIABLES, VECTORS
 from . import mesh
-from .interpolate import is_kept
+from .interpolate import is_kept, with_shown
 from .result import Result
 
 if TYPE_CHECKING:
@@ -67,15 +67,23 @@ def _meshed_steps(result: Result, numbers: Sequence[int] | None) -> list[int]:
     return steps
 
 
-def _fields(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any]]]:
+def _fields(result: Result, number: int, source: str | None = "nodes") -> Iterator[tuple[str, NDArray[Any]]]:
     one = result.step(number)
+    if source != "nodes":
+        one = with_shown(one, result.lattice, source)
     return ((name, one[name].values) for name in FIELDS if name in one)
 
 
 # --- VTK ------------------------------------------------------------------------------------------
 
 
-def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | None = None) -> Path:
+def to_vtk(
+    result: Result,
+    folder: Path,
+    stem: str,
+    numbers: Sequence[int] | None = None,
+    source: str | None = None,
+) -> Path:
     """Write a series of VTK files, one for each load step, and a ``.pvd`` file that lists them.
 
     Parameters
@@ -88,6 +96,8 @@ def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
         Start of the names of the files.
     numbers : sequence of int, optional
         Only these steps.
+    source : {"edges", "nodes"}, optional
+        Where tractions come from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -101,7 +111,7 @@ def to_vtk(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
     """
     steps = _meshed_steps(result, numbers)
     _make(folder)
-    return _series(folder, stem, "vtu", {number: _vtu(result, number) for number in steps})
+    return _series(folder, stem, "vtu", {number: _vtu(result, number, source) for number in steps})
 
 
 def volumes_to_vtk(result: Result, folder: Path, stem: str) -> list[Path]:
@@ -166,7 +176,7 @@ def _series(folder: Path, stem: str, kind: str, pages: Mapping[int, str]) -> Pat
     return series
 
 
-def _vtu(result: Result, number: int) -> str:
+def _vtu(result: Result, number: int, source: str | None) -> str:
     """Return a load step as an unstructured grid in XML."""
     lattice, one = result.lattice, result.step(number)
     points = np.stack([lattice.x.ravel(), lattice.y.ravel(), np.zeros(lattice.size)], axis=1)
@@ -177,7 +187,7 @@ def _vtu(result: Result, number: int) -> str:
         if variable.dims == ("step",) and variable.dtype != "str" and name in one.variables
     }
     data = [_array(name, values, VARIABLES[name].unit) for name, values in history.items()]
-    fields = [_array(name, values, unit) for name, values, unit in _point_data(result, number)]
+    fields = [_array(name, values, unit) for name, values, unit in _point_data(result, number, source)]
     cells = [
         _array("connectivity", faces.ravel().astype("i4")),
         _array("offsets", np.arange(3, 3 * len(faces) + 1, 3, dtype="i4")),
@@ -219,9 +229,9 @@ def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
     )
 
 
-def _point_data(result: Result, number: int) -> Iterator[tuple[str, NDArray[Any], str]]:
+def _point_data(result: Result, number: int, source: str | None) -> Iterator[tuple[str, NDArray[Any], str]]:
     """Yield name, nodal values and unit of the fields of a step, with components joined to vectors."""
-    fields = dict(_fields(result, number))
+    fields = dict(_fields(result, number, source))
     if "initial_gap" in result.dataset:
         yield "initial_gap", result.dataset["initial_gap"].values.ravel(), "m"
     for vector, parts in VECTORS.items():
@@ -253,7 +263,9 @@ def _array(name: str, values: NDArray[Any], unit: str = "") -> str:
 # --- UGRID ----------------------------------------------------------------------------------------
 
 
-def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None) -> Path:
+def to_ugrid(
+    result: Result, target: Path, numbers: Sequence[int] | None = None, source: str | None = None
+) -> Path:
     """Write a netCDF file whose fields lie on the nodes of a mesh, for xugrid and others.
 
     The result has the same mesh, but its fields by row and column.
@@ -266,6 +278,8 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
         File to write.
     numbers : sequence of int, optional
         Only these steps.
+    source : {"edges", "nodes"}, optional
+        Where tractions come from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -289,7 +303,9 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
         mesh.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
         mesh.write_mesh(file, result.lattice)
         on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
-        for name in (name for name in ("initial_gap", *FIELDS) if name in result.dataset):
+        names = [name for name in ("initial_gap", *FIELDS) if name in result.dataset]
+        columns = {}
+        for name in names:
             variable = VARIABLES[name]
             fill = variable.missing if variable.dtype == "f8" else None
             packed = {"zlib": True, "complevel": 1, "fill_value": fill}
@@ -297,16 +313,24 @@ def to_ugrid(result: Result, target: Path, numbers: Sequence[int] | None = None)
             column = mesh.add_column(file, name, variable.dtype, dims, attributes, **packed)
             if name == "initial_gap":
                 column[...] = result.dataset[name].values.ravel()
-                continue
-            for position, number in enumerate(steps):
-                column[position] = result.step(number)[name].values.ravel()
+            else:
+                columns[name] = column
+        for position, number in enumerate(steps):
+            for name, values in _fields(result, number, source):
+                columns[name][position] = values.ravel()
     return target
 
 
 # --- CSV ------------------------------------------------------------------------------------------
 
 
-def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | None = None) -> list[Path]:
+def to_csv(
+    result: Result,
+    folder: Path,
+    stem: str,
+    numbers: Sequence[int] | None = None,
+    source: str | None = None,
+) -> list[Path]:
     """Write the history as a table, and the fields of some steps, a line for each node.
 
     Parameters
@@ -319,6 +343,8 @@ def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
         Start of the names of the files.
     numbers : sequence of int, optional
         Steps whose fields are written.
+    source : {"edges", "nodes"}, optional
+        Where tractions come from, see `hexcontact.Result.traction_field`.
 
     Returns
     -------
@@ -340,7 +366,9 @@ def to_csv(result: Result, folder: Path, stem: str, numbers: Sequence[int] | Non
     for number in steps:
         rows, cols = np.meshgrid(result.lattice.rows, result.lattice.cols, indexing="ij")
         columns = {"row": rows, "col": cols, "x": result.lattice.x, "y": result.lattice.y}
-        table = pd.DataFrame({k: v.ravel() for k, v in (columns | dict(_fields(result, number))).items()})
+        table = pd.DataFrame(
+            {k: v.ravel() for k, v in (columns | dict(_fields(result, number, source))).items()}
+        )
         written.append(folder / f"{stem}_{number:04d}.csv")
         with replacing(written[-1]) as path:
             table.rename(columns=_with_unit).to_csv(path, index=False)

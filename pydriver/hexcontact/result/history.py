@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,20 @@ from ..core.measures import cycles as cycles_of
 from ..core.measures import turning_points
 from ..deck.below import Stage
 from ..text import Row, listed, percent, quantity
-from ..variables import BULK_STRESS, LOADS, RESIDUALS, SUMMARY, VARIABLES, label_of, names_where, spelled
+from ..variables import (
+    BULK_STRESS,
+    LOADS,
+    RESIDUALS,
+    SUMMARY,
+    VARIABLES,
+    WORN,
+    label_of,
+    names_where,
+    spelled,
+)
+
+if TYPE_CHECKING:
+    import xarray
 
 History = Mapping[str, Any]
 
@@ -24,6 +37,10 @@ LOADS_AND_MOTIONS = {
 }
 """Short name and unit of each load and motion."""
 
+WEARING = ("pressure", "traction_x", "traction_y", "slip_increment_x", "slip_increment_y", "zone")
+"""Fields of the steps of a cycle from which its wear follows."""
+
+_SLIP = 2  # among the zones
 _NOTICED = 1e-6  # share of the normal load or approach from which tangential ones are shown
 _NOISE = 1e-9  # ... below which they are written as zero
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
@@ -385,3 +402,24 @@ def limited_steps(histories: Sequence[History], tolerance: float) -> str:
 def _steps(names: Sequence[str]) -> str:
     shown = listed([*names[:_MOST_NAMED], *["..."] * (len(names) > _MOST_NAMED)], "and")
     return f"step{'s' * (len(names) > 1)} {shown}"
+
+
+def worn_by_cycle(
+    coefficient: float, steps: Iterable[Mapping[str, NDArray[Any]]], plane: xarray.Dataset, cell: float
+) -> xarray.Dataset:
+    """Return what a cycle wears off the nodes, see `hexcontact.Result.wear`.
+
+    `steps` have the fields `WEARING`; `plane` has the coordinates of the nodes, each with a cell (m2).
+    """
+    import xarray
+
+    worn, spent, path = (np.zeros(plane["x"].shape) for _ in range(3))
+    for step in steps:
+        x, y = (np.where(step["zone"] == _SLIP, step[f"slip_increment_{axis}"], 0.0) for axis in "xy")
+        worn += coefficient * step["pressure"] * np.hypot(x, y)
+        spent -= step["traction_x"] * x + step["traction_y"] * y
+        path += np.hypot(x, y)
+    found = xarray.Dataset(coords=plane.coords)
+    for name, values in zip(("worn_depth", *WORN[-2:]), (worn, spent, 0.25 * path), strict=True):
+        found[name] = ("row", "col"), values, {"units": VARIABLES[name].units}
+    return found.assign(wear_volume=((), cell * float(worn.sum()), {"units": "m3"}))

@@ -1,25 +1,31 @@
 """Fields between the nodes: at any point, and along lines.
 
 A field of the solution is a sum of hat functions, linear on each triangle of the lattice. Along a line it is
-a polygon with corners at the edges of triangles. Only the pressure of `PressureField` ends at the edge of the
-contact, like a square root.
+a polygon with corners at the edges of triangles. Only pressure and shear traction go to the edges of contact
+and stick, which lie between the nodes, unless the source "nodes" is asked for.
 """
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..analytic.hertz_gap import friction_of, is_compliant
 from ..arrays import Array
-from ..core.edges import ContactEdges
-from ..core.interpolation import crossings, linear, nearest, pressure_between, section_ends
+from ..core.edges import ContactEdges, Limits, TractionField
+from ..core.interpolation import crossings, linear, nearest, section_ends
 from ..core.lattice import Lattice
+from ..deck.below import SOURCES
+from ..deck.interface import shear_limits
+from ..deck.tables import Deck
 from ..errors import DeckError
+from ..interior.stress import EDGES, TRACTIONS
 from ..text import did_you_mean
 from ..variables import NOT_KEPT, VARIABLES
 
@@ -29,9 +35,19 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 Fields = Mapping[str, NDArray[Any]]
 
+_FINER = 8  # points along a spacing where tractions are curved
+_STICK = 1  # value of zone at a sticking node
 
-def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike, y: ArrayLike) -> Array:
-    """Return a field at points of the plane, linear on the triangles of the lattice like the solution.
+
+def interpolate(
+    lattice: Lattice,
+    name: str,
+    values: NDArray[Any],
+    x: ArrayLike,
+    y: ArrayLike,
+    tractions: TractionField | None = None,
+) -> Array:
+    """Return a field at points of the plane: tractions to the edges, others linear on the triangles.
 
     Parameters
     ----------
@@ -43,6 +59,8 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
         Its values at the nodes.
     x, y : array_like
         Points (m), broadcast.
+    tractions : TractionField, optional
+        What pressure and shear traction are taken from; default: their values at the nodes, joined linearly.
 
     Returns
     -------
@@ -50,9 +68,90 @@ def interpolate(lattice: Lattice, name: str, values: NDArray[Any], x: ArrayLike,
         Values at the points. Outside the window tractions and slip are 0, other fields NaN.
     """
     x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    if tractions is not None and name in TRACTIONS:
+        return np.asarray(tractions(x, y)[TRACTIONS.index(name)])
     variable = VARIABLES[name]
     between = nearest if variable.flags else linear
     return between(values, lattice.basis, lattice.start, x, y, variable.padding)
+
+
+def traction_field(
+    lattice: Lattice, fields: Fields, limits: Limits | None, source: str | None = None, sharp: bool = True
+) -> TractionField:
+    """Return pressure and shear traction of a load step at any point.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The window.
+    fields : mapping of str to ndarray
+        Fields of the step: the pressure, and what was kept of shear tractions, gap and zone.
+    limits : tuple of array_like or None
+        Coefficient of friction and bound of the shear traction (Pa); None: unknown, or no friction.
+    source : str, optional
+        ``"edges"``, or ``"nodes"``: the values at the nodes, joined linearly; by default the edges, if
+        there are any and the gap was kept.
+    sharp : bool
+        Whether the contact has a sharp edge, unlike that of a compliant interface.
+
+    Raises
+    ------
+    DeckError
+        If the pressure was not kept, or the edges cannot be found.
+    """
+    if source not in (None, *SOURCES):
+        raise DeckError(f"source = {source!r}: expected {' or '.join(SOURCES)}")
+    zero = np.zeros(lattice.shape)
+    kept = {name: np.asarray(values) for name, values in fields.items() if is_kept(np.asarray(values))}
+    if "pressure" not in kept:
+        raise DeckError("the pressure was not kept (output.fields, output.every)")
+    tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
+    if source == "nodes" or (source is None and not (sharp and "gap" in kept)):
+        return TractionField.of_nodes(tractions, lattice.basis, lattice.start)
+    if not sharp or "gap" not in kept:
+        why = "there are none with a compliant interface" if not sharp else "the gap was not kept"
+        raise DeckError(f"source = 'edges': expected nodes; the edges need the gap, and {why}")
+    zone = kept.get("zone")
+    contact = tractions[0] > 0.0 if zone is None else zone > 0
+    sheared = zone is not None and all(name in kept for name in TRACTIONS)
+    edges = ContactEdges(
+        *(tractions[0], kept["gap"], contact, np.isfinite(kept["gap"])), lattice.basis, lattice.start
+    )
+    if not (sheared and limits):
+        return edges.field(tractions[1:])
+    return edges.field(tractions[1:], np.asarray(zone == _STICK), limits)
+
+
+def tractions_of(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> TractionField:
+    """Return pressure and shear traction of a load step of a result, see `traction_field`."""
+    fields = {name: step[name].values for name in (*TRACTIONS, *EDGES) if name in step}
+    for name in ("pressure", "gap") if source == "edges" else ("pressure",):
+        if name not in fields or not is_kept(fields[name]):
+            at = int(step["step"])
+            raise DeckError(f"the {name} of step {at} was not kept (output.fields, output.every)")
+    limits = limits_of(step.attrs, lattice) if "traction_x" in fields else None
+    return traction_field(lattice, fields, limits, source, not is_compliant(step.attrs))
+
+
+def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
+    """Return a load step whose tractions are those of `tractions_of` at the nodes."""
+    names = [name for name in TRACTIONS if name in step and is_kept(step[name].values)]
+    if "pressure" not in names:
+        return step
+    found = dict(zip(TRACTIONS, tractions_of(step, lattice, source).at_nodes(), strict=True))
+    return step.assign({name: step[name].copy(data=found[name]) for name in names})
+
+
+def limits_of(attributes: Mapping[Any, Any], lattice: Lattice) -> Limits | None:
+    """Return coefficient of friction and bound (Pa) at the nodes of a result; None if they are unknown."""
+    mu = friction_of(attributes)
+    if not math.isnan(mu):
+        return (mu, math.inf) if 0.0 < mu < math.inf else None
+    try:
+        friction = Deck.checked(tomllib.loads(str(attributes.get("deck", ""))))[0].get("friction")
+    except ValueError:
+        return None
+    return shear_limits(friction, lattice.x, lattice.y) if friction else None
 
 
 class PressureField:
@@ -72,12 +171,19 @@ class PressureField:
     """
 
     def __init__(self, pressure: Array, gap: Array, basis: Array, start: tuple[float, float]) -> None:
-        self._pressure, self._basis, self._start = pressure, basis, start
-        self._squares = ContactEdges(pressure, gap, pressure > 0.0, np.isfinite(gap), basis, start).squares()
+        edges = ContactEdges(pressure, gap, pressure > 0.0, np.isfinite(gap), basis, start)
+        self._tractions = edges.field()
+
+    @classmethod
+    def of(cls, tractions: TractionField) -> Self:
+        """Return the pressure of a traction field."""
+        field = cls.__new__(cls)
+        field._tractions = tractions
+        return field
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the pressure (Pa) at points (m), in their shape; 0 outside the window."""
-        return pressure_between(self._pressure, self._squares, self._basis, self._start, x, y)
+        return np.asarray(self._tractions(x, y)[0])
 
 
 # --- lines --------------------------------------------------------------------------------------------------
@@ -191,7 +297,12 @@ def is_kept(values: NDArray[Any]) -> bool:
 
 
 def profile(
-    lattice: Lattice, fields: Fields, line: Line, points: int | None = None, **attributes: Any
+    lattice: Lattice,
+    fields: Fields,
+    line: Line,
+    points: int | None = None,
+    tractions: TractionField | None = None,
+    **attributes: Any,
 ) -> xarray.Dataset:
     """Return fields along a line.
 
@@ -205,7 +316,9 @@ def profile(
         The line.
     points : int, optional
         Number of points, evenly spaced. By default the points are the corners of the polygon of a field along
-        the line, so that straight lines between them are exact.
+        the line, so that straight lines between them are exact, and eight a spacing for curved tractions.
+    tractions : TractionField, optional
+        As of `interpolate`.
     **attributes
         Attributes of the data set.
 
@@ -224,6 +337,10 @@ def profile(
     if points is not None and (isinstance(points, bool) or not isinstance(points, int) or points < 2):
         raise DeckError(f"points = {points!r}: expected a whole number of at least 2")
     distance = line.corners(lattice) if points is None else np.linspace(0.0, line.length, points)
+    if tractions is not None and any(name in TRACTIONS for name in fields):
+        attributes["tractions"] = tractions.source
+        if points is None and tractions.source == "edges":
+            distance = np.union1d(distance, np.arange(0.0, line.length, lattice.spacing / _FINER))
     x, y = line.points(distance)
     places = {
         "distance": (distance - line.zero, "distance along the line"),
@@ -232,7 +349,11 @@ def profile(
     }
     return xarray.Dataset(
         {
-            name: ("distance", interpolate(lattice, name, values, x, y), VARIABLES[name].attributes)
+            name: (
+                "distance",
+                interpolate(lattice, name, values, x, y, tractions),
+                VARIABLES[name].attributes,
+            )
             for name, values in fields.items()
         },
         coords={

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, number
@@ -13,10 +12,22 @@ from ..core.lattice import Lattice
 from ..deck.below import Stage
 from ..errors import DeckError
 from ..interior.below import BelowSurface
+from ..interior.stress import TRACTIONS
 from ..text import did_you_mean, text_table
-from ..variables import FIELDS, VARIABLES, WORN
-from .history import cycles, segments, stages
-from .interpolate import Line, Point, PressureField, chosen_fields, interpolate, profile, section_line
+from ..variables import FIELDS, VARIABLES
+from .history import WEARING, cycles, segments, stages, worn_by_cycle
+from .interpolate import (
+    Line,
+    Point,
+    PressureField,
+    TractionField,
+    chosen_fields,
+    interpolate,
+    profile,
+    section_line,
+    tractions_of,
+    with_shown,
+)
 from .layout import Quantities, history_of, lattice_of, step_of
 
 if TYPE_CHECKING:
@@ -25,8 +36,6 @@ if TYPE_CHECKING:
 
     from ..analytic.compare import Comparison
 
-_WEARING = ("pressure", "traction_x", "traction_y", "slip_increment_x", "slip_increment_y", "zone")
-_SLIP = 2  # among the zones
 _LISTED = "result.quantities lists what there is"
 _ELSEWHERE = {
     "plot": "hexcontact.plotting draws results: hexcontact.plotting.overview(result)",
@@ -136,33 +145,31 @@ class Result(BelowSurface):
         """
         return step_of(self.dataset, number)
 
-    def pressure_field(self, number: int = -1) -> PressureField:
-        """Return the pressure of a load step at any point, a function of x and y (m).
+    def traction_field(self, number: int = -1, source: str | None = None) -> TractionField:
+        """Return pressure and shear traction of a load step at any point: p, q_x, q_y of x and y (m).
 
-        It goes to zero like a square root at the edge of the contact, which runs between the nodes; the mean
-        error against Hertz is a fourth or a fifth of that of the nodal pressures joined linearly.
+        They go to zero like square roots at the edge of the contact, and keep to friction up to the edge of
+        the stick area, both between the nodes. ``field.at_nodes()`` has the values at the nodes.
 
         Parameters
         ----------
         number : int
             Number of the step, the first is 1; -1 is the last one.
+        source : str, optional
+            ``"edges"``, or ``"nodes"``: the solution at the nodes, joined linearly. By default the edges,
+            if the gap was kept and they are sharp; ``field.source`` is the one taken. Of unknown laws of
+            friction the shear traction is that of the nodes (``field.sheared``).
 
         Raises
         ------
-        IndexError
-            If there is no such step.
-        ValueError
-            If the output lacks pressure or gap of the step.
+        DeckError, IndexError
+            If pressure or gap were not kept, or there is no such step.
         """
-        data = self.step(number)
-        for name in ("pressure", "gap"):
-            if name not in data or not np.isfinite(data[name].values).any():
-                raise ValueError(
-                    f"the {name} of step {int(data['step'])} was not kept (output.fields, output.every)"
-                )
-        lattice = self.lattice
-        pressure, gap = data["pressure"].values, data["gap"].values
-        return PressureField(pressure, gap, lattice.basis, lattice.start)
+        return tractions_of(self.step(number), self.lattice, source)
+
+    def pressure_field(self, number: int = -1) -> PressureField:
+        """Return the pressure of a load step at any point; see `traction_field`."""
+        return PressureField.of(self.traction_field(number, "edges"))
 
     @property
     def history(self) -> pandas.DataFrame:
@@ -192,8 +199,8 @@ class Result(BelowSurface):
 
     # --- between the nodes ----------------------------------------------------------------------------------
 
-    def at(self, name: str, x: ArrayLike, y: ArrayLike, step: int = -1) -> Array:
-        """Return a field at points of the plane, linear on the triangles of the lattice like the solution.
+    def at(self, name: str, x: ArrayLike, y: ArrayLike, step: int = -1, source: str | None = None) -> Array:
+        """Return a field at points of the plane: tractions to the edges, others linear on the triangles.
 
         Parameters
         ----------
@@ -203,6 +210,8 @@ class Result(BelowSurface):
             Points (m), broadcast.
         step : int
             Number of the load step, the first is 1; -1 is the last one.
+        source : str, optional
+            As of `traction_field`.
 
         Returns
         -------
@@ -217,15 +226,21 @@ class Result(BelowSurface):
             If there is no such step.
         """
         [values] = self._fields([name], step).values()
-        return interpolate(self.lattice, name, values, x, y)
+        return interpolate(self.lattice, name, values, x, y, self._tractions([name], step, source))
 
     def profile(
-        self, *names: str, start: Point, end: Point, step: int = -1, points: int | None = None
+        self,
+        *names: str,
+        start: Point,
+        end: Point,
+        step: int = -1,
+        points: int | None = None,
+        source: str | None = None,
     ) -> xarray.Dataset:
         """Return fields along a line between two points.
 
         Along a line a field is a polygon. By default the points are its corners, so that straight lines
-        between them are exact.
+        between them are exact, and eight a spacing for tractions to the edges, which are curved.
 
         Parameters
         ----------
@@ -237,6 +252,8 @@ class Result(BelowSurface):
             Number of the load step, the first is 1; -1 is the last one.
         points : int, optional
             Number of evenly spaced points instead.
+        source : str, optional
+            As of `traction_field`; the attribute ``tractions`` is the one taken.
 
         Returns
         -------
@@ -250,7 +267,7 @@ class Result(BelowSurface):
         IndexError
             If there is no such step.
         """
-        return self._along(Line(start, end), names, step, points)
+        return self._along(Line(start, end), names, step, points, source)
 
     def section(
         self,
@@ -259,6 +276,7 @@ class Result(BelowSurface):
         through: Point | None = None,
         step: int = -1,
         points: int | None = None,
+        source: str | None = None,
     ) -> xarray.Dataset:
         """Return fields along a line across the whole contact.
 
@@ -271,7 +289,7 @@ class Result(BelowSurface):
         through : tuple of float, optional
             A point on it (m), from which ``distance`` counts; default: the node next to the center of
             pressure.
-        step, points : int, optional
+        step, points, source : int, int and str, optional
             As for `profile`.
 
         Returns
@@ -288,7 +306,7 @@ class Result(BelowSurface):
         """
         pressure = self._fields(["pressure"], step)["pressure"]
         line = section_line(self.lattice, pressure, angle, through)
-        return self._along(line, names, step, points)
+        return self._along(line, names, step, points, source)
 
     def wear(
         self,
@@ -301,32 +319,24 @@ class Result(BelowSurface):
         `coefficient` is k of both bodies together (m2/N), the depth k p times slip whatever the law;
         `segment` or `steps` say what the cycle is, as in `fatigue`. ``worn_depth``,
         ``cycle_dissipation_density`` and ``cycle_slip_amplitude`` (a quarter of the slip path) are over the
-        nodes, ``wear_volume`` of all.
-        Raises DeckError if there is no friction, no such cycle, or fields of its steps were not kept.
+        nodes, ``wear_volume`` of all. Raises DeckError without friction, such a cycle, or its fields.
         """
-        import xarray
-
         number(coefficient, "coefficient", "a number of at least 0", lambda found: found >= 0)
         if "dissipation_density" not in self:
             raise DeckError("nothing wears without friction: the result has no dissipation_density")
-        worn, spent, path = (np.zeros(self.lattice.shape) for _ in range(3))
-        for at in self.cycle_steps(segment, steps):
-            step = self._fields(_WEARING, at)
-            slips = step["zone"] == _SLIP
-            x, y = (np.where(slips, step[f"slip_increment_{axis}"], 0.0) for axis in "xy")
-            worn += coefficient * step["pressure"] * np.hypot(x, y)
-            spent -= step["traction_x"] * x + step["traction_y"] * y
-            path += np.hypot(x, y)
-        found = xarray.Dataset(coords=self.dataset[["x", "y"]].coords)
-        fields = (worn, spent, 0.25 * path)
-        for name, values in zip(("worn_depth", *WORN[-2:]), fields, strict=True):
-            found[name] = ("row", "col"), values, {"units": VARIABLES[name].units}
-        volume = self.lattice.cell_area * float(worn.sum())
-        return found.assign(wear_volume=((), volume, {"units": "m3"}))
+        given = (self._fields(WEARING, at) for at in self.cycle_steps(segment, steps))
+        return worn_by_cycle(coefficient, given, self.dataset[["x", "y"]], self.lattice.cell_area)
 
-    def _along(self, line: Line, names: Sequence[str], step: int, points: int | None) -> xarray.Dataset:
-        number = int(self.step(step)["step"])
-        return profile(self.lattice, self._fields(names, step), line, points, step=number)
+    def _along(
+        self, line: Line, names: Sequence[str], step: int, points: int | None, source: str | None
+    ) -> xarray.Dataset:
+        number, fields = int(self.step(step)["step"]), self._fields(names, step)
+        tractions = self._tractions(fields, step, source)
+        return profile(self.lattice, fields, line, points, tractions, step=number)
+
+    def _tractions(self, names: Iterable[str], step: int, source: str | None) -> TractionField | None:
+        """Return the tractions between the nodes, if there is one among some fields."""
+        return self.traction_field(step, source) if any(name in TRACTIONS for name in names) else None
 
     def _fields(self, names: Sequence[str], step: int) -> dict[str, NDArray[Any]]:
         """Return the nodal values of some fields of a step, or of all."""
@@ -414,7 +424,7 @@ class Result(BelowSurface):
 
         for quantity in exact if isinstance(exact, Mapping) else ():
             self[str(quantity)]  # else KeyError
-        return compare(self.dataset, self.step(step), exact, name)
+        return compare(self.dataset, with_shown(self.step(step), self.lattice), exact, name)
 
     # --- display --------------------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, Mask
+from ..core.edges import Limits, TractionField
 from ..core.lattice import Lattice
+from ..interior.stress import EDGES, TRACTIONS
 from ..text import did_you_mean
-from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line
+from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line, traction_field
 
 if TYPE_CHECKING:
     import xarray
@@ -57,6 +59,9 @@ class Step:
         Coefficient of friction; 0 without friction, NaN for a law that is more than one coefficient.
     sharp : bool
         Whether the bodies touch without a compliant layer, so that the contact has a sharp edge.
+    limits : tuple of array_like or None
+        Coefficient of friction and bound of the shear traction (Pa), where these are the law of friction;
+        None for a step read from a file.
     """
 
     index: int
@@ -71,6 +76,7 @@ class Step:
     bodies: Sequence[Any] = ()
     friction: float = 0.0
     sharp: bool = True
+    limits: Limits | None = None
 
     def __post_init__(self) -> None:
         safe = {name: _read_only(values) for name, values in self.fields.items()}
@@ -145,29 +151,50 @@ class Step:
 
     # --- between the nodes ----------------------------------------------------------------------------------
 
-    def at(self, name: str, x: ArrayLike, y: ArrayLike) -> Array:
+    def traction_field(self, source: str | None = None) -> TractionField:
+        """Return pressure and shear traction at any point; see `hexcontact.Result.traction_field`."""
+        names = (*TRACTIONS, *EDGES)
+        known = {name: self.fields[name] for name in names if name in self.fields}
+        return traction_field(self.lattice, known, self.limits, source, self.sharp)
+
+    def at(self, name: str, x: ArrayLike, y: ArrayLike, source: str | None = None) -> Array:
         """Return a field at points of the plane; see `hexcontact.Result.at`."""
         [values] = chosen_fields([name], self.fields, self.number).values()
-        return interpolate(self.lattice, name, values, x, y)
+        return interpolate(self.lattice, name, values, x, y, self._tractions([name], source))
 
-    def profile(self, *names: str, start: Point, end: Point, points: int | None = None) -> xarray.Dataset:
+    def profile(
+        self, *names: str, start: Point, end: Point, points: int | None = None, source: str | None = None
+    ) -> xarray.Dataset:
         """Return fields along a line between two points; see `hexcontact.Result.profile`."""
-        fields = chosen_fields(names, self.fields, self.number)
-        return profile(self.lattice, fields, Line(start, end), points, step=self.number)
+        return self._along(Line(start, end), names, points, source)
 
     def section(
-        self, *names: str, angle: float = 0.0, through: Point | None = None, points: int | None = None
+        self,
+        *names: str,
+        angle: float = 0.0,
+        through: Point | None = None,
+        points: int | None = None,
+        source: str | None = None,
     ) -> xarray.Dataset:
         """Return fields along a line across the contact; see `hexcontact.Result.section`."""
-        fields = chosen_fields(names, self.fields, self.number)
         line = section_line(self.lattice, self.fields["pressure"], angle, through)
-        return profile(self.lattice, fields, line, points, step=self.number)
+        return self._along(line, names, points, source)
+
+    def _along(
+        self, line: Line, names: Sequence[str], points: int | None, source: str | None
+    ) -> xarray.Dataset:
+        fields = chosen_fields(names, self.fields, self.number)
+        return profile(self.lattice, fields, line, points, self._tractions(fields, source), step=self.number)
+
+    def _tractions(self, names: Iterable[str], source: str | None) -> TractionField | None:
+        """Return the tractions between the nodes, if there is one among some fields."""
+        return self.traction_field(source) if any(name in TRACTIONS for name in names) else None
 
     def stress_at(
         self, points: ArrayLike, *components: str, body: int = 1, source: str | None = None
     ) -> xarray.Dataset:
         """Return stresses below the surface at points, x, y and depth (m); see `hexcontact.Result.stress`."""
-        from ..interior.stress import EDGES, below
+        from ..interior.stress import below
 
         loaded: dict[str, Any] = {**self.history, **self.fields}
         if not self.sharp:

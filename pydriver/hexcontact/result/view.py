@@ -11,11 +11,12 @@ import numpy as np
 
 from ..analytic.hertz_gap import QuadraticGap, friction_of, pressure_is_frictionless
 from ..arrays import Array, Mask
-from ..core.edges import ContactEdges, ZoneMesh
+from ..core.edges import ContactEdges, TractionField, ZoneMesh
 from ..core.interpolation import linear
+from ..interior.stress import TRACTIONS
 from ..text import visible, worded
 from ..variables import LARGEST, VARIABLES, WORN, spelled
-from .interpolate import PressureField, is_kept
+from .interpolate import is_kept, tractions_of
 from .layout import lattice_of, step_of
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class StepView:
     data : xarray.Dataset
         All quantities of the step; the attributes are those of the result.
     x, y, pressure : ndarray, shape (n_row, n_col)
-        Coordinates of the nodes and contact pressure.
+        Coordinates of the nodes and contact pressure, as solved.
     contact : ndarray of bool, shape (n_row, n_col)
         Nodes with pressure.
     lattice : Lattice
@@ -70,9 +71,12 @@ class StepView:
         Center of the Hertz contact, else of the pressure.
     hertz : EllipticContact or None
         Hertz solution, if the initial gap is a quadratic form.
+    source : str or None
+        Source of the tractions that are shown, "edges" or "nodes"; None: the edges where they are known.
     """
 
-    def __init__(self, dataset: xarray.Dataset, step: int) -> None:
+    def __init__(self, dataset: xarray.Dataset, step: int, source: str | None = None) -> None:
+        self.source = source
         self.data = step_of(dataset, step)
         self.number = int(self.data["step"])
         self.pressure = self.field("pressure")
@@ -92,7 +96,7 @@ class StepView:
         self.title = f"{named} ({_loads(self.data)})".lstrip()
 
     @classmethod
-    def of(cls, result: AnyResult, step: int) -> StepView:
+    def of(cls, result: AnyResult, step: int, source: str | None = None) -> StepView:
         """Return the view of step number ``step`` (from 1; -1 is the last one) of a result.
 
         Raises
@@ -102,7 +106,7 @@ class StepView:
         ValueError
             If the output lacks the pressure of that step.
         """
-        return cls(dataset_of(result), step)
+        return cls(dataset_of(result), step, source)
 
     @property
     def friction(self) -> float:
@@ -181,12 +185,30 @@ class StepView:
         """Return the mesh of the stick area up to its edge."""
         return self.edges().stick_mesh(self.stick & self.contact, self.reserve)
 
-    def at(self, x: Array, y: Array, values: Array | None = None) -> Array:
-        """Return the pressure, or the field with some nodal values, at points of the plane (m).
+    @functools.cached_property
+    def tractions(self) -> TractionField:
+        """Pressure and shear traction at any point, from the source."""
+        return tractions_of(self.data, self.lattice, self.source)
 
-        It is linear on the triangles of the lattice as in the solution, and 0 outside the window.
+    @functools.cached_property
+    def _at_nodes(self) -> dict[str, Array]:
+        return dict(zip(TRACTIONS, self.tractions.at_nodes(), strict=True))
+
+    def shown(self, name: str) -> Array:
+        """Return a field at the nodes; tractions from the source."""
+        values = self.field(name)
+        return self._at_nodes[name] if name in TRACTIONS else values
+
+    def at(self, x: Array, y: Array, field: str | Array = "pressure") -> Array:
+        """Return a field at points of the plane (m), 0 outside the window.
+
+        Tractions come from the source; other fields, and those given by nodal values, are linear on the
+        triangles of the lattice.
         """
-        return linear(self.pressure if values is None else values, self.basis, self.start, x, y)
+        if isinstance(field, str) and field in TRACTIONS:
+            return np.asarray(self.tractions(x, y)[TRACTIONS.index(field)])
+        values = self.field(field) if isinstance(field, str) else field
+        return linear(values, self.basis, self.start, x, y)
 
     def touches(self, x: Array, y: Array) -> Mask:
         """Test which points of the plane (m) are in contact, to the edge between the nodes."""
@@ -196,14 +218,6 @@ class StepView:
         """Test which points of the plane (m) stick, to the edge between the nodes."""
         distances = self.edges().stick_distances(self.stick & self.contact, self.reserve)
         return np.asarray(self.at(x, y, distances) > 0.0)
-
-    @functools.cached_property
-    def pressure_field(self) -> PressureField | None:
-        """Pressure at any point, to the edge between the nodes; None without the gap in the output."""
-        try:
-            return PressureField(self.pressure, self.field("gap"), self.basis, self.start)
-        except ValueError:
-            return None
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
         """Return the limits of a picture of the contact: x_min, x_max, y_min, y_max."""

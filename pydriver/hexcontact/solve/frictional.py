@@ -35,6 +35,7 @@ class FrictionWindow(Window[ContactState]):
             friction_coefficient=self.friction,
             coupling="goodman" if self.case.solver.coupling == "goodman" else "full",
             method=self.case.method_for(self.lattice),
+            iteration="dissertation" if self.case.solver.iteration == "dissertation" else "newton",
             interface=self.case.interface,
             rim_warning=False,
         )

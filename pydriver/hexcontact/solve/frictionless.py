@@ -333,6 +333,7 @@ class Window(ABC, Generic[S]):
             bodies=(self.case.body_1, self.case.body_2),
             friction=coulomb(self.case.deck.friction, self.case.deck.interface) or 0.0,
             sharp=self.case.deck.interface is None,
+            limits=self.friction.limits if self.case.frictional else None,
         )
 
     def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:

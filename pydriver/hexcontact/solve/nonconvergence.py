@@ -133,6 +133,8 @@ def _sliding(
 def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:
     """Return advice, the likeliest first."""
     mu, advice = case.friction_coefficient, []
+    if case.solver.iteration == "dissertation":
+        return ['solver.iteration = "newton"; or a larger solver.tolerance']
     if case.frictional and math.isinf(mu) and worst.residual in ("R_n", "R_t"):
         advice.append(
             "a finite friction.coefficient of 2 to 5, which lets hardly any node slip: without slip a node "

@@ -18,7 +18,18 @@ import numpy as np
 from ..arrays import Array
 from ..core.friction import MOTION, ContactState
 from ..core.lattice import Lattice
-from ..core.steps import FAILED, LIMITED, REJECTED, Change, StepControl, archard_depth, change_by_jump, worn
+from ..core.steps import (
+    FAILED,
+    LIMITED,
+    REJECTED,
+    Change,
+    StepControl,
+    archard_depth,
+    change_by_jump,
+    expected_end,
+    remember_end,
+    worn,
+)
 from ..errors import ConvergenceError, DeckError
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
@@ -82,45 +93,35 @@ class _Ends:
         self.fields = np.zeros((count, 2, 3, *lattice.shape), dtype=np.float32)
         self.numbers = np.zeros((count, 2, len(MOTION)))
         self.cycles = np.full(count, -1.0)
-        self.before: tuple[Array, Array] | None = None  # what was expected of the last load step
-
-    def expected(self, step: int, cycles: float) -> tuple[Array, Array] | None:
-        """Return tractions and motions at the end of a load step, after so many cycles of wear."""
-        if self.cycles[step] < 0.0:
-            return None
-        ahead = cycles - self.cycles[step]
-        (fields, rates), (numbers, changes) = self.fields[step], self.numbers[step]
-        tractions = fields + np.float32(ahead) * rates * (fields[0] > 0.0)
-        np.maximum(tractions[0], 0.0, out=tractions[0])
-        return tractions, numbers + ahead * changes
+        self.before: tuple[Array, Array] | None = None  # pressure and motions expected of the last load step
 
     def guess(self, step: int, cycles: float, state: ContactState) -> tuple[Array, Array] | None:
         """Return tractions and motions to start a load step from, after one whose end `state` was found.
 
-        The pressure and the motions are those of that end, and what is expected to change between the two: so
+        The motions, as the pressure, are those of that end, and what is expected to change between the two: so
         what the expectation misses at both of them is right, above all where the pressure stays as it is. The
         shear traction, which turns round in a cycle, is the expected one.
         """
-        expected, self.before = self.before, self.expected(step, cycles)
-        if expected is None or self.before is None or not step:
-            return self.before
-        (last, last_motions), (tractions, motions) = expected, self.before
-        ahead = tractions.astype(float)
-        ahead[0] = np.maximum(state.pressure + (ahead[0] - last[0]), 0.0)
-        ahead *= ahead[0] > 0.0
-        return ahead, _motions(state) + (motions - last_motions)
+        before, self.before = self.before, None
+        if self.cycles[step] < 0.0:
+            return None
+        ahead, last = cycles - self.cycles[step], self.fields[step]
+        motions = self.numbers[step, 0] + ahead * self.numbers[step, 1]
+        if before is None or not step:
+            tractions, pressure = expected_end(last, ahead)
+            self.before = pressure, motions
+            return tractions, motions
+        tractions, pressure = expected_end(last, ahead, before[0], state.pressure)
+        self.before = pressure, motions
+        return tractions, _motions(state) + (motions - before[1])
 
     def found(self, step: int, cycles: float, state: ContactState) -> None:
         """Remember the end of a load step, in the place of the one before: records are written by then."""
         passed = cycles - self.cycles[step] if self.cycles[step] >= 0.0 else 0.0
-        tractions = state.pressure, state.traction_x, state.traction_y
-        motions = _motions(state)
-        for known, new in (
-            *zip(self.fields[step].swapaxes(0, 1), tractions, strict=True),
-            (self.numbers[step], motions),
-        ):
-            known[1] = (new - known[0]) / passed if passed else 0.0
-            known[0] = new
+        remember_end(state, passed, self.fields[step])
+        known, motions = self.numbers[step], _motions(state)
+        known[1] = (motions - known[0]) / passed if passed else 0.0
+        known[0] = motions
         self.cycles[step] = cycles
 
     @classmethod

@@ -1,0 +1,131 @@
+!> What a coarser lattice contributes to a load step: the change that it finds, or a first guess.
+!>
+!> The coarse problem is set up so that the present fine state, at the coarse
+!> nodes, solves it exactly under the present loads: what coarse tractions
+!> displace too much or too little is put into the initial gap and into the relative
+!> displacement at the beginning of the step,
+!>
+!>     h_c = g + approach - w_c,     s_c = u_c - shift - twist x r - (s - s^n).
+!>
+!> Under the new loads (full approximation scheme, Brandt, Math. Comput. 31, 1977) the change of its
+!> tractions and motions is added to the fine ones. Nodes between coarse ones that slip are put onto the cone.
+!>
+!> Equations: docs/theory/multilevel.md, (M1).
+module hc_coarse_change
+  use hc_precision, only: wp
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, slip, normal, force_control
+  use hc_contact_problem, only: friction_problem_t
+  use hc_transfer, only: prolong, prolong_vector, prolong_edge, prolong_shear, restrict_field, restrict_vector
+  implicit none
+  private
+
+  public :: restrict_state, balance, add_change, prolong_state
+
+contains
+
+  !> Restrict a state to the coarse nodes.
+  subroutine restrict_state(problem, fine, coarse_problem, coarse)
+    type(friction_problem_t), intent(in) :: problem, coarse_problem
+    type(contact_state_t), intent(in) :: fine
+    type(contact_state_t), intent(out) :: coarse
+
+    associate (from => problem%lattice, to => coarse_problem%lattice)
+      call new_friction_state(coarse, to, coarse_problem%space)
+      coarse%pressure = restrict_field(from, fine%pressure, to)
+      coarse%gap = restrict_field(from, fine%gap, to)
+      coarse%traction = restrict_vector(from, fine%traction, to)
+      coarse%relative_displacement = restrict_vector(from, fine%relative_displacement, to)
+    end associate
+    coarse%motion = fine%motion
+    coarse%load = coarse_problem%resultants(coarse%pressure, coarse%traction)
+  end subroutine restrict_state
+
+  !> Set the coarse problem up so that the present state solves it under the present loads.
+  subroutine balance(problem, start, reference, target, before, displacement, model, origin, coarse_target)
+    !> The problem
+    type(friction_problem_t), intent(in) :: problem
+    !> State at the beginning of the step, in balance
+    type(contact_state_t), intent(in) :: start
+    !> Relative displacement s^n at the beginning of the step (n_col, n_row, 2) [m]
+    real(wp), intent(in), contiguous :: reference(:, :, :)
+    !> Loads or motions to be reached
+    type(load_target_t), intent(in) :: target
+    !> That state at the coarse nodes, and w, u_x, u_y there under its tractions (n_col, n_row, 3) [m]
+    type(contact_state_t), intent(in) :: before
+    real(wp), intent(in) :: displacement(:, :, :)
+    !> The problem on the coarse lattice: its initial gap changes
+    type(friction_problem_t), intent(inout) :: model
+    !> Relative displacement at the beginning of its step (n_col, n_row, 2) [m]
+    real(wp), allocatable, intent(out) :: origin(:, :, :)
+    !> Its loads or motions
+    type(load_target_t), intent(out) :: coarse_target
+
+    model%initial_gap = merge(before%gap + before%motion(normal) - displacement(:, :, 1), model%initial_gap, model%candidate)
+    origin = displacement(:, :, 2:) - model%rigid_displacement(before%motion) &
+             - (before%relative_displacement - restrict_vector(problem%lattice, reference, model%lattice))
+    coarse_target = target
+    where (target%control == force_control) coarse_target%value = before%load + (target%value - start%load)
+  end subroutine balance
+
+  !> Add the change of a coarse state to a fine one.
+  subroutine add_change(coarse_problem, before, after, problem, state)
+    type(friction_problem_t), intent(in) :: coarse_problem
+    !> Coarse states
+    type(contact_state_t), intent(in) :: before, after
+    type(friction_problem_t), intent(in) :: problem
+    !> Fine state: tractions and motions change
+    type(contact_state_t), intent(inout) :: state
+    real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
+    real(wp), dimension(size(state%pressure, 1)) :: bound, length
+    integer :: col, row
+
+    allocate (change, mold=state%pressure)
+    allocate (change_of_traction, mold=state%traction)
+    call prolong(coarse_problem%lattice, after%pressure - before%pressure, problem%lattice, change, problem%space)
+    call prolong_vector(coarse_problem%lattice, after%traction - before%traction, problem%lattice, change_of_traction, &
+                        problem%space)
+    allocate (slipping, mold=state%pressure)
+    call prolong(coarse_problem%lattice, merge(1.0_wp, 0.0_wp, after%zone == slip), problem%lattice, slipping, &
+                 problem%space)
+    !$omp parallel do schedule(static) num_threads(problem%space%threads) private(col, bound, length)
+    do row = 1, size(slipping, 2)
+      do col = 1, size(slipping, 1)
+        state%pressure(col, row) = merge(max(state%pressure(col, row) + change(col, row), 0.0_wp), 0.0_wp, &
+                                         problem%candidate(col, row))
+      end do
+      call problem%friction%find_bounds((row - 1)*size(bound) + 1, state%pressure(:, row), bound)
+      do col = 1, size(slipping, 1)
+        if (state%pressure(col, row) <= 0.0_wp) then
+          state%traction(col, row, :) = 0.0_wp
+          cycle
+        end if
+        state%traction(col, row, :) = state%traction(col, row, :) + change_of_traction(col, row, :)
+      end do
+      ! what is interpolated between tractions on the cone lies inside, and would stick
+      call problem%friction%find_lengths(state%traction(:, row, 1), state%traction(:, row, 2), length)
+      do col = 1, size(slipping, 1)
+        if (slipping(col, row) < 1.0_wp .or. state%pressure(col, row) <= 0.0_wp) cycle
+        if (length(col) > 0.0_wp .and. length(col) < bound(col)) then
+          state%traction(col, row, :) = state%traction(col, row, :)*(bound(col)/length(col))
+        end if
+      end do
+    end do
+    !$omp end parallel do
+    state%motion = state%motion + (after%motion - before%motion)
+  end subroutine add_change
+
+  !> Prolong tractions and motions of a coarse state, to start on the finer lattice.
+  subroutine prolong_state(coarse_problem, coarse, problem, state)
+    type(friction_problem_t), intent(in) :: coarse_problem
+    type(contact_state_t), intent(in) :: coarse
+    type(friction_problem_t), intent(in) :: problem
+    type(contact_state_t), intent(inout) :: state
+    if (any(shape(coarse%pressure) /= coarse_problem%lattice%extent)) return
+    if (.not. all(abs(coarse%load) <= huge(1.0_wp))) return
+    call prolong_edge(coarse_problem%lattice, coarse%pressure, problem%lattice, state%pressure, problem%space)
+    call prolong_shear(coarse_problem%lattice, coarse%pressure, coarse%traction, problem%lattice, state%pressure, &
+                       state%traction, problem%space)
+    state%motion = coarse%motion
+  end subroutine prolong_state
+
+end module hc_coarse_change

@@ -61,9 +61,11 @@ module hc_options
     !> Compliance of a layer under the largest pressure, over that of a node, above which pressure and gap are smooth up to the
     !> edge; coarse tolerance there: what is interpolated deserves it
     real(wp) :: soft_layer = 2.0_wp, smooth_tolerance = 3.0e-3_wp
-    !> The preconditioner is given the springs of a compliant interface anew where the residual has fallen to this share, and after
-    !> steps below this length: it takes nodes for stiffer than they are
-    real(wp) :: spring_share = 0.03_wp, short_step = 0.3_wp
+    !> Residual below which a compliant interface is linearised with the stiffness of a node, times this share, for r': the errors
+    !> that are left sit in a few nodes along the edge
+    real(wp) :: close_residual = 0.3_wp, local_share = 0.3_wp
+    !> Share of the residual below which nodes that should enter or leave a compliant interface wait, where projected steps stall
+    real(wp) :: slight_change = 0.1_wp
     !> Iterations in which the springs of a compliant layer are linearised anew; beyond them (exponents of 3 and more, rough
     !> surfaces) only where their linear problem is solved to this share of the whole residual: that does not stall
     integer :: most_linearized = 10
@@ -149,6 +151,9 @@ module hc_options
     !> Compliances of springs, over that of a node, (P5): up to the first one only the inverse symbol counts, from the last one on
     !> only the spring; the one between is that of the body on springs whose symbol is inverted
     real(wp) :: stiff_spring = 0.5_wp, soft_spring = 8.0_wp, loose_spring = 64.0_wp
+    !> Springs along the normal, (P7): elastic compliance of the waves that a single spring acts on, as d_n and the stiffest
+    !> spring times these
+    real(wp) :: wave_of_nodes = 2.0_wp, wave_of_springs = 1.0_wp
   end type preconditioner_options_t
 
   !> Explicit matrices (docs/theory/friction.md, "Direct method").

@@ -43,6 +43,8 @@ module hc_normal_iterate
     real(wp) :: p_max = 0.0_wp
     !> Residual R_n, and the same on the active nodes alone
     real(wp) :: residual = huge(1.0_wp), residual_active = huge(1.0_wp)
+    !> Under a compliant law: the residual of the nodes that would enter or leave the set
+    real(wp) :: residual_changed = huge(1.0_wp)
     !> Active nodes, now and next
     integer :: n_active = 0, n_next = 0
   end type normal_iterate_t
@@ -132,7 +134,7 @@ contains
     logical, intent(out) :: changed
     !> Allocated on failure: a pressure or a gap that is not a finite number
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: r, stiffness, p_max, worst, worst_active
+    real(wp) :: r, stiffness, p_max, worst, worst_active, worst_changed
     integer :: row, n_next, n_changed, n_wrong
 
     r = classification_parameter(level, now)
@@ -140,15 +142,16 @@ contains
     p_max = 0.0_wp
     worst = 0.0_wp
     worst_active = 0.0_wp
+    worst_changed = 0.0_wp
     n_next = 0
     n_changed = 0
     n_wrong = 0
     !$omp parallel do schedule(static) num_threads(level%space%threads) &
-    !$omp& reduction(max: p_max, worst, worst_active) reduction(+: n_next, n_changed, n_wrong)
+    !$omp& reduction(max: p_max, worst, worst_active, worst_changed) reduction(+: n_next, n_changed, n_wrong)
     do row = 1, size(now%p, 2)
       if (allocated(now%offset)) then
-        call classify_compliant_row(level, now, row, r, candidate(:, row), next(:, row), p_max, worst, worst_active, n_next, &
-                                 n_changed, n_wrong)
+        call classify_compliant_row(level, now, row, r, candidate(:, row), next(:, row), p_max, worst, worst_active, &
+                                    worst_changed, n_next, n_changed, n_wrong)
         cycle
       end if
       call classify_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
@@ -161,6 +164,7 @@ contains
     end if
     now%p_max = p_max
     now%residual = worst/p_max
+    now%residual_changed = worst_changed/p_max
     now%residual_active = worst_active/(level%compliance*p_max)
     if (allocated(now%offset)) now%residual_active = worst_active/p_max
     changed = n_changed > 0 .and. n_next > 0
@@ -184,7 +188,8 @@ contains
 
   !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of what it was
   !> linearised to.
-  subroutine classify_compliant_row(level, now, row, r, candidate, next, p_max, worst, worst_active, n_next, n_changed, n_wrong)
+  subroutine classify_compliant_row(level, now, row, r, candidate, next, p_max, worst, worst_active, worst_changed, n_next, &
+                                    n_changed, n_wrong)
     type(normal_lattice_t), intent(in) :: level
     type(normal_iterate_t), intent(in) :: now
     integer, intent(in) :: row
@@ -193,7 +198,7 @@ contains
     logical, intent(in), contiguous :: candidate(:)
     logical, intent(out), contiguous :: next(:)
     !> What the rows before gave, and now this one too
-    real(wp), intent(inout) :: p_max, worst, worst_active
+    real(wp), intent(inout) :: p_max, worst, worst_active, worst_changed
     integer, intent(inout) :: n_next, n_changed
     !> Nodes whose pressure or gap is not a finite number
     integer, intent(inout) :: n_wrong
@@ -207,22 +212,22 @@ contains
     if (n_wrong > 0) return
     call level%law%find_contact(r, now%p(:, row), gap, candidate, next)
     call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate, worst)
+    call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate .and. (next .neqv. now%active(:, row)), &
+                             worst_changed)
     p_max = max(p_max, maxval(now%p(:, row)))
     worst_active = max(worst_active, maxval(abs(left)/(level%compliance + now%compliance(:, row)), mask=now%active(:, row)))
     n_next = n_next + count(next)
     n_changed = n_changed + count(next .neqv. now%active(:, row))
   end subroutine classify_compliant_row
 
-  !> Linearise a compliant law about the present pressure and gap.
-  subroutine linearize_law(level, now, r, precondition)
+  !> Linearise a compliant law about the present pressure and gap, and give the springs to the preconditioner.
+  subroutine linearize_law(level, now, r)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Classification parameter; 0: about the present pressure [Pa/m]
     real(wp), intent(in) :: r
-    !> Give the preconditioner these springs, too; absent: it does
-    logical, intent(in), optional :: precondition
     real(wp) :: gap(size(now%p, 1)), softest, p_max
     integer :: row
 
@@ -237,9 +242,6 @@ contains
     end do
     !$omp end parallel do
     call add_springs(level, now)
-    if (present(precondition)) then
-      if (.not. precondition) return
-    end if
     associate (n => size(now%p))
       call level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
     end associate
@@ -277,7 +279,7 @@ contains
     !$omp end parallel do
   end subroutine subtract_springs
 
-  !> Take a new set of active nodes.
+  !> Take a new set of active nodes; under a compliant law the preconditioner receives it with the springs.
   subroutine set_active(level, now, next)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
@@ -293,7 +295,7 @@ contains
     call move_alloc(swap, next)
     now%n_active = now%n_next
     call find_span(now, level%space)
-    call level%preconditioner%set_active(reshape(now%active, [size(now%active)]))
+    if (.not. allocated(now%compliance)) call level%preconditioner%set_active(reshape(now%active, [size(now%active)]))
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = 0.0_sp

@@ -109,9 +109,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     logical, allocatable :: candidate(:, :), next(:, :)
-    real(wp) :: history(3), fixed_start, pressures, share, softness, sprung_residual
+    real(wp) :: history(3), fixed_start, pressures, share, softness, r
     type(conjugate_gradient_t) :: recurrence
-    logical :: changed, fixed, fresh, compliant, settled, anew
+    logical :: changed, fixed, fresh, compliant, settled, stalled, anew
     integer :: fits
     type(normal_options_t) :: options
 
@@ -124,7 +124,6 @@ contains
     if (allocated(error)) return
     allocate (next, mold=candidate)
     compliant = level%law%is_compliant()
-    sprung_residual = huge(1.0_wp)
     share = 1.0_wp
     anew = .true.
     history = huge(1.0_wp)
@@ -157,6 +156,9 @@ contains
       end if
       if (now%residual <= tolerance .or. sweeps >= max_sweeps) return
       sweeps = sweeps + 1
+      ! nodes of no weight, as there are many along a soft edge, do not stop conjugate gradients again and again
+      stalled = compliant .and. now%residual > options%progress*history(1)
+      if (stalled .and. now%residual_changed <= options%slight_change*now%residual) changed = .false.
       if (sweeps == 1) changed = .true.
 
       ! has the residual come down, compared with the best but the last two?
@@ -176,15 +178,14 @@ contains
         call recurrence%restart()
       end if
       if (compliant) then
-        ! linearising costs no product; the inverse symbol of the springs serves while they change little
-        settled = now%residual < options%spring_share*sprung_residual .or. share < options%short_step
-        if (sweeps > options%most_linearized) then
-          settled = now%residual_active < options%linear_share*now%residual
-          anew = anew .or. settled
-        end if
-        if (changed .or. settled) sprung_residual = now%residual
+        ! linearising costs no product
+        settled = sweeps > options%most_linearized .and. now%residual_active < options%linear_share*now%residual
+        anew = anew .or. settled
         if (changed .or. settled .or. sweeps <= options%most_linearized) then
-          call linearize_law(level, now, classification_parameter(level, now), changed .or. settled)
+          r = classification_parameter(level, now)
+          ! what is left close to the solution are errors of a few nodes along the edge
+          if (now%residual < options%close_residual) r = max(r, options%local_share/level%compliance)
+          call linearize_law(level, now, r)
         end if
         if (by_load) call find_approach(level, now)
       end if

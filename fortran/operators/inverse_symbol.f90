@@ -11,6 +11,7 @@
 module hc_inverse_symbol
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
+  use hc_options, only: preconditioner_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -33,9 +34,8 @@ module hc_inverse_symbol
   integer, parameter :: normal_block(1, 1) = 1, tangential_block(2, 2) = reshape([1, 2, 2, 3], [2, 2])
   !> Self-compliance d_n of a node over lambda_1 and the spacing: K1(0) of the equilateral lattice.
   real(wp), parameter :: self_ratio = 2.854_wp
-  !> Mean compliance of springs, over d_n, up to which they count as stiff; compliance of a single one among them from which
-  !> on it counts as loose: with 4 it took the fewest iterations of 0.5, 1, 2, 4, 8 and none
-  real(wp), parameter :: stiff = 0.5_wp, loose = 4.0_wp
+  !> Excess over the stiffest spring below which a spring counts as equal to it, over t of (P7): single precision
+  real(wp), parameter :: negligible = 1.0e-3_wp
   !> Kernels of the tangential inverse; those on soft springs come after them.
   integer, parameter :: n_tangential = 3
 
@@ -52,15 +52,17 @@ module hc_inverse_symbol
     real(sp), allocatable, private :: given(:, :, :), wanted(:, :, :)
     !> Cost of one application in applications of the full flexibility operator
     real(wp) :: cost = 0.0_wp
-    !> On springs along the normal: the inverse symbol, the factor S of each node, and the stiffness of loose ones (n_col, n_row)
+    !> On springs along the normal: the inverse symbol; the share of a displacement that each node passes on to it, and the
+    !> stiffness of what is left (n)
     type(convolution_t), allocatable, private :: sprung
-    real(sp), allocatable, private :: share(:, :), loose(:, :)
-    !> They are stiffer than the nodes: displacements go on beyond the edge as they do without springs
-    logical, private :: stiff_springs = .false.
+    real(sp), allocatable, private :: share(:), stiffness(:)
+    !> Compliance from which on springs count as loose [m/Pa]; height of the continuation beyond those that do not
+    real(wp), private :: loose = 0.0_wp
+    real(sp), private :: height = 1.0_sp
   contains
     !> Put the nodes on springs along the normal
     procedure :: set_springs
-    !> Return whether springs among stiff ones count as loose
+    !> Return whether springs count as loose
     procedure :: is_loose
     !> Traction that causes a given displacement, approximately
     procedure :: apply
@@ -215,11 +217,15 @@ contains
     type(edge_extension_t), intent(in), optional :: edge
     !> Displacements of nodes on soft springs; absent: without springs
     logical, intent(in), optional :: on_springs
-    real(sp), pointer, contiguous :: field(:)
+    real(sp), pointer, contiguous :: field(:), sprung(:)
     integer :: m, block(2, 2)
 
     if (allocated(self%sprung)) then
-      call apply_on_springs(self, displacement(:, :, 1), traction, edge)
+      associate (n => self%shape(1)*self%shape(2))
+        field(1:n) => displacement(:, :, 1)
+        sprung(1:n) => traction(:, :, 1)
+      end associate
+      call apply_on_springs(self, field, sprung, edge)
       return
     end if
     if (present(edge)) then
@@ -242,41 +248,40 @@ contains
     end do
   end subroutine apply_single
 
-  !> Put the nodes on springs along the normal, of a compliant interface.
-  !>
-  !> Their compliance varies smoothly from the middle of the contact to its edge, so that one inverse symbol, of the body on
-  !> springs of a mean compliance, serves them all, (P7). Loose springs along the edge of stiff ones stand for themselves.
-  subroutine set_springs(self, compliance, active)
+  !> Put the nodes on springs along the normal, of a compliant interface, (P7).
+  subroutine set_springs(self, options, compliance, active)
     class(inverse_symbol_t), intent(inout) :: self
-    !> Compliance of each spring (n_col, n_row) [m/Pa]
-    real(wp), intent(in) :: compliance(:, :)
-    !> Active nodes (n_col, n_row)
-    logical, intent(in) :: active(:, :)
+    !> Tuning numbers
+    type(preconditioner_options_t), intent(in) :: options
+    !> Compliance of each spring (n) [m/Pa]
+    real(wp), intent(in), contiguous :: compliance(:)
+    !> Active nodes (n)
+    logical, intent(in), contiguous :: active(:)
     type(error_t), allocatable :: error
-    real(wp) :: mean, self_compliance
+    real(wp) :: stiffest, self_compliance, elastic, softer
     real(sp) :: stretch
     logical :: found
-    integer :: block, row
+    integer :: block, i
 
+    self%loose = 0.0_wp
     if (.not. any(active .and. compliance > 0.0_wp)) return
     if (.not. allocated(self%sprung)) then
-      allocate (self%sprung, self%share(size(compliance, 1), size(compliance, 2)), &
-                self%loose(size(compliance, 1), size(compliance, 2)))
-      call new_convolution(self%sprung, shape(compliance), good_size(shape(compliance)), 1, 1, self%convolution%space, error)
+      allocate (self%sprung, self%share(size(compliance)), self%stiffness(size(compliance)))
+      call new_convolution(self%sprung, self%shape(:2), good_size(self%shape(:2)), 1, 1, self%convolution%space, error)
       if (.not. allocated(error)) call self%sprung%find_spectra(found, error)
       if (allocated(error)) then
         ! without memory for it: the symbol without springs still is a preconditioner
-        deallocate (self%sprung, self%share, self%loose)
+        deallocate (self%sprung, self%share, self%stiffness)
         return
       end if
     end if
     self_compliance = self_ratio*self%unit
-    mean = minval(compliance, mask=active .and. compliance > 0.0_wp)
-    mean = mean*sum(mean/compliance, mask=active .and. compliance > 0.0_wp) &
-           /sum((mean/compliance)**2, mask=active .and. compliance > 0.0_wp)
-    self%stiff_springs = mean < stiff*self_compliance
+    stiffest = minval(compliance, mask=active .and. compliance > 0.0_wp)
+    elastic = options%wave_of_nodes*self_compliance + options%wave_of_springs*stiffest
+    self%loose = max(self_compliance, (1.0_wp + negligible)*stiffest)
+    self%height = real(self_compliance/(self_compliance + stiffest), sp)
     ! the spectrum is the inverse of the symbol over the number of frequencies
-    stretch = real(mean/self%unit*product(real(good_size(shape(compliance)), wp)), sp)
+    stretch = real(stiffest/self%unit*product(real(good_size(self%shape(:2)), wp)), sp)
     !$omp parallel do schedule(static) num_threads(self%convolution%space%threads)
     do block = 1, self%sprung%n_block
       associate (stiffness => self%convolution%spectrum(:, block, 1))
@@ -284,52 +289,49 @@ contains
       end associate
     end do
     !$omp end parallel do
-    !$omp parallel do schedule(static) num_threads(self%convolution%space%threads)
-    do row = 1, size(compliance, 2)
-      self%share(:, row) = real(sqrt((mean + self_compliance)/(compliance(:, row) + self_compliance)), sp)
-      self%loose(:, row) = 0.0_sp
-      if (.not. self%stiff_springs) cycle
-      where (self%is_loose(compliance(:, row)))
-        self%share(:, row) = 0.0_sp
-        self%loose(:, row) = real(self%unit/(compliance(:, row) + self_compliance), sp)
-      end where
+    !$omp parallel do schedule(static) num_threads(self%convolution%space%threads) private(softer)
+    do i = 1, size(compliance)
+      self%share(i) = 0.0_sp
+      self%stiffness(i) = 0.0_sp
+      if (.not. active(i)) cycle
+      softer = max(compliance(i) - stiffest, 0.0_wp)
+      self%share(i) = real((elastic + stiffest)/(elastic + stiffest + softer), sp)
+      if (softer > negligible*elastic) self%stiffness(i) = real(self%unit/softer, sp)
     end do
     !$omp end parallel do
   end subroutine set_springs
 
-  !> Return whether springs count as loose, which those in the middle are not.
+  !> Return whether springs count as loose: the continuation of displacements begins at the others.
   elemental logical function is_loose(self, compliance)
     class(inverse_symbol_t), intent(in) :: self
     !> Compliance of a spring [m/Pa]
     real(wp), intent(in) :: compliance
 
-    is_loose = compliance > loose*self_ratio*self%unit
+    is_loose = compliance > self%loose
   end function is_loose
 
   !> Apply the inverse for nodes on springs along the normal.
   subroutine apply_on_springs(self, displacement, traction, edge)
     class(inverse_symbol_t), intent(inout) :: self
-    !> Closing of the gap (n_col, n_row)
-    real(sp), intent(in) :: displacement(:, :)
-    !> Pressure (n_col, n_row, 1)
-    real(sp), intent(out), contiguous, target :: traction(:, :, :)
+    !> Closing of the gap (n)
+    real(sp), intent(in), contiguous :: displacement(:)
+    !> Pressure (n)
+    real(sp), intent(out), contiguous, target :: traction(:)
     !> Continuation beyond the nodes where displacements are given
     type(edge_extension_t), intent(in), optional :: edge
-    real(sp), allocatable, target :: shared(:, :, :)
-    real(sp), pointer, contiguous :: field(:)
+    real(sp), allocatable, target :: passed(:)
+    real(sp), pointer, contiguous :: from(:, :, :), onto(:, :, :)
 
-    allocate (shared, mold=traction)
-    shared(:, :, 1) = self%share*displacement
-    if (present(edge) .and. self%stiff_springs) then
-      field(1:size(shared)) => shared
-      call edge%extend(field)
-    end if
-    call self%sprung%convolve(normal_block, shared, traction)
-    if (present(edge) .and. self%stiff_springs) then
-      field(1:size(traction)) => traction
-      call edge%fold(field)
-    end if
-    traction(:, :, 1) = self%share*traction(:, :, 1) + self%loose*displacement
+    allocate (passed(size(displacement)))
+    passed = self%share*displacement
+    if (present(edge)) call edge%extend(passed, self%share, self%height)
+    from(1:self%shape(1), 1:self%shape(2), 1:1) => passed
+    onto(1:self%shape(1), 1:self%shape(2), 1:1) => traction
+    call self%sprung%convolve(normal_block, from, onto)
+    passed = self%stiffness*(displacement - passed)
+    traction = traction - passed
+    if (present(edge)) call edge%fold(traction, self%share, self%height)
+    traction = self%share*traction + passed
   end subroutine apply_on_springs
 
   !> Compute the elastic compliance t_h = 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa].

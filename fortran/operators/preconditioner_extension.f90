@@ -253,10 +253,14 @@ contains
   end subroutine list_neighbors
 
   !> Continue a field beyond the active nodes.
-  subroutine extend(self, field)
+  subroutine extend(self, field, own, first)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
+    !> Share of their own value at the nodes of the rings, to which the rest of the continuation is added: absent, 0 (n)
+    real(sp), intent(in), optional, contiguous :: own(:)
+    !> Height of the continuation in the first ring; absent: 1
+    real(sp), intent(in), optional :: first
     real(sp), allocatable :: value(:), smooth(:)
     integer :: r, k, s
 
@@ -264,35 +268,46 @@ contains
     allocate (value(size(self%node)), smooth(size(self%node)))
     !$omp parallel num_threads(self%space%threads) private(r, k, s)
     do r = 1, size(self%ring) - 1
-      associate (first => self%ring(r), last => self%ring(r + 1) - 1)
+      associate (from => self%ring(r), to => self%ring(r + 1) - 1)
         !$omp do schedule(static)
-        do k = first, last
+        do k = from, to
           value(k) = self%fall(k)*sum_of(field, self%inner(:self%n_inner(k), k))
+          if (r == 1 .and. present(first)) value(k) = first*value(k)
         end do
         !$omp end do
         do s = 1, self%smoothings
           !$omp do schedule(static)
-          do k = first, last
+          do k = from, to
             smooth(k) = sum_of(value, self%beside(:self%n_beside(k), k))/self%n_beside(k)
           end do
           !$omp end do
           !$omp do schedule(static)
-          do k = first, last
+          do k = from, to
             value(k) = smooth(k)
-            field(self%node(k)) = smooth(k)
+            if (.not. present(own)) field(self%node(k)) = smooth(k)
           end do
           !$omp end do
         end do
+        if (.not. present(own)) cycle
+        !$omp do schedule(static)
+        do k = from, to
+          field(self%node(k)) = field(self%node(k)) + (1.0_sp - own(self%node(k)))*value(k)
+        end do
+        !$omp end do
       end associate
     end do
     !$omp end parallel
   end subroutine extend
 
-  !> Apply the transpose of `extend`; the values on the rings have no meaning afterwards.
-  subroutine fold(self, field)
+  !> Apply the transpose of `extend`; the values on the rings have no meaning afterwards, but for those of `own`.
+  subroutine fold(self, field, own, first)
     class(edge_extension_t), intent(in) :: self
     !> Field over the window (n)
     real(sp), intent(inout), contiguous :: field(:)
+    !> Share of their own value at the nodes of the rings: absent, 0 (n)
+    real(sp), intent(in), optional, contiguous :: own(:)
+    !> Height of the continuation in the first ring; absent: 1
+    real(sp), intent(in), optional :: first
     real(sp), allocatable :: value(:), share(:)
     integer :: r, k, s, i
 
@@ -300,27 +315,29 @@ contains
     allocate (value(size(self%node)), share(size(self%node)))
     !$omp parallel num_threads(self%space%threads) private(r, k, s, i)
     do r = size(self%ring) - 1, 1, -1
-      associate (first => self%ring(r), last => self%ring(r + 1) - 1)
+      associate (from => self%ring(r), to => self%ring(r + 1) - 1)
         !$omp do schedule(static)
-        do k = first, last
+        do k = from, to
           value(k) = field(self%node(k))
+          if (present(own)) value(k) = (1.0_sp - own(self%node(k)))*value(k)
+          if (r == 1 .and. present(first)) value(k) = first*value(k)
         end do
         !$omp end do
         do s = 1, self%smoothings
           !$omp do schedule(static)
-          do k = first, last
+          do k = from, to
             share(k) = value(k)/self%n_beside(k)
           end do
           !$omp end do
           !$omp do schedule(static)
-          do k = first, last
+          do k = from, to
             value(k) = sum_of(share, self%beside(:self%n_beside(k), k))
           end do
           !$omp end do
         end do
         ! several nodes add to the same neighbor, always in the same order
         !$omp single
-        do k = first, last
+        do k = from, to
           do i = 1, self%n_inner(k)
             field(self%inner(i, k)) = field(self%inner(i, k)) + self%fall(k)*value(k)
           end do

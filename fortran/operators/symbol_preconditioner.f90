@@ -121,12 +121,14 @@ contains
 
     associate (direction => direction)
       stiff = active
-      ! beyond the nodes on loose springs there is no root of the distance
-      if (present(compliance)) stiff = active .and. .not. self%inverse%is_loose(compliance)
+      ! displacements go on beyond the nodes on stiff springs
+      if (present(compliance)) then
+        call self%inverse%set_springs(self%options, compliance, active)
+        stiff = active .and. .not. self%inverse%is_loose(compliance)
+      end if
       if (.not. allocated(self%edge)) allocate (self%edge)
       call new_edge_extension(self%edge, reshape(stiff, self%extent), self%space, self%options)
     end associate
-    if (present(compliance)) call self%inverse%set_springs(reshape(compliance, self%extent), reshape(active, self%extent))
   end subroutine set_contact
 
   !> Estimate the pressure that causes a closing of the gap.

@@ -3,6 +3,12 @@ module test_preconditioner
   use hc_precision, only: wp
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
+  use hc_options, only: preconditioner_options_t
+  use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_flexibility, only: normal
+  use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility
+  use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_preconditioner, only: preconditioner_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control
@@ -43,9 +49,65 @@ contains
     tests = [ &
       new_test('diagonal', test_diagonal), &
       new_test('diagonal_coupled', test_diagonal_coupled), &
-      new_test('diagonal_frictionless', test_diagonal_frictionless) &
+      new_test('diagonal_frictionless', test_diagonal_frictionless), &
+      new_test('springs', test_springs) &
     ]
   end subroutine collect_preconditioner
+
+  !> On springs along the normal that soften without bound towards the edge M is symmetric and at least the inverse, (P7): for
+  !> x = (K + C) y on the contact, x^T M x >= x^T y.
+  subroutine test_springs(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 40
+    type(lattice_t) :: lattice
+    type(elastic_pair_t) :: pair
+    type(fft_flexibility_t) :: flexibility
+    type(pressure_preconditioner_t) :: preconditioner
+    real(wp), dimension(n, n, 1) :: x, y, w
+    real(wp), dimension(n*n) :: compliance, mx, mw
+    logical :: active(n, n)
+    real(wp) :: work, layer, inside
+    integer :: col, row, softness
+
+    pair = elastic_pair_t(1.0_wp, 0.0_wp, 0.0_wp)
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [n, n], error)
+    if (allocated(error)) return
+    call new_fft_flexibility(flexibility, lattice, pair, error, normal_only=.true.)
+    if (allocated(error)) return
+    call new_symbol_preconditioner(preconditioner, lattice, pair, field_space_t(), preconditioner_options_t(), error)
+    if (allocated(error)) return
+    do softness = -2, 2
+      layer = 3.0_wp*10.0_wp**softness
+      do row = 1, n
+        do col = 1, n
+          inside = 1.0_wp - ((col - 20.3_wp)**2 + (row - 20.4_wp)**2 + (col - 20.3_wp)*(row - 20.4_wp))/16.5_wp**2
+          active(col, row) = inside > 0.0_wp
+          compliance((row - 1)*n + col) = merge(layer*max(inside, 1.0e-8_wp)**(-0.4_wp), 0.0_wp, active(col, row))
+        end do
+      end do
+      call preconditioner%set_active(reshape(active, [n*n]), compliance)
+      call random_number(y)
+      call random_number(w)
+      y(:, :, 1) = merge(y(:, :, 1), 0.0_wp, active)
+      w(:, :, 1) = merge(w(:, :, 1), 0.0_wp, active)
+      call flexibility%apply([normal], y, [normal], x, error)
+      if (allocated(error)) return
+      x(:, :, 1) = merge(x(:, :, 1) + reshape(compliance, [n, n])*y(:, :, 1), 0.0_wp, active)
+      work = 0.0_wp
+      call preconditioner%apply(reshape(x, [n*n]), mx, work)
+      call preconditioner%apply(reshape(w, [n*n]), mw, work)
+      mx = merge(mx, 0.0_wp, reshape(active, [n*n]))
+      mw = merge(mw, 0.0_wp, reshape(active, [n*n]))
+      ! single precision
+      call check(error, dot_product(reshape(w, [n*n]), mx), dot_product(reshape(x, [n*n]), mw), &
+                 1.0e-5_wp*abs(dot_product(reshape(x, [n*n]), mw)), 'w^T M x')
+      if (allocated(error)) return
+      call check_true(error, dot_product(reshape(x, [n*n]), mx) > 0.999_wp*sum(x*y), 'M is at least the inverse')
+      if (allocated(error)) return
+      call check_true(error, dot_product(reshape(x, [n*n]), mx) < 3.5_wp*sum(x*y), 'M is close to the inverse')
+      if (allocated(error)) return
+    end do
+  end subroutine test_springs
 
   subroutine set_active(self, active, compliance, direction)
     class(diagonal_preconditioner_t), intent(inout) :: self

@@ -14,7 +14,7 @@ import pytest
 import xarray
 from typer.testing import CliRunner
 
-from hexcontact import DeckError, fatigue, open_result
+from hexcontact import DeckError, PathWarning, fatigue, open_result
 from hexcontact.cli.app import app
 from hexcontact.deck.below import cycle_of
 from hexcontact.interior import stress as stress_below
@@ -367,3 +367,14 @@ def test_the_page_shows_the_case() -> None:
     shown = tomllib.loads(page.partition("```toml\n")[2].partition("```")[0])
     shown["grid"]["nodes_in_radius"] = 20
     assert shown == tomllib.loads((root / "cases/fretting_fatigue.toml").read_text(encoding="utf-8"))
+
+
+def test_a_cycle_without_steps_between_its_ends_is_warned_of(finished: Path) -> None:
+    result = open_result(finished / "deck.nc")
+    far = {"points": [[0.0, 0.0, 1.0]], "crossland_slope": 0.3}
+    assert len(result.cycle_steps(**CYCLE)) == 4
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(type(result), "cycle_steps", lambda *_, **__: [6, 8, 9])
+        with pytest.warns(PathWarning, match=r"only 3 load steps.*step_tolerance"):
+            result.fatigue("crossland", segment=["pull", "push"], **far)
+        result.fatigue("crossland", steps=[6, 8, 9], **far)  # named one by one: no warning

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
     import xarray
 
-_FEW_STEPS = 8  # load steps of a cycle below which extremes in time, and paths of the shear, may be missed
+_FEW_STEPS = 4  # load steps of a cycle below which a way there or back has nothing between its ends
 
 
 class BelowSurface(ABC):

@@ -39,8 +39,6 @@ module hc_contact_problem
     class(normal_law_t), allocatable :: normal_law
     !> Goodman's approximation: shear tractions do not move the pressure
     logical :: goodman = .false.
-    !> Coordinates of the nodes (n_col, n_row) [m]
-    real(wp), allocatable :: x(:, :), y(:, :)
     !> Self-compliances d_n and d_t of a node [m/Pa]
     real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
     !> Tolerances, caps and tuning numbers of the solver
@@ -56,8 +54,8 @@ module hc_contact_problem
     procedure :: separate
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure :: displacements
-    !> Tangential displacement of a rigid motion
-    procedure :: rigid_displacement
+    !> Tangential displacement of a rigid motion, at all nodes and at those of a row
+    procedure :: rigid_displacement, rigid_displacement_row
     !> Resultants of given tractions
     procedure :: resultants
     !> Compliance beyond which a spring of a compliant law has no effect; that of a node with the stiffest of them
@@ -130,13 +128,10 @@ contains
     call set_geometry(self)
   end subroutine inherit
 
-  !> Set coordinates and self-compliances of the nodes of the lattice.
+  !> Set self-compliances of the nodes of the lattice.
   subroutine set_geometry(self)
     type(friction_problem_t), intent(inout) :: self
 
-    self%x = self%initial_gap
-    self%y = self%initial_gap
-    call self%lattice%coordinates(self%x, self%y)
     self%normal_compliance = normal_self_compliance(self%lattice, self%pair)
     self%tangential_compliance = tangential_self_compliance(self%lattice, self%pair)
   end subroutine set_geometry
@@ -220,26 +215,42 @@ contains
     real(wp), allocatable :: displacement(:, :, :)
     integer :: row
 
-    allocate (displacement(size(self%x, 1), size(self%x, 2), 2))
-    do row = 1, size(self%x, 2)
-      call remote_displacement_row(motion, self%x(:, row), self%y(:, row), displacement(:, row, 1), displacement(:, row, 2))
+    allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 2))
+    do row = 1, size(displacement, 2)
+      call self%rigid_displacement_row(motion, row, displacement(:, row, 1), displacement(:, row, 2))
     end do
   end function rigid_displacement
+
+  !> Compute it at the nodes of a row.
+  pure subroutine rigid_displacement_row(self, motion, row, along, across)
+    class(friction_problem_t), intent(in) :: self
+    !> Motions
+    real(wp), intent(in) :: motion(n_motion)
+    !> Row of the window, from 1 on
+    integer, intent(in) :: row
+    !> Components along x and y (n_col) [m]
+    real(wp), intent(out), contiguous :: along(:), across(:)
+    real(wp), dimension(self%lattice%extent(1)) :: x, y
+
+    call self%lattice%row_coordinates(row, x, y)
+    call remote_displacement_row(motion, x, y, along, across)
+  end subroutine rigid_displacement_row
 
   !> Compute normal load, tangential loads [N] and torque [N m] of given tractions.
   function resultants(self, pressure, traction) result(load)
     class(friction_problem_t), intent(in) :: self
     !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
     real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
-    real(wp) :: load(n_motion), part(n_load, size(pressure, 2))
+    real(wp) :: load(n_motion), part(n_load, size(pressure, 2)), x(size(pressure, 1)), y(size(pressure, 1))
     integer :: row
 
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(x, y)
     do row = 1, size(pressure, 2)
       part(normal, row) = sum(pressure(:, row))
       part(along_x, row) = sum(traction(:, row, 1))
       part(along_y, row) = sum(traction(:, row, 2))
-      part(about_z, row) = dot_product(self%x(:, row), traction(:, row, 2)) - dot_product(self%y(:, row), traction(:, row, 1))
+      call self%lattice%row_coordinates(row, x, y)
+      part(about_z, row) = dot_product(x, traction(:, row, 2)) - dot_product(y, traction(:, row, 1))
     end do
     !$omp end parallel do
     load = 0.0_wp
@@ -311,7 +322,7 @@ contains
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(m, remote) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
       state%gap(:, row) = self%initial_gap(:, row) + displacement(:, row, 1) - state%motion(normal)
-      call remote_displacement_row(state%motion, self%x(:, row), self%y(:, row), remote(:, 1), remote(:, 2))
+      call self%rigid_displacement_row(state%motion, row, remote(:, 1), remote(:, 2))
       do m = 1, 2
         state%relative_displacement(:, row, m) = displacement(:, row, m + 1) - remote(:, m)
         state%slip_increment(:, row, m) = merge(state%relative_displacement(:, row, m) - reference(:, row, m), 0.0_wp, &

@@ -46,15 +46,23 @@ contains
     type(load_target_t), intent(in) :: target
     !> Nodes in contact (n_col, n_row)
     logical, intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
-    integer :: n_contact
+    real(wp), dimension(size(contact, 1)) :: x, y
+    real(wp) :: part(2, size(contact, 2))
+    integer :: n_contact, row
 
     associate (control => target%control, space => problem%space)
       n_contact = max(space%count(contact), 1)
       ! nothing turns a single node
       self%motion = pack([along_x, along_y, about_z], control(along_x:) == force_control .and. &
                          [.true., .true., n_contact > 1])
-      if (control(along_y) == force_control) self%center(1) = space%sum(problem%x, contact)/n_contact
-      if (control(along_x) == force_control) self%center(2) = space%sum(problem%y, contact)/n_contact
+      !$omp parallel do schedule(static) num_threads(space%threads) private(x, y)
+      do row = 1, size(contact, 2)
+        call problem%lattice%row_coordinates(row, x, y)
+        part(:, row) = [sum(x, mask=contact(:, row)), sum(y, mask=contact(:, row))]
+      end do
+      !$omp end parallel do
+      if (control(along_y) == force_control) self%center(1) = sum(part(1, :))/n_contact
+      if (control(along_x) == force_control) self%center(2) = sum(part(2, :))/n_contact
     end associate
     self%arm = sqrt(problem%lattice%cell_area()*n_contact/pi)
   end subroutine new_driven_motions
@@ -87,6 +95,7 @@ contains
     integer, intent(in) :: row
     !> Components along x and y (n_col)
     real(wp), intent(out), contiguous :: ux(:), uy(:)
+    real(wp), dimension(size(ux)) :: x, y
 
     ux = 0.0_wp
     uy = 0.0_wp
@@ -96,8 +105,9 @@ contains
     case (along_y)
       uy = 1.0_wp
     case default
-      ux = -(problem%y(:, row) - self%center(2))/self%arm
-      uy = (problem%x(:, row) - self%center(1))/self%arm
+      call problem%lattice%row_coordinates(row, x, y)
+      ux = -(y - self%center(2))/self%arm
+      uy = (x - self%center(1))/self%arm
     end select
   end subroutine direction_row
 

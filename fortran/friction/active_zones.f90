@@ -3,7 +3,7 @@
 !> Equations: docs/theory/friction.md, (F5), (F8); docs/theory/normal_contact.md, (N6).
 module hc_active_zones
   use hc_precision, only: wp
-  use hc_contact_state, only: separated, stick, slip, about_z, n_motion, remote_displacement_row, force_control
+  use hc_contact_state, only: separated, stick, slip, about_z, n_motion, force_control
   use hc_disc_law, only: normal_to
   use hc_friction_iterate, only: friction_iterate_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions, fix_in_stick
@@ -184,7 +184,7 @@ contains
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(remote, along, across, col, i)
     do row = 1, now%problem%lattice%extent(2)
-      call remote_displacement_row(motion, now%problem%x(:, row), now%problem%y(:, row), remote(:, 1), remote(:, 2))
+      call now%problem%rigid_displacement_row(motion, row, remote(:, 1), remote(:, 2))
       do col = 1, now%problem%lattice%extent(1)
         i = (row - 1)*now%problem%lattice%extent(1) + col
         along = now%origin(i) + remote(col, 1)

@@ -6,6 +6,7 @@ module hc_coupled_system
   use hc_elastic_operators, only: operators_t
   use hc_shear_system, only: shear_system_t
   use hc_linear_system, only: linear_system_t
+  use hc_active_set, only: active_set_t, paired_runs_t, pair_runs
   implicit none
   private
 
@@ -23,9 +24,14 @@ module hc_coupled_system
     real(wp), allocatable :: compliance(:)
     !> mu at slipping nodes, 0 elsewhere; traction across at rest over the pressure, not there if all are 0
     real(wp), allocatable :: slope(:), tilt(:)
+    !> Tractions that are multiplied, zero off the contact; kept between the products of a solution
+    real(wp), allocatable, private :: traction(:)
   contains
     procedure :: product => coupled_product
     procedure :: precondition => coupled_precondition
+    procedure :: product_packed => coupled_product_packed
+    procedure :: precondition_packed => coupled_precondition_packed
+    procedure :: release => release_coupled
   end type coupled_system_t
 
 contains
@@ -65,6 +71,91 @@ contains
       !$omp end parallel do
     end if
   end subroutine coupled_product
+
+  !> Multiply values at the active nodes: pressure and component along t of all nodes in contact, that along e of some.
+  subroutine coupled_product_packed(self, nodes, x, y, error)
+    class(coupled_system_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(active_set_t) :: contact, along_t
+    type(paired_runs_t) :: runs
+    real(wp) :: e
+    integer :: n, k, i, at
+
+    n = size(y)/3
+    if (.not. allocated(self%traction)) then
+      allocate (self%traction(3*n))
+      call self%space%fill(self%traction, 0.0_wp)
+    end if
+    contact = nodes%slice(1, n)
+    along_t = nodes%slice(n + 1, 2*n)
+    call pair_runs(along_t, nodes%slice(2*n + 1, 3*n), runs)
+    associate (n_p => contact%n_active, n_t => along_t%n_active, direction => self%shear%direction)
+      call self%shear%put_in_plane(runs, x(n_p + 1:n_p + n_t), x(n_p + n_t + 1:), self%traction(n + 1:))
+      !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, e)
+      do k = 1, size(contact%first)
+        do i = contact%first(k), contact%last(k)
+          at = contact%place(k) + i - contact%first(k)
+          self%traction(i) = x(at)
+          e = self%slope(i)*x(at)
+          self%traction(n + i) = self%traction(n + i) + direction(1, i)*e
+          self%traction(2*n + i) = self%traction(2*n + i) + direction(2, i)*e
+        end do
+      end do
+      !$omp end parallel do
+      call self%operators%apply([normal, along_x, along_y], self%traction, [normal, along_x, along_y], y, error)
+      if (allocated(error)) return
+      call self%shear%add_springs_packed(runs, x(n_p + 1:n_p + n_t), y(n + 1:))
+      !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at)
+      do k = 1, size(contact%first)
+        do i = contact%first(k), contact%last(k)
+          at = contact%place(k) + i - contact%first(k)
+          if (allocated(self%compliance)) y(i) = y(i) + self%compliance(i)*x(at)
+          if (allocated(self%tilt)) y(n + i) = y(n + i) - self%shear%compliance(i)*self%tilt(i)*x(at)
+        end do
+      end do
+      !$omp end parallel do
+    end associate
+  end subroutine coupled_product_packed
+
+  !> Free the tractions.
+  subroutine release_coupled(self)
+    class(coupled_system_t), intent(inout) :: self
+
+    if (allocated(self%traction)) deallocate (self%traction)
+  end subroutine release_coupled
+
+  !> Precondition the values at the active nodes.
+  subroutine coupled_precondition_packed(self, nodes, n, r, z, error)
+    class(coupled_system_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: r(:)
+    real(wp), intent(inout), contiguous :: z(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(active_set_t) :: contact
+    real(wp), allocatable :: shear(:)
+    integer :: k, i, at
+
+    contact = nodes%slice(1, n/3)
+    associate (n_p => contact%n_active, operators => self%operators)
+      call operators%normal%apply_packed(contact, n/3, r(:n_p), z(:n_p), operators%preconditioning)
+      if (.not. allocated(self%tilt)) then
+        call self%shear%precondition_packed(nodes%slice(n/3 + 1, n), 2*n/3, r(n_p + 1:), z(n_p + 1:), error)
+        return
+      end if
+      shear = r(n_p + 1:)
+      do k = 1, size(contact%first)
+        do i = contact%first(k), contact%last(k)
+          at = contact%place(k) + i - contact%first(k)
+          shear(at) = shear(at) + self%shear%compliance(i)*self%tilt(i)*z(at)
+        end do
+      end do
+      call self%shear%precondition_packed(nodes%slice(n/3 + 1, n), 2*n/3, shear, z(n_p + 1:), error)
+    end associate
+  end subroutine coupled_precondition_packed
 
   !> Precondition pressure and shear traction each by its own preconditioner, the shear traction after the pressure: where a
   !> law has a direction, the pressure moves the rest of springs, which are stiff where a node has slipped far.

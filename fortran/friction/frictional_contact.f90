@@ -90,8 +90,8 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     integer(long) :: finest
 
-    ! initial gap, coordinates, candidates
-    finest = operators_memory(extent, threads, unlike) + 28*int(extent(1), long)*extent(2)
+    ! initial gap, candidates
+    finest = operators_memory(extent, threads, unlike) + 12*int(extent(1), long)*extent(2)
     frictional_contact_memory = finest + finest/3
   end function frictional_contact_memory
 
@@ -108,28 +108,29 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
-    !> Directions of GMRES that are enough as a rule: five or six, and the holes in the heap that those of earlier sweeps left
-    integer, parameter :: n_direction = 7
+    !> Directions of GMRES that are enough as a rule: five or six, and the holes in the heap that earlier sweeps and lattices left
+    integer, parameter :: n_direction = 10
     integer(long) :: n, everywhere, building, iterating, inside, recording
 
     n = int(extent(1), long)*extent(2)
     ! state before without its slip increment, tractions to start from
     everywhere = (8 + 3)*field
-    ! iterate with traction estimates; shear system; weights and vectors of its preconditioner
-    everywhere = everywhere + (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 5*field + half + 4*field + half
+    ! iterate with traction estimates; shear system; weights of its preconditioner
+    everywhere = everywhere + (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 3*field + 2*half
     if (coupled) then
       ! unknowns, slope, constraints thrice, and either what makes them or product, right-hand side
       everywhere = everywhere + (3 + 1)*field + 3*half
       building = (3*3*n_force + 2)*field
-      ! product; GMRES: vector, the products of all directions, the product itself
-      iterating = (3 + 3 + 3*n_direction + 3)*field
-      ! packed: both of all directions, residuals, weights, constraints thrice
-      inside = 3*(2*n_direction + 4 + 3*n_force)*field
+      ! products of the unknowns and of a direction, its tractions; the products of all directions off the contact
+      iterating = (3 + 3 + 3)*field + 3*n_direction*half + 2*2*half
+      ! packed: both of all directions, residuals, constraints thrice
+      inside = 3*(2*n_direction + 3 + 3*n_force)*field - 3*n_direction*half
     else
       ! unknowns, product, traction before; constraints twice, or the vector and image of conjugate gradients
       everywhere = everywhere + 3*2*field + 2*half
       building = (2*2*max(n_force - 1, 1) + 2)*field
-      iterating = 2*2*field
+      ! product of a direction, its tractions, and what the preconditioner gets and gives
+      iterating = 2*2*field + 2*2*half
       ! packed: vectors of conjugate gradients, constraints twice
       inside = 2*(7 + 2*max(n_force - 1, 1))*field
     end if

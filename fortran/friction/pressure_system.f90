@@ -6,6 +6,7 @@ module hc_pressure_system
   use hc_flexibility, only: normal
   use hc_elastic_operators, only: operators_t
   use hc_linear_system, only: linear_system_t
+  use hc_active_set, only: active_set_t
   implicit none
   private
 
@@ -21,6 +22,7 @@ module hc_pressure_system
     procedure :: stretch
     procedure :: product => pressure_product
     procedure :: precondition => pressure_precondition
+    procedure :: precondition_packed => pressure_precondition_packed
   end type pressure_system_t
 
 contains
@@ -65,5 +67,19 @@ contains
       call operators%normal%apply(x, y, operators%preconditioning)
     end associate
   end subroutine pressure_precondition
+
+  !> Apply it to the values at the nodes in contact.
+  subroutine pressure_precondition_packed(self, nodes, n, r, z, error)
+    class(pressure_system_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: r(:)
+    real(wp), intent(inout), contiguous :: z(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (operators => self%operators, error => error)
+      call operators%normal%apply_packed(nodes, n, r, z, operators%preconditioning)
+    end associate
+  end subroutine pressure_precondition_packed
 
 end module hc_pressure_system

@@ -17,7 +17,7 @@ module hc_shear_system
   use hc_inverse_symbol, only: node_compliance
   use hc_elastic_operators, only: operators_t
   use hc_linear_system, only: linear_system_t
-  use hc_active_set, only: active_set_t, new_active_set
+  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t, pair_runs
   implicit none
   private
 
@@ -42,13 +42,15 @@ module hc_shear_system
     !> Elastic compliance 2 lambda_1 (1 + gamma/2) l_e of a node [m/Pa]
     real(wp) :: elastic_compliance = 0.0_wp
     !> Nodes in contact
-    logical, allocatable, private :: contact(:)
     type(active_set_t), private :: nodes
-    !> Components along x and y of what is multiplied, zero off the contact
+    !> Components along x and y of what is multiplied, zero off the contact; kept between the products of a solution
     real(wp), allocatable, private :: from(:)
   contains
     procedure :: product => shear_product
     procedure :: precondition => shear_precondition
+    procedure :: product_packed => shear_product_packed
+    procedure :: precondition_packed => shear_precondition_packed
+    procedure :: release => release_shear
     !> Components along x and y from those in the frames, and back
     procedure :: to_plane, to_frame
     !> Set the nodes in contact, with their frames and compliances
@@ -58,7 +60,9 @@ module hc_shear_system
     !> Reduce the traction of slipping nodes by their compliance
     procedure :: apply_slip_compliance
     !> Put displacements into the frames and add the stretch of the springs; take it off
-    procedure :: add_springs, subtract_springs
+    procedure :: add_springs, add_springs_packed, subtract_springs
+    !> Components along x and y from packed ones in the frames
+    procedure :: put_in_plane
     !> Rounding error of this subtraction
     procedure :: spring_rounding
   end type shear_system_t
@@ -72,22 +76,19 @@ contains
     !> Operator and preconditioners
     type(operators_t), intent(inout), target :: operators
     integer :: n, i
-    logical :: all_nodes(operators%flexibility%lattice%size())
 
     n = operators%flexibility%lattice%size()
     self%operators => operators
     self%space = operators%space
     self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%pair)
-    allocate (self%direction(2, n), self%compliance(n), self%from(2*n))
+    allocate (self%direction(2, n), self%compliance(n))
     !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
       self%direction(:, i) = [1.0_wp, 0.0_wp]
       self%compliance(i) = 0.0_wp
-      self%from([i, n + i]) = 0.0_wp
-      all_nodes(i) = .true.
     end do
     !$omp end parallel do
-    call new_active_set(self%nodes, all_nodes, self%space)
+    call new_active_set(self%nodes, spread(.true., 1, n), self%space)
   end subroutine new_shear_system
 
   !> Set the nodes in contact; their directions and compliances are known.
@@ -95,14 +96,10 @@ contains
     class(shear_system_t), intent(inout), target :: self
     !> Nodes in contact (n)
     logical, intent(in), contiguous :: contact(:)
-    logical :: known
 
-    known = allocated(self%contact)
-    if (known) known = count(self%contact .neqv. contact) == 0
-    if (.not. known) then
-      self%contact = contact
+    if (.not. self%nodes%is_set(contact)) then
       call new_active_set(self%nodes, contact, self%space)
-      call self%space%fill(self%from, 0.0_wp)
+      call self%release()
     end if
     call self%operators%tangential%set_active(contact, self%compliance, self%direction)
   end subroutine set_contact
@@ -244,6 +241,7 @@ contains
     integer :: n, k, i
 
     n = size(self%compliance)
+    call take_from(self)
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
@@ -255,7 +253,109 @@ contains
     call self%operators%apply(shear, self%from, shear, y, error)
     if (allocated(error)) return
     call self%add_springs(x, y)
+    call self%release()
   end subroutine shear_product
+
+  !> Take memory for what is multiplied, zero.
+  subroutine take_from(self)
+    class(shear_system_t), intent(inout) :: self
+
+    if (allocated(self%from)) return
+    allocate (self%from(2*size(self%compliance)))
+    call self%space%fill(self%from, 0.0_wp)
+  end subroutine take_from
+
+  !> Free it.
+  subroutine release_shear(self)
+    class(shear_system_t), intent(inout) :: self
+
+    if (allocated(self%from)) deallocate (self%from)
+  end subroutine release_shear
+
+  !> Multiply values at the active nodes: the component along t of all nodes in contact, that along e of some.
+  subroutine shear_product_packed(self, nodes, x, y, error)
+    class(shear_system_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp), intent(out), contiguous, target :: y(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(active_set_t) :: along_t
+    type(paired_runs_t) :: runs
+
+    call take_from(self)
+    along_t = nodes%slice(1, size(y)/2)
+    call pair_runs(along_t, nodes%slice(size(y)/2 + 1, size(y)), runs)
+    associate (n_t => along_t%n_active)
+      call self%put_in_plane(runs, x(:n_t), x(n_t + 1:), self%from)
+      call self%operators%apply(shear, self%from, shear, y, error)
+      if (allocated(error)) return
+      call self%add_springs_packed(runs, x(:n_t), y)
+    end associate
+  end subroutine shear_product_packed
+
+  !> Compute the components along x and y at the nodes in contact from those along t and e; values elsewhere stay.
+  subroutine put_in_plane(self, runs, along_t, along_e, plane)
+    class(shear_system_t), intent(in) :: self
+    !> Nodes in contact, and which of them have a component along e
+    type(paired_runs_t), intent(in) :: runs
+    !> Components along t and e
+    real(wp), intent(in), contiguous :: along_t(:), along_e(:)
+    !> Components along x and y (2 n)
+    real(wp), intent(inout), contiguous :: plane(:)
+    real(wp) :: t, e
+    integer :: n, k, i
+
+    n = size(plane)/2
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, t, e)
+    do k = 1, size(runs%first)
+      if (runs%second(k) == 0) then
+        do i = runs%first(k), runs%last(k)
+          t = along_t(runs%place(k) + i - runs%first(k))
+          plane(i) = -self%direction(2, i)*t
+          plane(n + i) = self%direction(1, i)*t
+        end do
+      else
+        do i = runs%first(k), runs%last(k)
+          t = along_t(runs%place(k) + i - runs%first(k))
+          e = along_e(runs%second(k) + i - runs%first(k))
+          plane(i) = -self%direction(2, i)*t + self%direction(1, i)*e
+          plane(n + i) = self%direction(1, i)*t + self%direction(2, i)*e
+        end do
+      end if
+    end do
+    !$omp end parallel do
+  end subroutine put_in_plane
+
+  !> Put displacements along x and y into the frames, and add the stretch of the springs.
+  subroutine add_springs_packed(self, runs, along_t, displacement)
+    class(shear_system_t), intent(in) :: self
+    !> Nodes in contact
+    type(paired_runs_t), intent(in) :: runs
+    !> Traction along t at these nodes
+    real(wp), intent(in), contiguous :: along_t(:)
+    !> Components along x and y; then in the frames (2 n)
+    real(wp), intent(inout), contiguous :: displacement(:)
+    real(wp) :: u(2)
+    integer :: n, k, i
+
+    n = size(self%compliance)
+    !$omp parallel num_threads(self%space%threads) private(i, u)
+    !$omp do schedule(static)
+    do i = 1, n
+      u = [displacement(i), displacement(n + i)]
+      displacement(i) = -self%direction(2, i)*u(1) + self%direction(1, i)*u(2)
+      displacement(n + i) = self%direction(1, i)*u(1) + self%direction(2, i)*u(2)
+    end do
+    !$omp end do
+    !$omp do schedule(static)
+    do k = 1, size(runs%first)
+      do i = runs%first(k), runs%last(k)
+        displacement(i) = displacement(i) + self%compliance(i)*along_t(runs%place(k) + i - runs%first(k))
+      end do
+    end do
+    !$omp end do
+    !$omp end parallel
+  end subroutine add_springs_packed
 
   !> Apply the preconditioner of the shear traction.
   subroutine shear_precondition(self, x, y, error)
@@ -268,6 +368,20 @@ contains
       call operators%tangential%apply(x, y, operators%preconditioning)
     end associate
   end subroutine shear_precondition
+
+  !> Apply it to the values at the active nodes.
+  subroutine shear_precondition_packed(self, nodes, n, r, z, error)
+    class(shear_system_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: r(:)
+    real(wp), intent(inout), contiguous :: z(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (operators => self%operators, error => error)
+      call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
+    end associate
+  end subroutine shear_precondition_packed
 
   !> Reduce the tractions of a row by springs in series with the stiffness that each node was found to have in stick.
   pure subroutine slip_compliance_row(n, compliance, ux, uy, qx, qy)

@@ -44,8 +44,8 @@ module hc_lattice
     procedure :: cell_area
     !> Length of the longest edge of the triangulation [m]
     procedure :: spacing => lattice_spacing
-    !> Coordinates of every node of the window [m]
-    procedure :: coordinates
+    !> Coordinates of every node of the window, and of those of one row [m]
+    procedure :: coordinates, row_coordinates
     !> The lattice of every second node of this one
     procedure :: coarsened
     !> Basis vectors over the spacing
@@ -145,18 +145,30 @@ contains
     class(lattice_t), intent(in) :: self
     !> Coordinates of the nodes, (n_col, n_row) [m]
     real(wp), intent(out) :: x(:, :), y(:, :)
-    integer :: col, row
-    real(wp) :: i, j
+    integer :: row
 
     do row = 1, self%extent(2)
-      j = real(self%first(2) + row - 1, wp)
-      do col = 1, self%extent(1)
-        i = real(self%first(1) + col - 1, wp)
-        x(col, row) = self%origin(1) + i*self%basis(1, 1) + j*self%basis(1, 2)
-        y(col, row) = self%origin(2) + i*self%basis(2, 1) + j*self%basis(2, 2)
-      end do
+      call self%row_coordinates(row, x(:, row), y(:, row))
     end do
   end subroutine coordinates
+
+  !> Compute the coordinates of the nodes of a row: faster than to read them.
+  pure subroutine row_coordinates(self, row, x, y)
+    class(lattice_t), intent(in) :: self
+    !> Row of the window, from 1 on
+    integer, intent(in) :: row
+    !> Coordinates of the nodes (n_col) [m]
+    real(wp), intent(out) :: x(:), y(:)
+    integer :: col
+    real(wp) :: i, j
+
+    j = real(self%first(2) + row - 1, wp)
+    do col = 1, self%extent(1)
+      i = real(self%first(1) + col - 1, wp)
+      x(col) = self%origin(1) + i*self%basis(1, 1) + j*self%basis(1, 2)
+      y(col) = self%origin(2) + i*self%basis(2, 1) + j*self%basis(2, 2)
+    end do
+  end subroutine row_coordinates
 
   !> Return the basis vectors over the spacing, as columns: the same to the bit for all equilateral lattices with a row along x.
   pure function unit_basis(self) result(basis)

@@ -4,12 +4,12 @@
 !> as much of the work on them. Active nodes come in runs along the rows of the window, so
 !> that packing is a copy of a few hundred pieces.
 module hc_active_set
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_field_space, only: field_space_t
   implicit none
   private
 
-  public :: active_set_t, new_active_set
+  public :: active_set_t, new_active_set, paired_runs_t, pair_runs
 
   !> Nodes that one thread looks through at a time.
   integer, parameter :: block_size = 8192
@@ -22,7 +22,7 @@ module hc_active_set
     !> First and last node of each run
     integer, allocatable :: first(:), last(:)
     !> Where it begins among the active nodes
-    integer, allocatable, private :: place(:)
+    integer, allocatable :: place(:)
   contains
     !> The active nodes of a field
     procedure :: pack => pack_field
@@ -30,7 +30,21 @@ module hc_active_set
     procedure :: pack_columns
     !> Put them where they belong, the rest of the field stays as it is
     procedure :: unpack => unpack_field
+    !> Those of a part of the nodes, and all nodes that are not active
+    procedure :: slice, complement
+    !> The same nodes of several components
+    procedure :: repeated
+    !> Is it a given set?
+    procedure :: is_set
+    !> Gather nodes in single precision; add a multiple of such values where they belong
+    procedure :: pack_single, add_single
   end type active_set_t
+
+  !> Runs of the active nodes of one field, cut where the same nodes of a second field become active or cease to be.
+  type :: paired_runs_t
+    !> First and last node of each run, and where it begins among the active nodes of both fields; 0: not active in the second
+    integer, allocatable :: first(:), last(:), place(:), second(:)
+  end type paired_runs_t
 
 contains
 
@@ -57,7 +71,7 @@ contains
       before(k + 1) = before(k) + before(k + 1)
     end do
     associate (n_run => before(n_block + 1))
-      allocate (self%first(n_run), self%last(n_run), self%place(n_run))
+      allocate (self%first(n_run), self%last(n_run))
     end associate
     !$omp parallel do schedule(static) num_threads(space%threads)
     do k = 1, n_block
@@ -66,10 +80,7 @@ contains
                      self%first(before(k) + 1:before(k + 1)), self%last(before(k) + 1:before(k + 1)))
     end do
     !$omp end parallel do
-    do k = 1, size(self%first)
-      self%place(k) = self%n_active + 1
-      self%n_active = self%n_active + self%last(k) - self%first(k) + 1
-    end do
+    call number_nodes(self)
     self%space = space
 
   contains
@@ -166,5 +177,180 @@ contains
     end do
     !$omp end parallel do
   end subroutine unpack_field
+
+  !> Return the active nodes among those of a part, counted from its beginning.
+  pure type(active_set_t) function slice(self, from, to) result(part)
+    class(active_set_t), intent(in) :: self
+    !> First and last node of the part
+    integer, intent(in) :: from, to
+    integer :: k, n_run
+
+    part%space = self%space
+    n_run = count(self%first <= to .and. self%last >= from)
+    allocate (part%first(n_run), part%last(n_run))
+    n_run = 0
+    do k = 1, size(self%first)
+      if (self%first(k) > to .or. self%last(k) < from) cycle
+      n_run = n_run + 1
+      part%first(n_run) = max(self%first(k), from) - from + 1
+      part%last(n_run) = min(self%last(k), to) - from + 1
+    end do
+    call number_nodes(part)
+  end function slice
+
+  !> Return the nodes that are not active.
+  pure type(active_set_t) function complement(self, n) result(others)
+    class(active_set_t), intent(in) :: self
+    !> Number of all nodes
+    integer, intent(in) :: n
+    integer :: first(size(self%first) + 1), last(size(self%first) + 1), k, n_run
+
+    others%space = self%space
+    first(1) = 1
+    first(2:) = self%last + 1
+    last(:size(self%first)) = self%first - 1
+    last(size(last)) = n
+    n_run = count(first <= last)
+    allocate (others%first(n_run), others%last(n_run))
+    n_run = 0
+    do k = 1, size(first)
+      if (first(k) > last(k)) cycle
+      n_run = n_run + 1
+      others%first(n_run) = first(k)
+      others%last(n_run) = last(k)
+    end do
+    call number_nodes(others)
+  end function complement
+
+  !> Return the same nodes of several components, one component after the other.
+  pure type(active_set_t) function repeated(self, n, times) result(all_of_them)
+    class(active_set_t), intent(in) :: self
+    !> Nodes of a component, and number of components
+    integer, intent(in) :: n, times
+    integer :: m
+
+    all_of_them%space = self%space
+    associate (n_run => size(self%first))
+      allocate (all_of_them%first(times*n_run), all_of_them%last(times*n_run))
+      do m = 0, times - 1
+        all_of_them%first(m*n_run + 1:(m + 1)*n_run) = self%first + m*n
+        all_of_them%last(m*n_run + 1:(m + 1)*n_run) = self%last + m*n
+      end do
+    end associate
+    call number_nodes(all_of_them)
+  end function repeated
+
+  !> Cut the runs of a set by those of a second one that is a part of it.
+  pure subroutine pair_runs(one, second, runs)
+    type(active_set_t), intent(in) :: one, second
+    type(paired_runs_t), intent(out) :: runs
+    integer, dimension(2*(size(one%first) + size(second%first))) :: first, last, place, other
+    integer :: i, j, k, n, to, at
+
+    n = 0
+    j = 1
+    do k = 1, size(one%first)
+      i = one%first(k)
+      do while (i <= one%last(k))
+        do while (j < size(second%first))
+          if (second%last(j) >= i) exit
+          j = j + 1
+        end do
+        to = one%last(k)
+        at = 0
+        if (j <= size(second%first)) then
+          if (second%first(j) > i) then
+            to = min(to, second%first(j) - 1)
+          else if (second%last(j) >= i) then
+            to = min(to, second%last(j))
+            at = second%place(j) + i - second%first(j)
+          end if
+        end if
+        n = n + 1
+        first(n) = i
+        last(n) = to
+        place(n) = one%place(k) + i - one%first(k)
+        other(n) = at
+        i = to + 1
+      end do
+    end do
+    allocate (runs%first(n), runs%last(n), runs%place(n), runs%second(n))
+    runs%first = first(:n)
+    runs%last = last(:n)
+    runs%place = place(:n)
+    runs%second = other(:n)
+  end subroutine pair_runs
+
+  !> Count the nodes of the runs, and number them.
+  pure subroutine number_nodes(self)
+    type(active_set_t), intent(inout) :: self
+    integer :: k
+
+    allocate (self%place(size(self%first)))
+    self%n_active = 0
+    do k = 1, size(self%first)
+      self%place(k) = self%n_active + 1
+      self%n_active = self%n_active + self%last(k) - self%first(k) + 1
+    end do
+  end subroutine number_nodes
+
+  !> Return whether the active nodes are those of a set.
+  logical function is_set(self, active)
+    class(active_set_t), intent(in) :: self
+    !> The set
+    logical, intent(in), contiguous :: active(:)
+    integer :: k, within
+
+    within = 0
+    !$omp parallel do schedule(static) num_threads(self%space%threads) reduction(+: within)
+    do k = 1, size(self%first)
+      within = within + count(active(self%first(k):self%last(k)))
+    end do
+    !$omp end parallel do
+    is_set = within == self%n_active
+    if (is_set) is_set = self%space%count(active) == within
+  end function is_set
+
+  !> Gather the active nodes of a field, in single precision.
+  subroutine pack_single(self, field, factor, packed)
+    class(active_set_t), intent(in) :: self
+    !> Field over all nodes
+    real(wp), intent(in), contiguous :: field(:)
+    !> What it is multiplied by
+    real(wp), intent(in) :: factor
+    !> Its values at the active nodes (n_active)
+    real(sp), intent(inout), contiguous :: packed(:)
+    integer :: k, i, shift
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
+    do k = 1, size(self%first)
+      shift = self%place(k) - self%first(k)
+      do i = self%first(k), self%last(k)
+        packed(i + shift) = real(factor*field(i), sp)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine pack_single
+
+  !> Add a multiple of values in single precision to the active nodes of a field.
+  subroutine add_single(self, packed, factor, field)
+    class(active_set_t), intent(in) :: self
+    !> Values at the active nodes (n_active)
+    real(sp), intent(in), contiguous :: packed(:)
+    !> What they are multiplied by
+    real(wp), intent(in) :: factor
+    !> Field over all nodes; the rest stays as it is
+    real(wp), intent(inout), contiguous :: field(:)
+    integer :: k, i, shift
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
+    do k = 1, size(self%first)
+      shift = self%place(k) - self%first(k)
+      do i = self%first(k), self%last(k)
+        field(i) = field(i) + factor*packed(i + shift)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine add_single
 
 end module hc_active_set

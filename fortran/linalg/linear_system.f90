@@ -14,6 +14,7 @@ module hc_linear_system
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
   use hc_field_space, only: field_space_t
+  use hc_active_set, only: active_set_t, new_active_set
   implicit none
   private
 
@@ -34,6 +35,10 @@ module hc_linear_system
     procedure(linear_map), deferred :: product
     !> z = M r for an r that vanishes off the active nodes; z is used on them only
     procedure :: precondition => no_precondition
+    !> The same for the values at the active nodes alone, x, r and z
+    procedure :: product_packed, precondition_packed
+    !> Free what products keep for the next one
+    procedure :: release
   end type linear_system_t
 
   abstract interface
@@ -67,6 +72,54 @@ contains
     end associate
   end subroutine no_precondition
 
+  !> Compute y = A x of the values at the active nodes.
+  subroutine product_packed(self, nodes, x, y, error)
+    class(linear_system_t), intent(inout) :: self
+    !> Active nodes
+    type(active_set_t), intent(in) :: nodes
+    !> Values at the active nodes
+    real(wp), intent(in), contiguous :: x(:)
+    !> Values at all nodes
+    real(wp), intent(out), contiguous, target :: y(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable, target :: from(:)
+
+    allocate (from(size(y)))
+    call self%space%fill(from, 0.0_wp)
+    call nodes%unpack(x, from)
+    call self%product(from, y, error)
+  end subroutine product_packed
+
+  !> Compute z = M r at the active nodes.
+  subroutine precondition_packed(self, nodes, n, r, z, error)
+    class(linear_system_t), intent(inout) :: self
+    !> Active nodes, and number of all nodes
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    !> Values at the active nodes
+    real(wp), intent(in), contiguous :: r(:)
+    real(wp), intent(inout), contiguous :: z(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable, target :: from(:), onto(:)
+
+    allocate (from(n), onto(n))
+    call self%space%fill(from, 0.0_wp)
+    call nodes%unpack(r, from)
+    call self%precondition(from, onto, error)
+    if (allocated(error)) return
+    call nodes%pack(onto, z)
+  end subroutine precondition_packed
+
+  !> Free what products keep: by default nothing is kept.
+  subroutine release(self)
+    class(linear_system_t), intent(inout) :: self
+
+    associate (nothing_of => self)
+    end associate
+  end subroutine release
+
   !> Compute M B, the constraint vectors after the preconditioner, zero off the active nodes.
   subroutine precondition_constraints(system, active, constraint, mb, error)
     !> Operator and preconditioner
@@ -79,17 +132,18 @@ contains
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    integer :: i, m
+    type(active_set_t) :: nodes
+    real(wp), allocatable :: r(:), z(:)
+    integer :: m
 
-    allocate (mb(size(constraint, 1), size(constraint, 2)))
+    call new_active_set(nodes, active, system%space)
+    allocate (r(nodes%n_active), z(nodes%n_active), mb(size(constraint, 1), size(constraint, 2)))
     do m = 1, size(constraint, 2)
-      call system%precondition(constraint(:, m), mb(:, m), error)
+      call nodes%pack(constraint(:, m), r)
+      call system%precondition_packed(nodes, size(active), r, z, error)
       if (allocated(error)) return
-      !$omp parallel do schedule(static) num_threads(system%space%threads)
-      do i = 1, size(active)
-        if (.not. active(i)) mb(i, m) = 0.0_wp
-      end do
-      !$omp end parallel do
+      call system%space%fill(mb(:, m), 0.0_wp)
+      call nodes%unpack(z, mb(:, m))
     end do
   end subroutine precondition_constraints
 

@@ -55,8 +55,8 @@ contains
     real(wp), intent(out), optional :: drift
 
     type(active_set_t) :: nodes
-    !> Over all nodes: what is multiplied or preconditioned (zero off the active nodes), and what comes of it
-    real(wp), allocatable :: from(:), onto(:)
+    !> Product of a direction, over all nodes
+    real(wp), allocatable :: onto(:)
     !> On the active nodes
     real(wp), allocatable :: r(:), z(:), d(:), ad(:), x_active(:), ax_active(:), rhs_active(:), b(:, :), m_b(:, :)
     type(conjugate_gradient_t) :: recurrence
@@ -80,8 +80,7 @@ contains
     end associate
     call nodes%pack(x, x_active)
     call nodes%pack(ax, ax_active)
-    allocate (onto(size(x)), from(size(x)))
-    call space%fill(from, 0.0_wp)
+    allocate (onto(size(x)))
     call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0
     largest = 0.0_wp
@@ -105,10 +104,8 @@ contains
       end if
       largest = max(largest, residual)
       if (residual <= tolerance .or. iterations >= max_iterations) exit
-      call nodes%unpack(r, from)
-      call system%precondition(from, onto, error)
+      call system%precondition_packed(nodes, size(x), r, z, error)
       if (allocated(error)) return
-      call nodes%pack(onto, z)
       call space%add_columns(m_b, -matmul(inverse, space%dots(b, z)), z)
 
       call recurrence%last_share(space%dot(r, z), step, anew)
@@ -121,8 +118,7 @@ contains
         end if
       end do
       !$omp end parallel do
-      call nodes%unpack(d, from)
-      call system%product(from, onto, error)
+      call system%product_packed(nodes, d, onto, error)
       if (allocated(error)) return
       call nodes%pack(onto, ad)
       step = recurrence%step_length(space%dot(d, ad))
@@ -145,6 +141,7 @@ contains
       !$omp end parallel
       iterations = iterations + 1
     end do
+    call system%release()
     if (residual <= tolerance) outcome = solution_accurate
     ! the largest of several numbers hides one that is not a number
     if (.not. ieee_is_finite(space%dot(r, r))) outcome = solution_broke_off

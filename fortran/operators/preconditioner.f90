@@ -8,6 +8,7 @@
 !> Equations: docs/theory/preconditioner.md.
 module hc_preconditioner
   use hc_precision, only: wp, sp
+  use hc_active_set, only: active_set_t
   implicit none
   private
 
@@ -22,8 +23,8 @@ module hc_preconditioner
     procedure(set_active), deferred :: set_active
     !> Estimate the traction that causes a displacement
     procedure(apply), deferred :: apply
-    !> The same in single precision
-    procedure :: apply_single
+    !> The same in single precision, and for the values at the active nodes alone
+    procedure :: apply_single, apply_packed
     !> Forget the active nodes, and free what was stored for them
     procedure :: clear
   end type preconditioner_t
@@ -73,6 +74,26 @@ contains
     call self%apply(given, wanted, work)
     traction = real(wanted, sp)
   end subroutine apply_single
+
+  !> Compute z = M r at the active nodes.
+  subroutine apply_packed(self, nodes, n, displacement, traction, work)
+    class(preconditioner_t), intent(inout) :: self
+    !> Active nodes of a vector, and its length
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    !> Displacement and the traction that causes it, at the active nodes
+    real(wp), intent(in), contiguous :: displacement(:)
+    real(wp), intent(inout), contiguous :: traction(:)
+    !> Work so far, in applications of the full flexibility operator; this one is added
+    real(wp), intent(inout) :: work
+    real(wp), allocatable :: given(:), wanted(:)
+
+    allocate (given(n), wanted(n))
+    given = 0.0_wp
+    call nodes%unpack(displacement, given)
+    call self%apply(given, wanted, work)
+    call nodes%pack(wanted, traction)
+  end subroutine apply_packed
 
   !> Forget the active nodes: by default nothing is stored for them.
   subroutine clear(self)

@@ -22,7 +22,7 @@ module hc_symbol_preconditioner
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_active_set, only: active_set_t, new_active_set
+  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t, pair_runs
   use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol, node_compliance
   use hc_preconditioner, only: preconditioner_t
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
@@ -50,6 +50,7 @@ module hc_symbol_preconditioner
     procedure :: set_active => set_contact
     procedure :: apply => apply_to_pressure
     procedure :: apply_single => apply_to_pressure_single
+    procedure :: apply_packed => apply_to_pressure_packed
     procedure :: clear => clear_contact
   end type pressure_preconditioner_t
 
@@ -61,18 +62,19 @@ module hc_symbol_preconditioner
     !> Compliance D along t, and direction e
     real(wp), pointer, contiguous :: compliance(:) => null(), direction(:, :) => null()
     !> Weights sqrt(chi) of each node in the inverse symbols without and with soft springs; is one of them not zero?
-    real(wp), allocatable :: weight(:, :)
+    real(sp), allocatable :: weight(:, :)
     logical :: used(2) = .true.
-    !> Active nodes, and their runs
-    logical, allocatable :: active(:)
+    !> Nodes in contact
     type(active_set_t) :: nodes
-    !> Components along x and y
-    real(sp), allocatable :: displacement(:), traction(:)
   contains
     procedure :: set_active => set_sheared
     procedure :: apply => apply_to_shear
+    procedure :: apply_packed => apply_to_shear_packed
     procedure :: clear => clear_sheared
   end type shear_preconditioner_t
+
+  !> Rounding errors of the sum of squares of weights.
+  real(wp), parameter :: rounding = 8.0_wp*epsilon(1.0_sp)
 
 contains
 
@@ -142,6 +144,44 @@ contains
     work = work + self%inverse%cost
   end subroutine apply_to_pressure
 
+  !> Estimate it at the nodes in contact alone.
+  subroutine apply_to_pressure_packed(self, nodes, n, displacement, traction, work)
+    class(pressure_preconditioner_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: displacement(:)
+    real(wp), intent(inout), contiguous :: traction(:)
+    real(wp), intent(inout) :: work
+    real(sp), allocatable :: given(:), wanted(:)
+    integer :: i, k, shift
+
+    allocate (given(n), wanted(n))
+    !$omp parallel num_threads(self%space%threads) private(i, shift)
+    !$omp do schedule(static)
+    do i = 1, n
+      given(i) = 0.0_sp
+    end do
+    !$omp end do
+    !$omp do schedule(static)
+    do k = 1, size(nodes%first)
+      shift = nodes%place(k) - nodes%first(k)
+      do i = nodes%first(k), nodes%last(k)
+        given(i) = real(displacement(i + shift)/self%unit, sp)
+      end do
+    end do
+    !$omp end do
+    !$omp end parallel
+    call self%apply_single(given, wanted, work)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
+    do k = 1, size(nodes%first)
+      shift = nodes%place(k) - nodes%first(k)
+      do i = nodes%first(k), nodes%last(k)
+        traction(i + shift) = wanted(i)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine apply_to_pressure_packed
+
   !> Estimate it in single precision.
   subroutine apply_to_pressure_single(self, displacement, traction, work)
     class(pressure_preconditioner_t), intent(inout) :: self
@@ -169,23 +209,20 @@ contains
 
     self%compliance => compliance
     self%direction => direction
-    known = allocated(self%active)
-    if (known) known = count(self%active .neqv. active) == 0
+    known = allocated(self%weight)
+    if (known) known = self%nodes%is_set(active)
     if (.not. known) then
-      self%active = active
       if (.not. allocated(self%edge)) allocate (self%edge)
       call new_edge_extension(self%edge, reshape(active, self%extent), self%space, self%options)
       call new_active_set(self%nodes, active, self%space)
     end if
-    if (.not. allocated(self%weight)) then
-      allocate (self%weight(size(active), 2), self%displacement(2*size(active)), self%traction(2*size(active)))
-    end if
+    if (.not. allocated(self%weight)) allocate (self%weight(size(active), 2))
     used = .false.
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i) reduction(.or.: used)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
-        self%weight(i, :) = blend(self%options, compliance(i)/self%elastic_compliance)
-        used = used .or. self%weight(i, :) > 0.0_wp
+        self%weight(i, :) = real(blend(self%options, compliance(i)/self%elastic_compliance), sp)
+        used = used .or. self%weight(i, :) > 0.0_sp
       end do
     end do
     !$omp end parallel do
@@ -198,59 +235,90 @@ contains
     real(wp), intent(in), contiguous, target :: displacement(:)
     real(wp), intent(out), contiguous, target :: traction(:)
     real(wp), intent(inout) :: work
-    integer :: m
+    type(active_set_t) :: both
+    real(wp), allocatable :: given(:), wanted(:)
 
-    call apply_springs(self%nodes, self%space%threads, self%weight, self%compliance, displacement, traction)
+    both = self%nodes%repeated(size(displacement)/2, 2)
+    allocate (given(both%n_active), wanted(both%n_active))
+    call both%pack(displacement, given)
+    call self%apply_packed(both, size(displacement), given, wanted, work)
+    call both%unpack(wanted, traction)
+  end subroutine apply_to_shear
+
+  !> Estimate it at the active nodes: the component along t of all nodes in contact, that along e of some.
+  subroutine apply_to_shear_packed(self, nodes, n, displacement, traction, work)
+    class(shear_preconditioner_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: displacement(:)
+    real(wp), intent(inout), contiguous :: traction(:)
+    real(wp), intent(inout) :: work
+    type(active_set_t) :: along_t, along_e
+    type(paired_runs_t) :: runs
+    !> Components along x and y
+    real(sp), allocatable :: given(:), wanted(:)
+    integer :: m, n_t
+
+    along_t = nodes%slice(1, n/2)
+    along_e = nodes%slice(n/2 + 1, n)
+    call pair_runs(along_t, along_e, runs)
+    n_t = along_t%n_active
+    call apply_springs(runs, self%space%threads, self%weight, self%compliance, displacement(:n_t), traction(:n_t))
+    traction(n_t + 1:) = 0.0_wp
+    allocate (given(n), wanted(n))
     do m = 1, size(self%used)
       if (.not. self%used(m)) cycle
-      call to_plane(self%nodes, self%space%threads, self%direction, self%weight(:, m), self%unit, displacement, &
-                    self%displacement)
-      if (m == 1) call self%inverse%apply_single(self%displacement, self%traction, self%edge)
+      call to_plane(runs, self%space%threads, self%direction, self%weight(:, m), self%unit, displacement(:n_t), &
+                    displacement(n_t + 1:), given)
+      if (m == 1) call self%inverse%apply_single(given, wanted, self%edge)
       ! displacements on soft springs are not continued beyond the contact
-      if (m == 2) call self%inverse%apply_single(self%displacement, self%traction, on_springs=.true.)
+      if (m == 2) call self%inverse%apply_single(given, wanted, on_springs=.true.)
       work = work + self%inverse%cost
-      call add_in_frames(self%nodes, self%space%threads, self%direction, self%weight(:, m), self%traction, traction)
+      call add_in_frames(runs, self%space%threads, self%direction, self%weight(:, m), wanted, traction(:n_t), &
+                         traction(n_t + 1:))
     end do
-  end subroutine apply_to_shear
+  end subroutine apply_to_shear_packed
 
   ! The arguments of the following procedures are no pointers, so that the compiler can exclude aliases.
 
   !> Apply the part chi_3/D along t.
-  subroutine apply_springs(nodes, threads, weight, compliance, displacement, traction)
+  subroutine apply_springs(runs, threads, weight, compliance, displacement, traction)
     !> Active nodes
-    type(active_set_t), intent(in) :: nodes
+    type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
     !> Weights of both inverse symbols (n, 2), compliance D (n)
-    real(wp), intent(in), contiguous :: weight(:, :), compliance(:)
-    !> Displacement and traction, in the frames (2 n)
+    real(sp), intent(in), contiguous :: weight(:, :)
+    real(wp), intent(in), contiguous :: compliance(:)
+    !> Displacement and traction along t, at the active nodes
     real(wp), intent(in), contiguous :: displacement(:)
     real(wp), intent(inout), contiguous :: traction(:)
     real(wp) :: left
-    integer :: n, k, i
+    integer :: k, i, at
 
-    n = size(compliance)
-    !$omp parallel do schedule(static) num_threads(threads) private(i, left)
-    do k = 1, size(nodes%first)
-      do i = nodes%first(k), nodes%last(k)
-        left = 1.0_wp - sum(weight(i, :)**2)
-        traction(i) = 0.0_wp
-        if (compliance(i) > 0.0_wp) traction(i) = left/compliance(i)*displacement(i)
-        traction(n + i) = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(threads) private(i, at, left)
+    do k = 1, size(runs%first)
+      do i = runs%first(k), runs%last(k)
+        at = runs%place(k) + i - runs%first(k)
+        left = 1.0_wp - sum(real(weight(i, :), wp)**2)
+        traction(at) = 0.0_wp
+        if (left > rounding .and. compliance(i) > 0.0_wp) traction(at) = left/compliance(i)*displacement(at)
       end do
     end do
     !$omp end parallel do
   end subroutine apply_springs
 
   !> Weight a displacement and turn it to x and y, zero off the active nodes: its continuation beyond the contact is made afresh.
-  subroutine to_plane(nodes, threads, direction, weight, unit, frame, plane)
+  subroutine to_plane(runs, threads, direction, weight, unit, along_t, along_e, plane)
     !> Active nodes
-    type(active_set_t), intent(in) :: nodes
+    type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
     !> Direction e (2, n), weight (n), and unit of the displacement
-    real(wp), intent(in), contiguous :: direction(:, :), weight(:)
+    real(wp), intent(in), contiguous :: direction(:, :)
+    real(sp), intent(in), contiguous :: weight(:)
     real(wp), intent(in) :: unit
-    !> Displacement in the frames, and along x and y (2 n)
-    real(wp), intent(in), contiguous :: frame(:)
+    !> Displacement along t and e at the active nodes
+    real(wp), intent(in), contiguous :: along_t(:), along_e(:)
+    !> Displacement along x and y (2 n)
     real(sp), intent(out), contiguous :: plane(:)
     real(wp) :: t, e
     integer :: n, k, i
@@ -263,39 +331,50 @@ contains
     end do
     !$omp end do
     !$omp do schedule(static)
-    do k = 1, size(nodes%first)
-      do i = nodes%first(k), nodes%last(k)
-        t = weight(i)/unit*frame(i)
-        e = weight(i)/unit*frame(n + i)
-        plane(i) = real(-direction(2, i)*t + direction(1, i)*e, sp)
-        plane(n + i) = real(direction(1, i)*t + direction(2, i)*e, sp)
-      end do
+    do k = 1, size(runs%first)
+      if (runs%second(k) == 0) then
+        do i = runs%first(k), runs%last(k)
+          t = weight(i)/unit*along_t(runs%place(k) + i - runs%first(k))
+          plane(i) = real(-direction(2, i)*t, sp)
+          plane(n + i) = real(direction(1, i)*t, sp)
+        end do
+      else
+        do i = runs%first(k), runs%last(k)
+          t = weight(i)/unit*along_t(runs%place(k) + i - runs%first(k))
+          e = weight(i)/unit*along_e(runs%second(k) + i - runs%first(k))
+          plane(i) = real(-direction(2, i)*t + direction(1, i)*e, sp)
+          plane(n + i) = real(direction(1, i)*t + direction(2, i)*e, sp)
+        end do
+      end if
     end do
     !$omp end do
     !$omp end parallel
   end subroutine to_plane
 
   !> Add a weighted traction along x and y to one in the frames.
-  subroutine add_in_frames(nodes, threads, direction, weight, plane, frame)
+  subroutine add_in_frames(runs, threads, direction, weight, plane, along_t, along_e)
     !> Active nodes
-    type(active_set_t), intent(in) :: nodes
+    type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
     !> Direction e (2, n) and weight (n)
-    real(wp), intent(in), contiguous :: direction(:, :), weight(:)
-    !> Traction along x and y, and in the frames (2 n)
+    real(wp), intent(in), contiguous :: direction(:, :)
+    real(sp), intent(in), contiguous :: weight(:)
+    !> Traction along x and y (2 n), and along t and e at the active nodes
     real(sp), intent(in), contiguous :: plane(:)
-    real(wp), intent(inout), contiguous :: frame(:)
-    real(wp) :: t, e
-    integer :: n, k, i
+    real(wp), intent(inout), contiguous :: along_t(:), along_e(:)
+    integer :: n, k, i, at
 
     n = size(weight)
-    !$omp parallel do schedule(static) num_threads(threads) private(i, t, e)
-    do k = 1, size(nodes%first)
-      do i = nodes%first(k), nodes%last(k)
-        t = -direction(2, i)*plane(i) + direction(1, i)*plane(n + i)
-        e = direction(1, i)*plane(i) + direction(2, i)*plane(n + i)
-        frame(i) = frame(i) + weight(i)*t
-        frame(n + i) = frame(n + i) + weight(i)*e
+    !$omp parallel do schedule(static) num_threads(threads) private(i, at)
+    do k = 1, size(runs%first)
+      do i = runs%first(k), runs%last(k)
+        at = runs%place(k) + i - runs%first(k)
+        along_t(at) = along_t(at) + weight(i)*(-direction(2, i)*plane(i) + direction(1, i)*plane(n + i))
+      end do
+      if (runs%second(k) == 0) cycle
+      do i = runs%first(k), runs%last(k)
+        at = runs%second(k) + i - runs%first(k)
+        along_e(at) = along_e(at) + weight(i)*(direction(1, i)*plane(i) + direction(2, i)*plane(n + i))
       end do
     end do
     !$omp end parallel do
@@ -308,7 +387,7 @@ contains
     self%compliance => null()
     self%direction => null()
     if (allocated(self%edge)) deallocate (self%edge)
-    if (allocated(self%active)) deallocate (self%active, self%weight, self%displacement, self%traction)
+    if (allocated(self%weight)) deallocate (self%weight)
   end subroutine clear_sheared
 
   !> Compute sqrt(chi) of the inverse symbols without and with soft springs; the rest of the squares belongs to 1/D.

@@ -21,7 +21,7 @@ module test_direct_friction
   use hc_flexibility_dense, only: dense_flexibility_t, new_dense_flexibility
   use hc_lapack, only: dposv
   use hc_options, only: direct_options_t
-  use testing, only: test_t, new_test, check, check_true, largest
+  use testing, only: test_t, new_test, check, check_true, largest, coordinate
   implicit none
   private
 
@@ -842,7 +842,9 @@ contains
 
     call sphere(problem, 9, 7, 0.2_wp, 0.4_wp, coulomb_t(0.4_wp), error)
     if (allocated(error)) return
-    problem%candidate = problem%x > -0.2_wp .and. problem%x**2 + problem%y**2 > 0.04_wp
+    associate (x => coordinate(problem%lattice, 1), y => coordinate(problem%lattice, 2))
+      problem%candidate = x > -0.2_wp .and. x**2 + y**2 > 0.04_wp
+    end associate
     call new_direct_friction(solver, problem, error)
     if (allocated(error)) return
     call step(solver, state, [f, f, f, f], [load, 0.0_wp, 0.0_wp, 0.0_wp], error)

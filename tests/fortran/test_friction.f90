@@ -19,7 +19,7 @@ module test_friction
   use hc_elastic_operators, only: operators_t, new_operators
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
-  use testing, only: test_t, new_test, check, check_raised, check_true, largest
+  use testing, only: test_t, new_test, check, check_raised, check_true, largest, coordinate
   implicit none
   private
 
@@ -572,7 +572,7 @@ contains
       if (allocated(error)) return
       call check(error, state%motion(along_x), shift, 6.0e-4_wp*shift, 'shift')
       if (allocated(error)) return
-      associate (x => contact%problem%x, y => contact%problem%y)
+      associate (x => coordinate(contact%problem%lattice, 1), y => coordinate(contact%problem%lattice, 2))
         center = sum(x, mask=state%zone == stick)/count(state%zone == stick)
         call check(error, center, e, 0.004_wp, 'center of the stick disc')
         if (allocated(error)) return

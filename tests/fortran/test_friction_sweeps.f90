@@ -12,7 +12,7 @@ module test_friction_sweeps
   use hc_load_constraints, only: overloads
   use hc_frictional_contact, only: frictional_contact_t
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check_true
+  use testing, only: test_t, new_test, check_true, coordinate
   implicit none
   private
 
@@ -92,7 +92,8 @@ contains
 
     call new_sphere(contact, 20, 0.0_wp, 0.0_wp, coulomb_t(mu), error, n_threads=1)
     if (allocated(error)) return
-    associate (x => contact%problem%x, y => contact%problem%y, cell => contact%problem%lattice%cell_area())
+    associate (x => coordinate(contact%problem%lattice, 1), y => coordinate(contact%problem%lattice, 2), &
+               cell => contact%problem%lattice%cell_area())
       pressure = sqrt(max(1.0_wp - x**2 - y**2, 0.0_wp))
       pressure = pressure*load/(cell*sum(pressure))
       do i = 1, size(shares)
@@ -138,7 +139,7 @@ contains
 
     call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(mu), error, n_threads=1)
     if (allocated(error)) return
-    associate (problem => contact%problem, pressure => 1.0_wp + contact%problem%x)
+    associate (problem => contact%problem, pressure => 1.0_wp + coordinate(contact%problem%lattice, 1))
       is_said = [overloads(problem, target(held, 0.61_wp, 0.8_wp), pressure, 1.0_wp), &
                  overloads(problem, target(held, 0.59_wp, 0.8_wp), pressure, 0.0_wp), &
                  overloads(problem, target(along, 0.99_wp, 5.0_wp), pressure, 0.0_wp), &

@@ -20,7 +20,7 @@ module test_laws
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_true, largest
+  use testing, only: test_t, new_test, check, check_true, largest, coordinate
   implicit none
   private
 
@@ -112,7 +112,7 @@ contains
     if (allocated(error)) return
     call check_true(error, state%converged, 'converged')
     if (allocated(error)) return
-    mu = merge(smooth, rough, coulomb%problem%x < 0.0_wp)
+    mu = merge(smooth, rough, coordinate(coulomb%problem%lattice, 1) < 0.0_wp)
     length = norm2(state%traction, dim=3)
     call check_true(error, all(length <= mu*state%pressure*(1.0_wp + 1.0e-12_wp)), 'within the bound of each node')
     if (allocated(error)) return
@@ -241,7 +241,9 @@ contains
     type(friction_problem_t) :: problem
 
     problem = coulomb%problem
-    law%coefficient = merge(left, right, reshape(coulomb%problem%x, [coulomb%problem%lattice%size()]) < 0.0_wp)
+    associate (lattice => coulomb%problem%lattice)
+      law%coefficient = merge(left, right, reshape(coordinate(lattice, 1), [lattice%size()]) < 0.0_wp)
+    end associate
     deallocate (problem%friction)
     allocate (problem%friction, source=law)
     call new_frictional_contact(nodal, problem, error, 2)

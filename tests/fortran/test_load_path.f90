@@ -16,7 +16,7 @@ module test_load_path
   use hc_contact_entry, only: entry_displacement
   use hc_load_path, only: advance
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_true, largest
+  use testing, only: test_t, new_test, check, check_true, largest, coordinate
   implicit none
   private
 
@@ -475,7 +475,7 @@ contains
 
     call new_sphere(solver%frictional_contact_t, 40, 0.0_wp, 0.0_wp, coulomb_t(0.3_wp), error)
     if (allocated(error)) return
-    associate (x => solver%problem%x, y => solver%problem%y)
+    associate (x => coordinate(solver%problem%lattice, 1), y => coordinate(solver%problem%lattice, 2))
       r = sqrt(x**2 + y**2)
       do i = 1, 2
         do k = 1, 2
@@ -515,8 +515,8 @@ contains
       state%pressure = 1.0e-6_wp*sqrt(max(radius - r, 0.0_wp))
       state%gap = far**1.5_wp
       where (r > 0.0_wp)
-        state%relative_displacement(:, :, 1) = -far**power(k)*solver%problem%x/r
-        state%relative_displacement(:, :, 2) = -far**power(k)*solver%problem%y/r
+        state%relative_displacement(:, :, 1) = -far**power(k)*coordinate(solver%problem%lattice, 1)/r
+        state%relative_displacement(:, :, 2) = -far**power(k)*coordinate(solver%problem%lattice, 2)/r
       end where
     end subroutine edge_state
 
@@ -708,7 +708,7 @@ contains
 
     call new_sphere(solver%frictional_contact_t, 20, 0.0_wp, 0.0_wp, coulomb_t(0.3_wp), error)
     if (allocated(error)) return
-    associate (x => solver%problem%x, y => solver%problem%y)
+    associate (x => coordinate(solver%problem%lattice, 1), y => coordinate(solver%problem%lattice, 2))
       gap = 0.5_wp*((x - x(1, 1))**2 + (y - y(1, 1))**2)
     end associate
     solver%problem%initial_gap = gap

@@ -15,7 +15,7 @@ module test_nodal_friction
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check, check_true, largest
+  use testing, only: test_t, new_test, check, check_true, largest, coordinate
   implicit none
   private
 
@@ -90,7 +90,7 @@ contains
     if (.not. allocated(error)) call solve(nodal, [f, d, d, d], [load, 0.0_wp, 0.0_wp, 20.0_wp], state, error)
     if (allocated(error)) return
     mu = coefficients(nodal, inner, outer)
-    associate (x => nodal%problem%x, y => nodal%problem%y)
+    associate (x => coordinate(nodal%problem%lattice, 1), y => coordinate(nodal%problem%lattice, 2))
       call check(error, largest(merge(norm2(state%traction, dim=3) - mu*state%pressure, 0.0_wp, state%zone == slip)), 0.0_wp, &
                  1.0e-8_wp, 'mu(r) p')
       if (allocated(error)) return
@@ -180,7 +180,9 @@ contains
 
       p = 1.0_wp
       call problem%friction%find_bounds(1, p, bound)
-      expected = reshape(merge(inner, outer, hypot(problem%x, problem%y) < ring), shape(expected))
+      associate (x => coordinate(problem%lattice, 1), y => coordinate(problem%lattice, 2))
+        expected = reshape(merge(inner, outer, hypot(x, y) < ring), shape(expected))
+      end associate
       call check(error, bound, expected, 0.0_wp, what)
     end subroutine check_law
 
@@ -195,7 +197,7 @@ contains
     call new_nodal(0.0_wp, inner, 1.0e9_wp, nodal, error)
     if (.not. allocated(error)) call solve(nodal, [f, f, f, d], [load, 0.05_wp*load, 0.0_wp, 0.0_wp], state, error)
     if (allocated(error)) return
-    associate (smooth => hypot(nodal%problem%x, nodal%problem%y) < ring)
+    associate (smooth => hypot(coordinate(nodal%problem%lattice, 1), coordinate(nodal%problem%lattice, 2)) < ring)
       call check_true(error, all(state%zone == slip .or. .not. smooth), 'they slip')
       if (allocated(error)) return
       call check(error, largest(merge(norm2(state%traction, dim=3), 0.0_wp, smooth)), 0.0_wp, 1.0e-300_wp, 'no traction')
@@ -326,7 +328,7 @@ contains
     real(wp), intent(in) :: within, beyond
     real(wp), allocatable :: mu(:, :)
 
-    mu = merge(within, beyond, hypot(contact%problem%x, contact%problem%y) < ring)
+    mu = merge(within, beyond, hypot(coordinate(contact%problem%lattice, 1), coordinate(contact%problem%lattice, 2)) < ring)
   end function coefficients
 
   !> A sphere with one coefficient within a ring, and another beyond it.

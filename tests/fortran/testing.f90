@@ -14,12 +14,13 @@ module testing
   use, intrinsic :: iso_fortran_env, only: output_unit
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
   implicit none
   private
 
   public :: test_t, suite_t, new_test, new_suite, run_suites
   public :: check, check_true, check_raised, check_succeeded, fail
-  public :: data_file, largest, open_table
+  public :: data_file, largest, open_table, coordinate
 
   !> A named test.
   type :: test_t
@@ -326,6 +327,17 @@ contains
       if (first /= '#') exit
     end do
   end subroutine open_table
+
+  !> One coordinate of all nodes of a window (n_col, n_row).
+  function coordinate(lattice, axis)
+    type(lattice_t), intent(in) :: lattice
+    !> 1: x, 2: y
+    integer, intent(in) :: axis
+    real(wp) :: coordinate(lattice%extent(1), lattice%extent(2)), both(lattice%extent(1), lattice%extent(2), 2)
+
+    call lattice%coordinates(both(:, :, 1), both(:, :, 2))
+    coordinate = both(:, :, axis)
+  end function coordinate
 
   !> An argument of the command line, empty if there is none.
   function argument(number) result(value)

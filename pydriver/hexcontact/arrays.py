@@ -37,8 +37,9 @@ def reals(values: ArrayLike, name: str, shape: tuple[int, ...] | None = None, me
         If it has another shape, or holds complex numbers, text, objects, rows of different lengths or masked
         values.
     """
-    # numpy.ma is loaded at its first use
-    if type(values) is not np.ndarray and isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+    # numpy.ma, which takes a while, is loaded at its first use
+    derived = isinstance(values, np.ndarray) and type(values) is not np.ndarray
+    if derived and isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise DeckError(f"{name}: an array without masked values expected")
     try:
         array = np.asarray(values)

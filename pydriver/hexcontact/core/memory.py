@@ -29,14 +29,13 @@ def available(cgroups: Path = Path("/sys/fs/cgroup"), process: Path = Path("/pro
     process : Path
         File with the groups of this process.
     """
-    import psutil
-
-    machine = int(psutil.virtual_memory().available)
-    return min([machine, *_left_in_limits(), *_left_in_groups(cgroups, process)])
+    return min([_left_on_machine(), *_left_in_limits(), *_left_in_groups(cgroups, process)])
 
 
 def resident() -> int:
     """Return the resident memory (bytes) of this process, with the interpreter and all libraries."""
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        return int(Path("/proc/self/statm").read_text().split()[1]) * mmap.PAGESIZE
     import psutil
 
     return int(psutil.Process().memory_info().rss)
@@ -93,6 +92,17 @@ def give_back() -> None:
 def claim(needed: int) -> None:
     """Raise OSError unless a number of bytes is available at once; some libraries crash without."""
     mmap.mmap(-1, needed, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS).close()
+
+
+def _left_on_machine() -> int:
+    """Return the memory (bytes) that the machine has left, by Linux itself or else by psutil."""
+    with contextlib.suppress(OSError, ValueError):
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+    import psutil
+
+    return int(psutil.virtual_memory().available)
 
 
 def _left_in_limits() -> Iterator[int]:

@@ -229,8 +229,16 @@ def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:
     solver, mu, beta = case.solver, case.friction_coefficient, abs(case.pair.beta)
     if solver.algorithm != "incremental" or solver.entry != "implicit" or not mu or case.adaptive:
         return
+    coupled = beta > _ALIKE and not math.isnan(mu)
     growing = list(_growing(case))
-    if growing and beta > _ALIKE and not math.isnan(mu):
+    if not coupled and not any(ratio for _, _, ratio in growing):
+        return  # without the estimates that the growth of the contact takes
+    if (growth := case.growth) < _STEADY:
+        return
+    assert case.estimate is not None
+    radius = case.estimate.radius
+    growing = [(radius * one**growth, radius * other**growth, ratio) for one, other, ratio in growing]
+    if growing and coupled:
         before, after, _ = np.array(growing).T
         yield expected_entry_error(before, after, mu / beta, None, _STEP_ERROR)
     if oblique := [entry for entry in growing if entry[2]]:
@@ -239,17 +247,14 @@ def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:
 
 
 def _growing(case: Problem) -> Iterator[tuple[float, float, float]]:
-    """Yield the radius before and after each step in which the contact grows, and Q/mu P if it changes."""
+    """Yield the share of the largest load before and after each step in which it grows, and changed Q/mu P."""
     ((name, largest),) = case.largest_drives[0].items()
-    assert case.estimate is not None
-    radius, control = case.estimate.radius, LOADS["z"].index(name)
-    if case.growth < _STEADY:
-        return
+    control = LOADS["z"].index(name)
     before, sheared = 0.0, (0.0, 0.0, 0.0)
     for step in case.load_steps:
         after = before
         if step.z.control == ("force", "displacement")[control]:
-            after = radius * max(step.z.value / largest, 0.0) ** case.growth
+            after = max(step.z.value / largest, 0.0)
         shear = (step.x.value, step.y.value, step.twist.value)
         if after > before:
             yield before, after, _load_ratio(case, step) if shear != sheared else 0.0

@@ -140,6 +140,7 @@ class Problem:
         self.window_fixed = window.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # if the window follows from it alone
         self.estimate: Estimate | None = None  # None for an array of gaps
+        self._estimates: dict[tuple[str, float], Estimate] = {}  # at the largest load or approach
         self.lattice = self._size(deck.grid, given.source, lattice)
         if self._friction.varies and self.lattice.size <= _MOST_CHECKED_NODES:
             self.friction_law(self.lattice)
@@ -429,14 +430,17 @@ class Problem:
         """Exponent of the contact radius over load or approach, near the largest one; 0 if it is unknown."""
         ((name, value), *_) = self.largest_drives[0].items()
         try:
-            small, large = (self.estimated(**{name: load}).radius for load in (value / 8, value))
+            large = self._estimates.get((name, value)) or self.estimated(**{name: value})
+            small = self.estimated(**{name: value / 8})
         except NoContactFound:
             return 0.0
-        return math.log(large / small) / math.log(8.0)
+        return math.log(large.radius / small.radius) / math.log(8.0)
 
     def _largest_contact(self) -> Estimate:
         """Estimate the contact at the largest load of the history, by force and by approach."""
-        found = [self.estimated(**drive) for drive in self.largest_drives]
+        for drive in self.largest_drives:
+            self._estimates |= {known: self.estimated(**drive) for known in drive.items()}
+        found = [*self._estimates.values()]
         return found[0] if len(found) == 1 else found[0].joined(found[1])
 
     @property

@@ -16,7 +16,7 @@ import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,10 @@ from ..errors import DeckError
 from ..files import beginning, reading
 from .check import MATERIALS, fault_of_record
 from .layout import Layout, Metadata, assemble
-from .result import Result
 from .step import Step
+
+if TYPE_CHECKING:
+    from .result import Result
 
 SUFFIX = ".npz"
 STOPPED = "stopped.txt"  # the reason of an early end
@@ -105,6 +107,8 @@ class Journal:
 
     def result(self, path: Path) -> Result:
         """Return all finished steps as a result in memory; `path` is its name."""
+        from .result import Result
+
         with reading(self.folder, "a journal"):
             dataset = assemble(self.metadata, self, self.complete)
         if self.stopped:

@@ -13,7 +13,6 @@ import os
 import sys
 import threading
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,11 +26,12 @@ from ..variables import SCHEMA_VERSION, VARIABLES
 from . import mesh
 from .check import fault_of_dimensions, fault_of_fields, fault_of_result
 from .layout import COORDINATES, Layout, Metadata
-from .result import Result
 from .step import Step
 
 if TYPE_CHECKING:
     import netCDF4
+
+    from .result import Result
 
 _CHUNK = 512  # nodes of a chunk along row and col
 _MARK = b"hexcontact sha-2"
@@ -227,6 +227,8 @@ def read_output(path: Path) -> Result:
     with reading(path):
         import xarray
 
+        from .result import Result
+
         # the mesh, for other programs, repeats rows and columns
         dataset = xarray.open_dataset(path, engine="netcdf4", drop_variables=mesh.VARIABLES)
         result = Result(dataset, str(path))
@@ -249,8 +251,13 @@ def _digest(descriptor: int, size: int) -> bytes:
     def of_block(start: int) -> bytes:
         return hashlib.sha256(os.pread(descriptor, min(_BLOCK, size - start), start)).digest()
 
+    starts = range(0, size, _BLOCK)
+    if len(starts) <= 1:
+        return hashlib.sha256(b"".join(map(of_block, starts))).digest()
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:  # hashing releases the interpreter
-        return hashlib.sha256(b"".join(pool.map(of_block, range(0, size, _BLOCK)))).digest()
+        return hashlib.sha256(b"".join(pool.map(of_block, starts))).digest()
 
 
 def seal(path: Path) -> None:

@@ -18,19 +18,22 @@ import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import flush, make_anew, reading, replacing, require_utf8
-from ..interior.tables import files_of
 from ..lock import Lock, names_a_run
 from .journal import STOPPED, SUFFIX, Journal, journal_of, read_record, write_record
 from .layout import Layout, Metadata
 from .netcdf import is_ours, read_output, require_free, write
-from .result import Result
 from .step import Step
 from .trials import TrialFolder, foreign_file, linked_folder, remove_all
 
+if TYPE_CHECKING:
+    from .result import Result
+
+# Words of a deck with tables [[stress]] or [[fatigue]], whose keys may be written with escapes.
+_BELOW = ("stress", "fatigue", "\\")
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _LACKING = {*LACKING, None}
 
@@ -84,6 +87,15 @@ def _continues(journal: Journal, output: Result) -> bool:
 def same_run(journal: Journal, output: Result) -> bool:
     """Test whether `output` and the steps of `journal` are of one run."""
     return journal.metadata.run == output.dataset.attrs.get("run")
+
+
+def _stress_files(deck: str, output: Path) -> Iterable[Path]:
+    """Return the files beside an output that hold the tables [[stress]] and [[fatigue]] of its deck."""
+    if not any(name in deck for name in _BELOW):
+        return ()
+    from ..interior.tables import files_of
+
+    return files_of(deck, output).values()
 
 
 class Store:
@@ -264,7 +276,7 @@ class Store:
                 f"{self.path} is not a result of hexcontact that can be read, so it is not overwritten; "
                 "delete it or choose another output"
             )
-        require_free(files_of(self.metadata.deck, self.path).values(), overwrite)
+        require_free(_stress_files(self.metadata.deck, self.path), overwrite)
         with self.writing("the journal"):
             if left:  # they become the old output, which a complete new one replaces
                 with contextlib.suppress(DeckError):

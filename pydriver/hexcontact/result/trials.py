@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from ..files import beginning, reading, replacing
 from ..lock import names_a_run
 from .journal import Journal, journal_of
 from .layout import Metadata
-from .result import Result
+
+if TYPE_CHECKING:
+    from .result import Result
 
 VERSION = 2  # 1 had no checksum
 _JOURNAL = re.compile(r"\d+_\d+\.nc\.d")

@@ -25,8 +25,6 @@ from ..deck.below import cycle_of
 from ..deck.interface import coulomb
 from ..deck.units import readable
 from ..errors import DeckError
-from ..interior import fatigue, stress
-from ..interior.region import region
 from ..problem.checks import stage_of
 from ..problem.loads import MOTIONS, LoadStep
 from ..problem.problem import Problem
@@ -69,6 +67,11 @@ def peak_memory(case: Problem, lattice: Lattice) -> int:
 
 def _stress_memory(case: Problem, lattice: Lattice, kept: bool = False) -> int:
     """Return the memory (bytes) of the tables [[stress]] and [[fatigue]] after the run."""
+    if not (case.deck.stress or case.deck.fatigue):
+        return 0
+    from ..interior import fatigue, stress
+    from ..interior.region import region
+
     needed = 0
     for table in case.deck.stress:
         all_steps = math.ceil(len(case.load_steps) / case.output.every)
@@ -80,7 +83,7 @@ def _stress_memory(case: Problem, lattice: Lattice, kept: bool = False) -> int:
         points = region(lattice, **cycle.where)
         below = fatigue.memory_needed(lattice, points, steps) + _ITEM * 5 * steps * lattice.size
         needed = max(needed, below, _tractions_memory(case, lattice, steps, None))
-    return needed + _LOADED_AFTER * bool(case.deck.stress or case.deck.fatigue)
+    return needed + _LOADED_AFTER
 
 
 def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
@@ -91,6 +94,8 @@ def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
 
 def _tractions_memory(case: Problem, lattice: Lattice, steps: int, source: str | None) -> int:
     """Return the memory (bytes) of the tractions of some steps, corrected at sharp edges."""
+    from ..interior import stress
+
     mu = case.friction_coefficient  # nan where it varies
     sheared = math.isnan(mu) or 0.0 < mu < math.inf
     nodes, unlike = case.contact_nodes(lattice), case.pair.beta != 0.0

@@ -7,23 +7,23 @@ import logging
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import AccuracyWarning, HexcontactError
-from ..interior.tables import computed, files_of, write_netcdf
 from ..problem.overview import parameters_of
 from ..problem.problem import Problem
-from ..result.export import kept_steps
 from ..result.layout import Metadata, assemble
 from ..result.netcdf import require_free
-from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
 from ..text import visible
-from . import lattices
 from .events import Callback, Listener, Listeners, Stopped
 from .log import Log
 from .progress import reporter
 from .steps import steps
+
+if TYPE_CHECKING:
+    from ..result.result import Result
 
 
 def metadata_of(case: Problem) -> Metadata:
@@ -116,10 +116,14 @@ def checked(result: Result) -> Result:
 
 def _in_memory(case: Problem, listener: Listener) -> Result:
     """Solve a case; if a callback ends the run, the result has the finished steps of the present lattice."""
+    from ..result.result import Result
+
     about, trials, stopped = metadata_of(case), None, ""
     finished: list[Step] = []
     try:
         if case.accuracy is not None:
+            from . import lattices
+
             refinement = lattices.refine(case, lattices.InMemory(finished, listener))
             about, trials = refinement.metadata(about), refinement.trials
             finished = [refinement.with_errors(step) for step in finished]
@@ -154,6 +158,8 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
     """
     try:
         if case.accuracy is not None:
+            from . import lattices
+
             solver = lattices.OnDisk(store, listener)
             solver.finish(lattices.refine(case, solver))
         else:
@@ -173,6 +179,9 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
 
 def write_stresses(output: Path, only_missing: bool = False) -> Iterator[Path]:
     """Write the tables [[stress]] and [[fatigue]] of the deck of a result beside it, and yield the files."""
+    from ..interior.tables import computed, files_of, write_netcdf
+    from ..result.export import kept_steps
+
     result = open_result(output)
     try:
         files = files_of(result.deck, output)

@@ -20,7 +20,6 @@ from ..problem.arguments import known_keywords, middle_of, with_radians
 from ..problem.loads import History, LoadStep
 from ..problem.problem import Problem
 from ..result.layout import Metadata, assemble
-from ..result.result import Result
 from ..result.step import Step
 from ..result.store import Store, open_result
 from . import steps as solving
@@ -29,6 +28,8 @@ from .run import metadata_of
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
+
+    from ..result.result import Result
 
 _AT_REST = ("tangential_load_x", "tangential_load_y", "twist")  # zero unless they are given
 _FINENESS = ("spacing", "nodes_across", "nodes_in_radius", "origin")
@@ -135,6 +136,8 @@ class Session:
         DeckError
             If there is none.
         """
+        from ..result.result import Result
+
         _ = self.step
         if self._store is None:
             about = self._described(self._loads, len(self._steps)) if self._by_hand else self._about

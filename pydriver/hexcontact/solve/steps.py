@@ -24,7 +24,6 @@ from .events import Listener
 from .frictional import FrictionWindow
 from .frictionless import NormalWindow, Window
 from .log import Log
-from .wear import WearPath
 
 _SAME = 1e-9  # relative difference of equal initial gaps
 
@@ -89,8 +88,12 @@ def steps(
     _announce(case, lattice, done, listener)
     held = len(case.load_steps) if in_memory else 0
     kind: type[GivenPath] = GivenPath
-    if targets is None and (case.adaptive or case.deck.wear):
-        kind = WearPath if case.deck.wear else AdaptivePath
+    if targets is None and case.deck.wear:
+        from .wear import WearPath
+
+        kind = WearPath
+    elif targets is None and case.adaptive:
+        kind = AdaptivePath
     path = kind(case, window_type(case)(case, lattice, held, listener), before)
     targets = case.load_steps[path.position :] if targets is None else targets
     for step in _solved(path, before, targets):

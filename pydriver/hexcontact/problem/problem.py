@@ -140,7 +140,6 @@ class Problem:
         self.window_fixed = window.is_fixed(deck.grid)
         self._contact: Estimate | None = None  # if the window follows from it alone
         self.estimate: Estimate | None = None  # None for an array of gaps
-        self._estimates: dict[tuple[str, float], Estimate] = {}  # at the largest load or approach
         self.lattice = self._size(deck.grid, given.source, lattice)
         if self._friction.varies and self.lattice.size <= _MOST_CHECKED_NODES:
             self.friction_law(self.lattice)
@@ -175,8 +174,7 @@ class Problem:
     @property
     def adaptive(self) -> bool:
         """Whether load steps are chosen during the solution: some are "auto", and have a history."""
-        incremental = self.solver.algorithm == "incremental"
-        return incremental and any(step.ramp is not None for step in self.load_steps)
+        return self.solver.algorithm == "incremental" and any(s.ramp is not None for s in self.load_steps)
 
     @property
     def planned_steps(self) -> int:
@@ -438,8 +436,7 @@ class Problem:
 
     def _largest_contact(self) -> Estimate:
         """Estimate the contact at the largest load of the history, by force and by approach."""
-        for drive in self.largest_drives:
-            self._estimates |= {known: self.estimated(**drive) for known in drive.items()}
+        self._estimates = {one: self.estimated(**d) for d in self.largest_drives for one in d.items()}
         found = [*self._estimates.values()]
         return found[0] if len(found) == 1 else found[0].joined(found[1])
 

@@ -21,7 +21,9 @@ def timed(name: str, call: Callable[[], object]) -> None:
     before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
     call()
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    print(f"{name}: {time.process_time() - start:.1f} s of the processor, peak memory +{grown / 1024:.0f} MiB")
+    print(
+        f"{name}: {time.process_time() - start:.1f} s of the processor, peak memory +{grown / 1024:.0f} MiB"
+    )
 
 
 def main() -> None:

@@ -472,7 +472,8 @@ def test_a_command_imports_only_what_it_needs(deck: Path, command: str) -> None:
     if command == "check":
         spared |= {"hexcontact.solve.run", "hexcontact.analytic", "netCDF4", "numpy.ma"}
     program = (
-        f"import sys\nfrom hexcontact.cli.app import main\nsys.argv = ['', {command!r}, {str(deck)!r}, '--json']\n"
+        "import sys\nfrom hexcontact.cli.app import main\n"
+        f"sys.argv = ['', {command!r}, {str(deck)!r}, '--json']\n"
         f"try:\n    main()\nexcept SystemExit:\n    pass\nprint(sorted({spared} & set(sys.modules)))"
     )
     folder = deck.parent

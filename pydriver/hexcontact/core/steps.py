@@ -163,14 +163,15 @@ def expected_end(
     """
     shape = last.shape[2:]
     follows = before is not None and pressure is not None
-    expected = np.zeros(shape, np.float32) if before is None else before.copy()
+    expected: Array = np.zeros(shape, np.float32) if before is None else before.copy()
     known = np.zeros(shape) if pressure is None else pressure
-    tractions = _wear.expected_end(_columns(last), ahead, follows, known.ravel(), expected.reshape(-1))
-    return tractions.T.reshape(3, *shape), expected
+    columns, values = _columns(last), expected.reshape(-1)
+    tractions = _wear.expected_end(columns, ahead, follows, known.ravel(), values)
+    return np.asarray(tractions.T.reshape(3, *shape)), expected
 
 
 def remember_end(state: ContactState, passed: float, last: Array) -> None:
-    """Put the tractions of a state, and their change by cycle since `passed` cycles, in the place of `last`."""
+    """Put the tractions of a state, and their change a cycle since `passed` cycles, in place of `last`."""
     tractions = (getattr(state, name).ravel() for name in _TRACTIONS)
     _wear.remembered_end(*tractions, passed, _columns(last))
 

@@ -123,9 +123,9 @@ class BelowSurface(ABC):
         numbers = self.cycle_steps(segment, steps)
         if steps is None and len(numbers) < _FEW_STEPS:
             warnings.warn(
-                f"fatigue: the cycle {segment!r} has only {len(numbers)} load steps, between which extremes and "
-                f"phases are lost: give its segments more steps, at least {_FEW_STEPS} in all, or with adaptive "
-                "steps a smaller solver.step_tolerance",
+                f"fatigue: the cycle {segment!r} has only {len(numbers)} load steps, between which extremes "
+                f"and phases are lost: give its segments more steps, at least {_FEW_STEPS} in all, or with "
+                "adaptive steps a smaller solver.step_tolerance",
                 PathWarning,
                 stacklevel=2,
             )

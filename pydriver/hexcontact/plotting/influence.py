@@ -274,7 +274,8 @@ def _draw_errors(axes: Axes, a: int) -> None:
     for name, look in LOOKS.items():
         error = 100 * displacement_errors(name, a, x * a, 0.0)
         infinite = name == "point force"  # at each node: behind the others, and thin
-        axes.plot(x, error, **look, zorder=2 - infinite, **({"lw": 0.7} if infinite else {}))
+        lw = 0.7 if infinite else matplotlib.rcParams["lines.linewidth"]
+        axes.plot(x, error, **look, zorder=2 - infinite, lw=lw)
     axes.axhline(0.0, color=GUIDE, lw=0.6, zorder=0)
     axes.set(title="error of $u_z$ inside the contact", xlabel="$x/a$", ylabel="error (% of the approach)")
     axes.set(xlim=(0.0, 0.9), ylim=(-0.25, 0.25))

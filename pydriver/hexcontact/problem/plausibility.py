@@ -247,7 +247,7 @@ def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:
 
 
 def _growing(case: Problem) -> Iterator[tuple[float, float, float]]:
-    """Yield the share of the largest load before and after each step in which it grows, and changed Q/mu P."""
+    """Yield the shares of the largest load before and after each step that raises it, and changed Q/mu P."""
     ((name, largest),) = case.largest_drives[0].items()
     control = LOADS["z"].index(name)
     before, sheared = 0.0, (0.0, 0.0, 0.0)

@@ -98,9 +98,9 @@ class _Ends:
     def guess(self, step: int, cycles: float, state: ContactState) -> tuple[Array, Array] | None:
         """Return tractions and motions to start a load step from, after one whose end `state` was found.
 
-        The motions, as the pressure, are those of that end, and what is expected to change between the two: so
-        what the expectation misses at both of them is right, above all where the pressure stays as it is. The
-        shear traction, which turns round in a cycle, is the expected one.
+        The motions, as the pressure, are those of that end, and what is expected to change between the two:
+        so what the expectation misses at both of them is right, above all where the pressure stays as it is.
+        The shear traction, which turns round in a cycle, is the expected one.
         """
         before, self.before = self.before, None
         if self.cycles[step] < 0.0:

@@ -49,6 +49,8 @@ module hc_spectrum_cache
     procedure :: find
     !> Store spectra
     procedure :: store
+    !> Return whether so many bytes of spectra can be stored together
+    procedure :: holds
     !> Return the fault of the folder
     procedure :: fetch_message
     !> Copy the bound alone: spectra of two caches would be freed twice
@@ -214,6 +216,14 @@ contains
       if (self%entry(i)%key%is_same(key)) place_of = i
     end do
   end function place_of
+
+  !> Return whether so many bytes of spectra can be stored together, in memory or in a folder.
+  pure logical function holds(self, bytes)
+    class(kernel_cache_t), intent(in) :: self
+    integer(int64), intent(in) :: bytes
+
+    holds = bytes <= self%bound .or. allocated(self%folder)
+  end function holds
 
   !> Mark spectra as used last.
   subroutine touch(self, i)

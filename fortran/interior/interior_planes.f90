@@ -49,6 +49,8 @@ module hc_interior_planes
     !> Tractions in the frame of the body
     real(wp), allocatable :: loads(:, :, :)
   contains
+    !> Bytes of the spectra of a plane
+    procedure :: spectra_memory
     !> Take the tables of a depth
     procedure :: set_depth
     !> Stress or displacement at the nodes of the plane
@@ -148,6 +150,16 @@ contains
                     + transform_memory(extent, good_size(2*extent - 1), 15) &
                     + 3*product(int(extent, long))*(storage_size(1.0_wp)/8)
   end function planes_memory
+
+  !> Bytes of the spectra of a plane.
+  pure integer(selected_int_kind(18)) function spectra_memory(self)
+    class(interior_planes_t), intent(in) :: self
+    integer, parameter :: long = selected_int_kind(18)
+
+    associate (c => self%convolution)
+      spectra_memory = product(int([c%width, c%padded(2), c%n_block, size(self%tables%load)], long))*(storage_size(1.0_wp)/8)
+    end associate
+  end function spectra_memory
 
   !> Take the tables of a depth, from a cache or anew.
   subroutine set_depth(self, depth, error, cache)

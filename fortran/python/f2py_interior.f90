@@ -11,6 +11,7 @@ module hc_f2py_interior
   use hc_interior_planes, only: interior_planes_t, new_interior_planes, planes_memory
   use hc_stress_invariants, only: stress_invariants
   use hc_f2py_handles, only: report, kernel_cache
+  use hc_spectrum_cache, only: kernel_cache_t
   implicit none
   private
 
@@ -80,6 +81,7 @@ contains
     type(error_t), allocatable :: error
     type(lattice_t) :: lattice
     type(interior_planes_t) :: planes
+    type(kernel_cache_t), pointer :: cache
     type(field_space_t) :: space
     integer :: i, step
 
@@ -89,8 +91,13 @@ contains
     if (.not. allocated(error)) call require_memory(planes_memory(lattice%extent, space%threads), error, space%threads)
     if (.not. allocated(error)) call new_interior_planes(planes, lattice, body, poisson_ratio, error, space, &
                                                          n_component == 3)
+    ! of too many planes each would drop another one, and the surface, before it is used again
+    cache => null()
+    if (associated(kernel_cache) .and. .not. allocated(error)) then
+      if (kernel_cache%holds(n_depth*planes%spectra_memory())) cache => kernel_cache
+    end if
     do i = 1, n_depth
-      if (.not. allocated(error)) call planes%set_depth(depth(i), error, kernel_cache)
+      if (.not. allocated(error)) call planes%set_depth(depth(i), error, cache)
       do step = 1, n_step
         if (.not. allocated(error)) call planes%apply(traction(:, :, :, step), field(:, :, :, i, step), error)
       end do

@@ -378,6 +378,8 @@ def grouped(column: Callable[[str, Variable], str]) -> dict[str, tuple[str, ...]
 
 # Parameters of a case with a compliant interface.
 INTERFACE = ("interface_coefficient", "interface_exponent", "interface_tangential_stiffness")
+TRACTIONS = ("pressure", "traction_x", "traction_y")
+EDGES = ("gap", "zone")  # fields that, with the tractions, tell where the edges of contact and stick are
 FIELDS = names_where(lambda v: v.is_field)
 FRICTIONLESS_FIELDS = names_where(lambda v: v.is_field and not v.frictional)
 _HELD = names_where(lambda v: v.core in ("fields", "zone"))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray
 
-from hexcontact import Case, DeckError, ResourceError, analytic, influence, open_result, resume
+from hexcontact import Case, DeckError, ResourceError, analytic, influence, kernel_cache, open_result, resume
 from hexcontact.core.lattice import Lattice
 from hexcontact.interior import fields
 from hexcontact.interior.stress import tractions
@@ -487,3 +487,19 @@ def test_spectra_of_planes_are_kept_and_give_the_same_bits(pressed) -> None:
     _, result, _ = pressed
     first = result.stress("stress_xx", depths=[1e-4])
     assert first.equals(result.stress("stress_xx", depths=[1e-4]))
+
+
+def test_planes_that_do_not_fit_together_leave_the_cache_alone(pressed) -> None:
+    _, result, _ = pressed
+    try:
+        kernel_cache.clear()
+        result.stress("stress_xx", depths=[1e-4])
+        one = kernel_cache.statistics().memory
+        kernel_cache.configure(memory=3 * one)
+        together = result.stress("stress_xx", depths=[2e-4, 3e-4, 4e-4, 5e-4, 6e-4])
+        assert kernel_cache.statistics().memory == one > 0
+        result.stress("stress_xx", depths=[2e-4])
+        assert kernel_cache.statistics().memory > one
+        assert together.isel(depth=[0]).equals(result.stress("stress_xx", depths=[2e-4]))
+    finally:
+        kernel_cache.configure(memory="256 MB")

@@ -14,10 +14,10 @@ from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stage, cycle_of
 from ..deck.faults import NOWHERE
 from ..errors import DeckError, PathWarning
-from ..variables import INTERFACE
+from ..variables import EDGES, INTERFACE, TRACTIONS
 from .fatigue import SLIPS, histories, parameters_below, tabulated
 from .region import region
-from .stress import EDGES, LOADED, TRACTIONS, below, bodies_of, nodal_tractions
+from .stress import LOADED, below, bodies_of, nodal_tractions
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]

@@ -23,7 +23,7 @@ from ..deck.below import SOURCES
 from ..deck.tables import Body, Deck
 from ..errors import DeckError
 from ..text import did_you_mean
-from ..variables import BULK_STRESS, STRESSES
+from ..variables import BULK_STRESS, EDGES, STRESSES, TRACTIONS
 from . import fields
 from .region import Region, region
 
@@ -33,11 +33,8 @@ if TYPE_CHECKING:
 Fields = Mapping[str, NDArray[Any]]
 Bodies = Sequence[Body]
 
-TRACTIONS = ("pressure", "traction_x", "traction_y")
 LOADED = (*TRACTIONS, "bulk_body", *BULK_STRESS)
 """What the stress below the surface comes from."""
-EDGES = ("gap", "zone")
-"""What else tells where the edges of contact and stick are."""
 # fields of each step, as read and for the core; corrected ones, while others follow and in all
 _LOADED_ARRAYS, _CORRECTED_ARRAYS = 8, (3, 6)
 # fields as floats that are read for them, and bytes of each that the netCDF library keeps
@@ -262,12 +259,13 @@ def memory_needed(lattice: Lattice, where: Region, steps: int, kept: bool = Fals
     if where.lattice is None or summed(lattice, where):
         return 8 * steps * (6 * lattice.size + 30 * where.count)
     whole, count = window_over(lattice, where.lattice)[0], steps * where.depths.size
-    # of fifteen influences, of each further depth
+    # of fifteen influences, of each further depth; stored if those of all depths fit
     spectra = 15 * 8 * 2 * whole.size * (where.depths.size - 1)
+    kept = kept and spectra <= kernel_cache.bound()
     return (
         fields.planes_memory(whole)
         + 8 * (12 * count * where.lattice.size + (6 * count + 6 * steps) * whole.size)
-        + kept * min(spectra, kernel_cache.bound())
+        + kept * spectra
     )
 
 

@@ -14,13 +14,12 @@ import matplotlib
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..interior.stress import TRACTIONS
 from ..result.history import step_rows
 from ..result.raster import Plane, png_of
 from ..result.result import Result
 from ..result.view import StepView, dataset_of
 from ..text import scaled, worded
-from ..variables import LOADS, MAPS, RESIDUALS, VARIABLES, spelled
+from ..variables import LOADS, MAPS, RESIDUALS, TRACTIONS, VARIABLES, spelled
 from .history import panels_of, peak
 from .plane import Limits, Part
 from .sections import line_of

@@ -11,9 +11,10 @@ from matplotlib.ticker import MaxNLocator
 
 from ..analytic.hertz_gap import is_compliant
 from ..arrays import Array
-from ..interior.stress import EDGES, LOADED, below, bodies_of
+from ..interior.stress import LOADED, below, bodies_of
 from ..result.view import StepView, dataset_of, title_of
 from ..text import scaled, worded
+from ..variables import EDGES
 from .registry import figure
 from .report_data import kept_steps
 from .sections import Cut, Point

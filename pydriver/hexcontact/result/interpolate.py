@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..analytic.hertz_gap import friction_of, is_compliant
 from ..arrays import Array
 from ..core.edges import ContactEdges, Limits, TractionField
 from ..core.interpolation import crossings, linear, nearest, section_ends
@@ -25,9 +24,8 @@ from ..deck.below import SOURCES
 from ..deck.interface import shear_limits
 from ..deck.tables import Deck
 from ..errors import DeckError
-from ..interior.stress import EDGES, TRACTIONS
 from ..text import did_you_mean
-from ..variables import NOT_KEPT, VARIABLES
+from ..variables import EDGES, NOT_KEPT, TRACTIONS, VARIABLES
 
 if TYPE_CHECKING:
     import xarray
@@ -129,6 +127,8 @@ def tractions_of(step: xarray.Dataset, lattice: Lattice, source: str | None = No
         if name not in fields or not is_kept(fields[name]):
             at = int(step["step"])
             raise DeckError(f"the {name} of step {at} was not kept (output.fields, output.every)")
+    from ..analytic.hertz_gap import is_compliant
+
     limits = limits_of(step.attrs, lattice) if "traction_x" in fields else None
     return traction_field(lattice, fields, limits, source, not is_compliant(step.attrs))
 
@@ -144,6 +144,8 @@ def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None
 
 def limits_of(attributes: Mapping[Any, Any], lattice: Lattice) -> Limits | None:
     """Return coefficient of friction and bound (Pa) at the nodes of a result; None if they are unknown."""
+    from ..analytic.hertz_gap import friction_of
+
     mu = friction_of(attributes)
     if not math.isnan(mu):
         return (mu, math.inf) if 0.0 < mu < math.inf else None

@@ -12,9 +12,8 @@ from ..core.lattice import Lattice
 from ..deck.below import Stage
 from ..errors import DeckError
 from ..interior.below import BelowSurface
-from ..interior.stress import TRACTIONS
 from ..text import did_you_mean, text_table
-from ..variables import FIELDS, VARIABLES
+from ..variables import FIELDS, TRACTIONS, VARIABLES
 from .history import WEARING, cycles, segments, stages, worn_by_cycle
 from .interpolate import (
     Line,

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Array, Mask
 from ..core.edges import Limits, TractionField
 from ..core.lattice import Lattice
-from ..interior.stress import EDGES, TRACTIONS
 from ..text import did_you_mean
+from ..variables import EDGES, TRACTIONS
 from .interpolate import Line, Point, chosen_fields, interpolate, profile, section_line, traction_field
 
 if TYPE_CHECKING:

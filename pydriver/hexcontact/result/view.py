@@ -13,9 +13,8 @@ from ..analytic.hertz_gap import QuadraticGap, friction_of, pressure_is_friction
 from ..arrays import Array, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
 from ..core.interpolation import linear
-from ..interior.stress import TRACTIONS
 from ..text import visible, worded
-from ..variables import LARGEST, VARIABLES, WORN, spelled
+from ..variables import LARGEST, TRACTIONS, VARIABLES, WORN, spelled
 from .interpolate import is_kept, tractions_of
 from .layout import lattice_of, step_of
 

@@ -6,7 +6,7 @@
 !> Equations: docs/theory/friction.md, (F1).
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, &
     force_control
@@ -339,14 +339,9 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: applications, largest
-    real(wp), allocatable :: q(:), moved(:), by_pressure(:), w(:), u(:), closing(:), rounding(:), tangential_rounding(:)
+    real(wp), allocatable :: q(:), moved(:), by_pressure(:), w(:), u(:), closing(:)
 
-    associate (n => size(self%p))
-      rounding = spread(self%problem%options%newton%displacement_rounding, 1, n)
-      ! GMRES stores products in single precision but for the unknowns, which slipping nodes have along one direction only
-      if (self%joint) rounding = merge(rounding, real(epsilon(1.0_sp), wp), self%contact)
-      tangential_rounding = spread(self%problem%options%newton%displacement_rounding, 1, 2*n)
-      if (self%joint) tangential_rounding = epsilon(1.0_sp)
+    associate (n => size(self%p), rounding => self%problem%options%newton%displacement_rounding)
       allocate (moved(3*n), by_pressure(3*n), source=0.0_wp)
       applications = self%operators%flexibility%applications
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], by_pressure, error)
@@ -368,7 +363,7 @@ contains
       largest = maxval(abs(by_pressure(n + 1:))) + maxval(abs(moved(n + 1:)))
       if (.not. (agree(self%w, w, maxval(abs(w)), rounding) .and. &
                  agree(self%closing, closing, maxval(abs(w)), rounding) .and. &
-                 (agree(self%u, u, largest, tangential_rounding) .or. .not. self%problem%friction%resists()))) then
+                 (agree(self%u, u, largest, rounding) .or. .not. self%problem%friction%resists()))) then
         call raise(error, status%no_convergence, 'friction: displacements are not those of the tractions')
       end if
     end associate
@@ -379,8 +374,8 @@ contains
     real(wp), intent(in) :: one(:), other(:)
     !> Size of what they belong to
     real(wp), intent(in) :: scale
-    !> Share of it that rounding errors may make up, at each node
-    real(wp), intent(in) :: rounding(:)
+    !> Share of it that rounding errors may make up
+    real(wp), intent(in) :: rounding
 
     agree = all(abs(one - other) <= rounding*scale)
   end function agree

@@ -4,7 +4,7 @@
 !> as much of the work on them. Active nodes come in runs along the rows of the window, so
 !> that packing is a copy of a few hundred pieces.
 module hc_active_set
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp
   use hc_field_space, only: field_space_t
   implicit none
   private
@@ -30,14 +30,12 @@ module hc_active_set
     procedure :: pack_columns
     !> Put them where they belong, the rest of the field stays as it is
     procedure :: unpack => unpack_field
-    !> Those of a part of the nodes, and all nodes that are not active
-    procedure :: slice, complement
+    !> Those of a part of the nodes
+    procedure :: slice
     !> The same nodes of several components
     procedure :: repeated
     !> Is it a given set?
     procedure :: is_set
-    !> Gather nodes in single precision; add a multiple of such values where they belong
-    procedure :: pack_single, add_single
   end type active_set_t
 
   !> Runs of the active nodes of one field, cut where the same nodes of a second field become active or cease to be.
@@ -198,30 +196,6 @@ contains
     call number_nodes(part)
   end function slice
 
-  !> Return the nodes that are not active.
-  pure type(active_set_t) function complement(self, n) result(others)
-    class(active_set_t), intent(in) :: self
-    !> Number of all nodes
-    integer, intent(in) :: n
-    integer :: first(size(self%first) + 1), last(size(self%first) + 1), k, n_run
-
-    others%space = self%space
-    first(1) = 1
-    first(2:) = self%last + 1
-    last(:size(self%first)) = self%first - 1
-    last(size(last)) = n
-    n_run = count(first <= last)
-    allocate (others%first(n_run), others%last(n_run))
-    n_run = 0
-    do k = 1, size(first)
-      if (first(k) > last(k)) cycle
-      n_run = n_run + 1
-      others%first(n_run) = first(k)
-      others%last(n_run) = last(k)
-    end do
-    call number_nodes(others)
-  end function complement
-
   !> Return the same nodes of several components, one component after the other.
   pure type(active_set_t) function repeated(self, n, times) result(all_of_them)
     class(active_set_t), intent(in) :: self
@@ -310,47 +284,5 @@ contains
     is_set = within == self%n_active
     if (is_set) is_set = self%space%count(active) == within
   end function is_set
-
-  !> Gather the active nodes of a field, in single precision.
-  subroutine pack_single(self, field, factor, packed)
-    class(active_set_t), intent(in) :: self
-    !> Field over all nodes
-    real(wp), intent(in), contiguous :: field(:)
-    !> What it is multiplied by
-    real(wp), intent(in) :: factor
-    !> Its values at the active nodes (n_active)
-    real(sp), intent(inout), contiguous :: packed(:)
-    integer :: k, i, shift
-
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
-    do k = 1, size(self%first)
-      shift = self%place(k) - self%first(k)
-      do i = self%first(k), self%last(k)
-        packed(i + shift) = real(factor*field(i), sp)
-      end do
-    end do
-    !$omp end parallel do
-  end subroutine pack_single
-
-  !> Add a multiple of values in single precision to the active nodes of a field.
-  subroutine add_single(self, packed, factor, field)
-    class(active_set_t), intent(in) :: self
-    !> Values at the active nodes (n_active)
-    real(sp), intent(in), contiguous :: packed(:)
-    !> What they are multiplied by
-    real(wp), intent(in) :: factor
-    !> Field over all nodes; the rest stays as it is
-    real(wp), intent(inout), contiguous :: field(:)
-    integer :: k, i, shift
-
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
-    do k = 1, size(self%first)
-      shift = self%place(k) - self%first(k)
-      do i = self%first(k), self%last(k)
-        field(i) = field(i) + factor*packed(i + shift)
-      end do
-    end do
-    !$omp end parallel do
-  end subroutine add_single
 
 end module hc_active_set

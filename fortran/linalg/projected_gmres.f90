@@ -9,7 +9,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_gmres
-  use hc_precision, only: wp, sp
+  use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_active_set, only: active_set_t, new_active_set
   use hc_field_space, only: field_space_t
@@ -57,25 +57,20 @@ contains
     real(wp), intent(out), optional :: drift
 
     type :: direction_t
-      !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active nodes
-      real(wp), allocatable :: v(:), z(:)
-      !> Weighted product A z on the other nodes; on the active ones it is a sum of the residuals and B share
-      real(sp), allocatable :: image(:)
+      !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
+      !> nodes; the product A z over all nodes
+      real(wp), allocatable :: v(:), z(:), image(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
-    type(active_set_t) :: nodes, others, of_part
-    !> Product of a direction, over all nodes
-    real(wp), allocatable :: onto(:)
+    type(active_set_t) :: nodes, of_part
     !> On the active nodes
     real(wp), allocatable :: packed(:), b(:, :), m_b(:, :), c_rows(:, :)
     !> Places of the last active nodes of the parts
     integer :: last(0:size(weight))
     real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
-    !> h before the rotations
-    real(wp) :: along(max_iterations + 1, max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier), max_iterations), length, rotated
-    real(wp) :: inverse(size(multiplier), size(multiplier)), change(size(multiplier))
+    real(wp) :: inverse(size(multiplier), size(multiplier))
     integer :: i, k, part, stat
     type(field_space_t) :: space
 
@@ -93,7 +88,6 @@ contains
     deallocate (rows)
     call invert_gram(c_rows, m_b, inverse, independent, space)
     if (.not. independent) return
-    others = nodes%complement(size(x))
     associate (n => nodes%n_active)
       allocate (basis(1)%v(n), packed(n))
     end associate
@@ -119,11 +113,9 @@ contains
     g = 0.0_wp
     g(1) = length
     h = 0.0_wp
-    along = 0.0_wp
-    allocate (onto(size(x)))
 
     do k = 1, max_iterations
-      allocate (basis(k)%z(nodes%n_active), basis(k)%image(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
+      allocate (basis(k)%z(nodes%n_active), basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
       if (stat /= 0) then
         call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
         return
@@ -134,10 +126,9 @@ contains
       if (allocated(error)) return
       share(:, k) = -matmul(inverse, space%dots(c_rows, basis(k)%z))
       call space%add_columns(m_b, share(:, k), basis(k)%z)
-      call system%product_packed(nodes, basis(k)%z, onto, error)
+      call system%product_packed(nodes, basis(k)%z, basis(k)%image, error)
       if (allocated(error)) return
-      call nodes%pack(onto, basis(k + 1)%v)
-      call others%pack_single(onto, weight(1), basis(k)%image)
+      call nodes%pack(basis(k)%image, basis(k + 1)%v)
       call space%add_columns(b, -share(:, k), basis(k + 1)%v)
       call weigh(weight, basis(k + 1)%v)
       do i = 1, k
@@ -146,7 +137,6 @@ contains
       end do
       h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
       if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
-      along(:k + 1, k) = h(:k + 1, k)
       do i = 1, k - 1
         rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
         h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
@@ -166,7 +156,6 @@ contains
     end do
     if (residual <= tolerance) outcome = solution_accurate
     call system%release()
-    deallocate (onto)
 
     do i = iterations, 1, -1
       y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
@@ -176,24 +165,11 @@ contains
     call nodes%pack(x, packed)
     do i = 1, iterations
       packed = packed + y(i)*basis(i)%z
-      call others%add_single(basis(i)%image, y(i)/weight(1), ax)
+      ax = ax + y(i)*basis(i)%image
       deallocate (basis(i)%z, basis(i)%image)
     end do
     call nodes%unpack(packed, x)
-    if (iterations == 0) return
-    packed = 0.0_wp
-    do i = 1, iterations + 1
-      packed = packed + dot_product(along(i, :iterations), y(:iterations))*basis(i)%v
-      deallocate (basis(i)%v)
-    end do
-    call weigh(1.0_wp/weight, packed)
-    change = matmul(share(:, :iterations), y(:iterations))
-    multiplier = multiplier + change
-    call space%add_columns(b, change, packed)
-    allocate (basis(1)%v(nodes%n_active))
-    call nodes%pack(ax, basis(1)%v)
-    call space%add(basis(1)%v, packed)
-    call nodes%unpack(packed, ax)
+    multiplier = multiplier + matmul(share(:, :iterations), y(:iterations))
 
   contains
 

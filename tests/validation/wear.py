@@ -68,7 +68,8 @@ def wear() -> Comparison:
             relative=0.01,
         )
     beyond = p[r > c + CONTACT / 24].sum() / p.sum()
-    found.add(f"{case}, a spacing beyond c", "load/P", "-", float(beyond), analytic=0.0, absolute=1e-12)
+    # load steps of a cycle are solved to a hundredth of wear.tolerance
+    found.add(f"{case}, a spacing beyond c", "load/P", "-", float(beyond), analytic=0.0, absolute=1e-6)
     _volume(found, case, mu, cycles)
 
     mu, case = 0.3, "gross slip, 10 spacings in a"

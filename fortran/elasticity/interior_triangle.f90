@@ -1,7 +1,9 @@
 !> Displacement and stress below the surface by linear loads on single triangles.
 !>
 !> A load may jump at the edges of its triangle: at a point of such an edge on the surface some stresses are infinite,
-!> and the logarithm is cut off there, so that the sum over triangles of a continuous load stays right.
+!> and the logarithm is cut off there, so that the sum over triangles of a continuous load stays right. Triangles
+!> that share an edge must find the same distance from it, to the last bit: lengths are divided by powers of two, and
+!> all triangles of a set have the same cut.
 !> Near the triangle: closed forms by edges. Far away: the point loads of a conical product rule.
 !>
 !> Equations: docs/theory/interior.md, (I13) to (I15).
@@ -22,7 +24,7 @@ module hc_interior_triangle
 
   !> Distance from the centroid, in longest edges, from which the triangle is a cluster of point loads.
   real(wp), parameter :: far_radius = 2.5_wp
-  !> Distance from an edge, in longest edges, below which a point lies on it.
+  !> Distance from an edge, in longest edges of the smallest triangle, below which a point lies on it.
   real(wp), parameter :: next_to = 1.0e-14_wp
   !> Least divisor; where a distance is smaller, its numerator is zero.
   real(wp), parameter :: smallest = 1.0e-30_wp
@@ -43,16 +45,17 @@ contains
     !> Allocated on failure: numbers that are not finite, points above the surface, no such Poisson's ratio
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp) :: d(1, n_derivative), u(1, 3, 3), s(1, 6, 3), size_of
+    real(wp) :: d(1, n_derivative), u(1, 3, 3), s(1, 6, 3), size_of, near
     integer :: i
 
     call check_triangle(corner, error)
     if (.not. allocated(error)) call check_interior(x, y, z, poisson_ratio, error)
     if (allocated(error)) return
-    size_of = longest_edge(corner)
+    size_of = unit_length(corner)
+    near = next_to*longest_edge(corner)
     !$omp parallel do schedule(dynamic, 16) private(d, u, s) if (size(x) > 64)
     do i = 1, size(x)
-      d(1, :) = potentials(corner, value, [x(i), y(i), z(i)])
+      d(1, :) = potentials(corner, value, [x(i), y(i), z(i)], near)
       call displacements(1, d, d, d, [z(i)/size_of], poisson_ratio, u)
       call stresses(1, d, d, d, poisson_ratio, s)
       displacement(:, :, i) = size_of*u(1, :, :)
@@ -75,12 +78,14 @@ contains
     !> Allocated on failure: numbers that are not finite, points above the surface, no such Poisson's ratio
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp) :: d(1, n_derivative, 3), u(1, 3, 3), s(1, 6, 3), size_of
+    real(wp) :: d(1, n_derivative, 3), u(1, 3, 3), s(1, 6, 3), size_of, near
     integer :: i, t, k
 
+    near = largest
     do t = 1, size(corner, 3)
       call check_triangle(corner(:, :, t), error)
       if (allocated(error)) return
+      if (abs(twice_area(corner(:, :, t))) > 0.0_wp) near = min(near, next_to*longest_edge(corner(:, :, t)))
     end do
     if (.not. all(ieee_is_finite(traction))) then
       call raise(error, status%invalid_input, 'the tractions: finite numbers expected')
@@ -93,9 +98,9 @@ contains
     !$omp parallel do schedule(dynamic, 4) private(d, u, s, t, k, size_of) if (size(x) > 4)
     do i = 1, size(x)
       do t = 1, size(corner, 3)
-        size_of = longest_edge(corner(:, :, t))
+        size_of = unit_length(corner(:, :, t))
         do k = 1, 3
-          d(1, :, k) = potentials(corner(:, :, t), traction(k, :, t), [x(i), y(i), z(i)])
+          d(1, :, k) = potentials(corner(:, :, t), traction(k, :, t), [x(i), y(i), z(i)], near)
         end do
         call displacements(1, d(:, :, 1), d(:, :, 2), d(:, :, 3), [z(i)/size_of], poisson_ratio, u)
         call stresses(1, d(:, :, 1), d(:, :, 2), d(:, :, 3), poisson_ratio, s)
@@ -124,17 +129,26 @@ contains
     longest_edge = max(1.0_wp/largest, maxval(norm2(corner - cshift(corner, 1, dim=2), dim=1)))
   end function longest_edge
 
-  !> Compute the derivatives of the potentials of a linear load, lengths in longest edges.
-  pure function potentials(corner, value, point) result(d)
+  !> Return the unit of length of a triangle: the power of two above its longest edge, by which division is exact.
+  pure real(wp) function unit_length(corner)
+    real(wp), intent(in) :: corner(2, 3)
+    unit_length = scale(1.0_wp, exponent(longest_edge(corner)))
+  end function unit_length
+
+  !> Compute the derivatives of the potentials of a linear load, with the `unit_length` of the triangle.
+  pure function potentials(corner, value, point, near) result(d)
     !> Vertices as columns, the load there, and the point
     real(wp), intent(in) :: corner(2, 3), value(3), point(3)
+    !> Distance below which the point lies on an edge
+    real(wp), intent(in) :: near
     real(wp) :: d(n_derivative)
 
-    real(wp) :: at(2, 3), load(3), length, z, area_2, slope(2)
+    real(wp) :: at(2, 3), load(3), length, cut, z, area_2, slope(2)
     integer :: order(3), i
 
     d = 0.0_wp
-    length = longest_edge(corner)
+    length = unit_length(corner)
+    cut = max(near/length, 100.0_wp*smallest)
     area_2 = twice_area(corner)
     if (.not. abs(area_2) > epsilon(1.0_wp)*length**2 .or. all(abs(value) <= 0.0_wp)) return
     order = merge([1, 2, 3], [1, 3, 2], area_2 > 0.0_wp)
@@ -145,12 +159,12 @@ contains
     load = value(order)
     z = point(3)/length
     do i = 1, 3
-      if (norm2(at(:, i)) > next_to) cycle
+      if (norm2(at(:, i)) > cut) cycle
       ! at a vertex the limit from below is taken
       at(:, i) = 0.0_wp
-      z = max(z, next_to)
+      z = max(z, 0.01_wp*cut)
     end do
-    if (norm2([sum(at, dim=2)/3.0_wp, z]) > far_radius) then
+    if (norm2([sum(at, dim=2)/3.0_wp, z]) > far_radius*longest_edge(corner)/length) then
       do i = 1, size(node_weight)
         d = d + 0.5_wp*area_2*node_weight(i)*dot_product(node(i, :), load)*point_load(-matmul(at, node(i, :)), z)
       end do
@@ -159,19 +173,19 @@ contains
     slope = (load(2) - load(1))*[at(2, 3) - at(2, 1), at(1, 1) - at(1, 3)]/area_2 &
             + (load(3) - load(1))*[at(2, 1) - at(2, 2), at(1, 2) - at(1, 1)]/area_2
     do i = 1, 3
-      d = d + edge_terms(at(:, i), at(:, modulo(i, 3) + 1), load(1) - dot_product(slope, at(:, 1)), slope, z)
+      d = d + edge_terms(at(:, i), at(:, modulo(i, 3) + 1), load(1) - dot_product(slope, at(:, 1)), slope, z, cut)
     end do
     d(z_psi_zz) = -(d(z_psi_xx) + d(z_psi_yy))
   end function potentials
 
   !> Compute what one edge of a triangle, counter-clockwise, contributes to the derivatives.
-  pure function edge_terms(from, onto, value, slope, z) result(d)
+  pure function edge_terms(from, onto, value, slope, z, near) result(d)
     !> Ends of the edge relative to the point
     real(wp), intent(in) :: from(2), onto(2)
     !> The load continued to the point, and its slopes
     real(wp), intent(in) :: value, slope(2)
-    !> Depth
-    real(wp), intent(in) :: z
+    !> Depth; distance below which the point lies on the edge
+    real(wp), intent(in) :: z, near
     real(wp) :: d(n_derivative)
 
     type(segment_t) :: s
@@ -183,14 +197,14 @@ contains
     normal = [along(2), -along(1)]
     t = [dot_product(along, from), dot_product(along, onto)]
     tm = 0.5_wp*sum(t)
-    ! the nearer end gives the more accurate distance; a point next to the plane of the edge lies in it, for both
-    ! triangles that share the edge
-    q = -dot_product(normal, merge(from, onto, tm >= 0.0_wp))
-    if (abs(q) < next_to) q = 0.0_wp
+    ! the nearer end gives the more accurate distance, and the same one to both triangles that share the edge
+    q = -dot_product(normal, merge(from, onto, tm > 0.0_wp))
+    if (.not. abs(tm) > 0.0_wp) q = -0.5_wp*dot_product(normal, from + onto)
+    if (abs(q) < near) q = 0.0_wp
     s = segment_integrals(q, t(1), t(2), length, z)
     lambda = s%lambda
-    if (s%nn < next_to**2) then
-      associate (cut => segment_integrals(next_to, t(1), t(2), length, 0.0_wp))
+    if (s%nn < near**2) then
+      associate (cut => segment_integrals(near, t(1), t(2), length, 0.0_wp))
         lambda = cut%lambda
       end associate
     end if

@@ -113,7 +113,8 @@ contains
     if (.not. allocated(error)) call check(error, n_row, 32, 'rows of triangle_stress.csv')
   end subroutine test_triangles
 
-  !> Beside creases and vertices, on the surface and next to it: the six triangles of the pyramid, another route.
+  !> Beside creases and vertices, on the surface and next to it: the triangles of the pyramid, another route. One of the
+  !> six is cut into three, so that triangles of unlike size share edges and a vertex.
   subroutine test_creases(error)
     type(error_t), allocatable, intent(out) :: error
 
@@ -121,7 +122,8 @@ contains
     real(wp), parameter :: depth(6) = [0.0_wp, 1.0e-300_wp, 1.0e-17_wp, 1.0e-9_wp, 1.0e-4_wp, 1.0_wp]
     type(interior_pyramid_t) :: pyramid
     type(error_t), allocatable :: raised
-    real(wp) :: corner(2, 3, 6), traction(3, 3, 6), at(2), u(3, 3, 1), s(6, 3, 1), u_sum(3, 1), s_sum(6, 1), c
+    real(wp), parameter :: share(3) = [0.85_wp, 0.05_wp, 0.1_wp]
+    real(wp) :: corner(2, 3, 8), height(3, 8), traction(3, 3, 8), at(2), u(3, 3, 1), s(6, 3, 1), u_sum(3, 1), s_sum(6, 1), c
     integer :: k, i, j, load, place
 
     call new_interior_pyramid(pyramid, equilateral_basis(1.0_wp))
@@ -129,12 +131,22 @@ contains
       corner(:, 1, k) = 0.0_wp
       corner(:, 2, k) = [cos((k - 1)*pi/3.0_wp), sin((k - 1)*pi/3.0_wp)]
     end do
-    corner(:, 3, :) = cshift(corner(:, 2, :), 1, dim=2)
-    do place = 1, 4
+    corner(:, 3, 1:6) = cshift(corner(:, 2, 1:6), 1, dim=2)
+    height = spread([1.0_wp, 0.0_wp, 0.0_wp], 2, 8)
+    at = matmul(corner(:, :, 2), share)
+    corner(:, :, 7) = corner(:, :, 2)
+    corner(:, :, 8) = corner(:, :, 2)
+    corner(:, 1, 2) = at
+    corner(:, 2, 7) = at
+    corner(:, 3, 8) = at
+    height(1, 2) = share(1)
+    height(2, 7) = share(1)
+    height(3, 8) = share(1)
+    do place = 1, 6
       do i = 1, size(offset)
         do j = 1, size(depth)
           c = offset(i)
-          ! the apex, a spoke, a rim and the end of a spoke
+          ! the apex, a spoke, a rim, the end of a spoke, the middle of an oblique spoke, an edge inside a triangle
           select case (place)
           case (1)
             at = [c, 0.0_wp]
@@ -142,13 +154,17 @@ contains
             at = [0.4_wp, c]
           case (3)
             at = [0.85_wp - c, 0.3_wp*sqrt(0.75_wp)]
-          case default
+          case (4)
             at = [1.0_wp, c]
+          case (5)
+            at = 0.5_wp*corner(:, 2, 2) + c*[sqrt(0.75_wp), -0.5_wp]
+          case default
+            at = 0.5_wp*(corner(:, 1, 2) + corner(:, 3, 2)) + [c, 0.0_wp]
           end select
           call pyramid%fields(at(1:1), at(2:2), depth(j:j), 0.3_wp, u, s, raised)
           do load = 1, 3
             traction = 0.0_wp
-            traction(load, 1, :) = 1.0_wp
+            traction(load, :, :) = height
             call mesh_fields(corner, traction, at(1:1), at(2:2), depth(j:j), 0.3_wp, u_sum, s_sum, raised)
             call check(error, [u(:, load, 1), s(:, load, 1)], [u_sum(:, 1), s_sum(:, 1)], 1.0e-12_wp, 'sum of triangles')
             if (allocated(error)) return

@@ -85,6 +85,8 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
 
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
+_POWERS = {"m2": ("m²", 2), "m3": ("m³", 3)}  # units whose prefix is raised to a power
+
 
 def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     """Write a number with a prefix of its unit: ``quantity(8.543e8, "Pa")`` is ``"854.3 MPa"``.
@@ -94,8 +96,8 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     value : float
         The number, in SI.
     unit : str
-        A unit that takes a prefix, an area (m2) the square of one; without a unit, or where no prefix fits,
-        the number is written plainly.
+        A unit that takes a prefix, an area (m2) its square, a volume (m3) its cube; without a unit, or where
+        no prefix fits, the number is written plainly.
     digits : int
         Significant digits.
     """
@@ -104,33 +106,35 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     if value == 0 or math.isinf(value):
         return f"{value + 0.0:g} {unit}".rstrip()  # no sign on zero
     rounded = float(f"{value:.{digits - 1}e}")
-    area, size = unit == "m2", math.log10(abs(rounded))
-    power = 3 * math.floor((size + 1) / 6 if area else size / 3)  # areas from 0.1 of a unit on
+    shown, times = _POWERS.get(unit, (unit, 1))
+    # areas from 0.1 of a unit on, volumes from 0.01
+    power = 3 * math.floor((math.log10(abs(rounded)) + times - 1) / (3 * times))
     if not unit or power not in PREFIXES:
         return f"{rounded:.{digits}g} {unit}".rstrip()
-    number = f"{rounded / 10.0 ** (2 * power if area else power):#.{digits}g}".rstrip(".")
-    return f"{number} {PREFIXES[power]}{'m²' if area else unit}"
+    number = f"{rounded / 10.0 ** (times * power):#.{digits}g}".rstrip(".")
+    return f"{number} {PREFIXES[power]}{shown}"
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
     """Return factor and unit that scale a quantity to 1 ... 1000: ``(1e-6, "MPa")`` for 8.5e8 Pa.
 
-    An area is scaled to 0.1 ... 100,000, as by `quantity`.
+    An area is scaled to 0.1 ... 100,000, a volume to 0.01 ... 10,000,000, as by `quantity`.
 
     Parameters
     ----------
     largest : float
         Largest magnitude, SI.
     unit : str
-        SI unit; "1" or empty for a pure number, which has no prefix. An area takes the square of a prefix.
+        SI unit; "1" or empty for a pure number, which has no prefix. Areas and volumes take
+        the square or the cube of a prefix.
     """
     if unit in ("", "1") or not math.isfinite(largest) or largest == 0.0:
         return 1.0, unit.replace("1", "")
-    power = 2 if unit == "m2" else 1
+    shown, power = _POWERS.get(unit, (unit, 1))
     size = math.log10(abs(largest) * 1.0000001) + (power - 1)
     exponent = 3 * math.floor(size / (3 * power))
     exponent = min(max(exponent, -12), 9)
-    return 10.0 ** (-exponent * power), PREFIXES[exponent] + unit.replace("m2", "m²")
+    return 10.0 ** (-exponent * power), PREFIXES[exponent] + shown
 
 
 def worded(value: float, unit: str) -> str:

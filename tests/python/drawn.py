@@ -142,6 +142,9 @@ def assert_painted(figure: Figure) -> None:
     """Check that the data paint pixels into each of the axes of a figure that are shown."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
+    # no label beyond the picture, whose unit is an inch here
+    labels = figure.get_tightbbox(canvas.get_renderer())
+    assert min(*labels.min, *(figure.get_size_inches() - labels.max)) > -0.01, labels
     whole = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
     figure.set_layout_engine("none")  # what is hidden below does not move the rest
     shown = visible(figure)

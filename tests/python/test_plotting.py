@@ -95,6 +95,7 @@ def cone(**more) -> xarray.Dataset:
         (1000.0, "N", 1e-3, "kN"),
         (2e-6, "m2", 1e6, "mm²"),
         (2e-7, "m2", 1e6, "mm²"),  # areas from 0.1 of a unit on
+        (2e-14, "m3", 1e18, "µm³"),
         (0.3, "1", 1.0, ""),
         (0.0, "Pa", 1.0, "Pa"),
         (1e-30, "m", 1e12, "pm"),

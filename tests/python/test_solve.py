@@ -382,6 +382,8 @@ def test_silence() -> None:
         (math.nan, "m", "-"),
         (1.234e-7, "m2", "0.1234 mm²"),
         (3.3, "m2", "3.300 m²"),
+        (2.4e-14, "m3", "24000 µm³"),
+        (5e-20, "m3", "0.05000 µm³"),
     ],
 )
 def test_quantities_are_written_with_prefixes(value: float, unit: str, text: str) -> None:

@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.collections import TriMesh
 
 import hexcontact
-from hexcontact import Case, DeckError
+from hexcontact import Case, DeckError, plotting
 from hexcontact.deck.write import starter
+from hexcontact.result.history import step_rows
 
 MODULUS, RADIUS, CONTACT, MU, WEAR = 1e11, 1e-2, 1e-4, 0.5, 1e-14
 EFFECTIVE = MODULUS / 2  # E* of two bodies with nu = 0, and the same number for shear, 2 G / 2
@@ -54,7 +56,8 @@ def test_worn_volume_is_that_of_the_dissipated_work(mu: float | str) -> None:
 
 def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     # V. L. Popov, Sci. Rep. 4 (2014) 3749: P = 2 E* (d c - c^3/(3 R)) on the disc that sticks
-    found = worn(fretting(nodes_in_radius=10, wear={"cycles": 10**7, "tolerance": 0.3}).run())
+    result = fretting(nodes_in_radius=10, wear={"cycles": 10**7, "tolerance": 0.3}).run()
+    found = worn(result)
     last = found.isel(step=-1)
     limit = 2 * EFFECTIVE * (APPROACH * STICK - STICK**3 / (3 * RADIUS))
     # the edge of the disc is known to 0.3 spacings, 5 % of its radius; validation/wear.py has finer lattices
@@ -64,6 +67,17 @@ def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     assert not last["pressure"].values[r > STICK + spacing].any()
     assert not last["worn_depth"].values[r < STICK - spacing].any()
     assert float(found["normal_load"][0]) > 1.2 * limit
+    # nothing of Hertz, Cattaneo and Mindlin holds for worn surfaces
+    assert result.compare(step=2).entries
+    assert not result.compare().entries
+    rows = dict(step_rows(result.history.iloc[-1].to_dict()))
+    assert {"cycles of wear", "wear volume", "max worn depth"} <= rows.keys()
+    # what is worn is shown where nothing touches any more, too
+    axes = plotting.FIGURES["worn_depth"](result).axes[0]
+    [shades] = [drawn for drawn in axes.collections if isinstance(drawn, TriMesh)]
+    unworn = last["worn_depth"].values[last["pressure"].values > 0.0].max()
+    assert shades.get_array().max() == pytest.approx(1e9 * float(last["max_worn_depth"]))
+    assert float(last["max_worn_depth"]) > 2 * unworn
 
 
 def test_halved_jumps_change_the_depth_as_stated() -> None:

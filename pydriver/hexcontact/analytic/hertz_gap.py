@@ -42,6 +42,12 @@ def is_strained(dataset: xarray.Dataset) -> bool:
     return any(bool(np.any(dataset[name])) for name in BULK_STRESS if name in dataset)
 
 
+def is_worn(dataset: xarray.Dataset) -> bool:
+    """Test whether wear has changed the surfaces by the last load step, so that no closed solution holds."""
+    worn = dataset.get("max_worn_depth")
+    return worn is not None and bool(np.ravel(worn)[-1] > 0.0)
+
+
 def pressure_is_frictionless(attributes: Mapping[Any, Any]) -> bool:
     """Test whether the pressure of a result is that of a contact without friction, see `recognise`."""
     return (

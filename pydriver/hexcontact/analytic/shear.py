@@ -20,7 +20,7 @@ from ..arrays import Array
 from ..core.analytic import flat
 from .elliptic import EllipticContact
 from .friction import LubkinTorsion, MindlinContact
-from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of, is_strained
+from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of, is_strained, is_worn
 
 if TYPE_CHECKING:
     import xarray
@@ -178,7 +178,7 @@ class ClosedForms:
         scale = self.friction * history.normal_load
         load = np.stack([history[f"tangential_load_{axis}"] for axis in "xy"])
         direction = line_of(load, _SMALL * scale, _ASIDE * scale) if self.apply else None
-        if direction is None:
+        if direction is None or history.is_worn:
             return None
         loads = history.at_constant_pressure(np.array(direction) @ load, scale)
         return None if loads is None else (history, direction, loads)
@@ -223,6 +223,8 @@ class ClosedForms:
         shear = np.hypot(*(history[f"tangential_load_{axis}"] for axis in "xy")).max()
         if not history.normal_load > 0.0 or shear > _ASIDE * self.friction * history.normal_load:
             return None
+        if history.is_worn:
+            return None
         hertz = self._gap.contact(history.normal_load)
         contact = LubkinTorsion(
             self.friction, history.normal_load, hertz.semi_major, 2.0 / self.modulus * (1.0 + self.gamma)
@@ -265,6 +267,7 @@ class History:
         self.steps = slice(last if static else 0, last + 1)
         self.dataset = dataset
         self.normal_load = float(dataset["normal_load"].values[last])
+        self.is_worn = is_worn(dataset.isel(step=self.steps))
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.dataset:

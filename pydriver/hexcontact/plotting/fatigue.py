@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 
 from ..arrays import Array
@@ -18,7 +17,7 @@ from ..text import scaled
 from .maps import mesh_of
 from .plane import Part
 from .registry import figure
-from .style import handles_of, legend_under, new_figure, set_title
+from .style import EDGED, handles_of, legend_under, mark_largest, new_figure, set_title
 from .zones import draw_zone_bars
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 _LEVELS = 12
 _MARGIN = 1.5  # width of the map over that of the contact
 _ENDLESS = 1e9  # cycles beyond which life is shown as endless
-_EDGED = [Stroke(linewidth=2.4, foreground="black"), Normal()]
 
 
 @figure("fatigue", "fatigue parameter on the surface and below it", needs="[[fatigue]]")
@@ -107,10 +105,10 @@ def _draw_surface(axes: Axes, view: StepView, field: xarray.DataArray, values: A
     if view.friction != 0.0 and view.has("zone"):
         meshes.append(("stick area", "red", view.stick_mesh()))
     for name, color, mesh in meshes:
-        look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": _EDGED}
+        look: dict[str, Any] = {"color": color, "lw": 1.2, "path_effects": EDGED}
         for polygon in mesh.outlines():
             axes.plot(*(polygon * part.factor).T, label=f"{name} in step {view.number}", **look)
-    _mark_largest(axes, x, y, values)
+    mark_largest(axes, x, y, values)
     return drawn
 
 
@@ -122,13 +120,8 @@ def _draw_section(axes: Axes, view: StepView, field: xarray.DataArray, values: A
     along, depth = along * factor, field["depth"].values * factor
     drawn = axes.contourf(along, depth, values, levels)
     draw_zone_bars(axes, view, (x[0], y[0]), along[0], depth.min() - 0.03 * np.ptp(depth))
-    _mark_largest(axes, along, depth, values)
+    mark_largest(axes, along, depth, values)
     axes.set_ylim(depth.max(), depth.min() - 0.06 * np.ptp(depth))
     word = "x" if np.ptp(y) == 0.0 else "y" if np.ptp(x) == 0.0 else "distance"
     axes.set(xlabel=f"{word} ({unit})", ylabel=f"depth ({unit})", aspect="equal")
     return drawn
-
-
-def _mark_largest(axes: Axes, x: Array, y: Array, values: Array) -> None:
-    place = np.unravel_index(np.nanargmax(values), values.shape)
-    axes.plot(x[place], y[place], "+", color="white", label="largest", path_effects=_EDGED)

@@ -13,7 +13,7 @@ from matplotlib.collections import TriMesh
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.tri import LinearTriInterpolator, Triangulation, UniformTriRefiner
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..core.edges import ZoneMesh
 from ..core.interpolation import linear
 from ..result.result import Result
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 DRAWN_NODES = 60_000  # above this number, fields are drawn from every second, third, ... node
 _DIVIDED = 30_000, 8_000  # triangles up to which each is cut into four, into sixteen
+_SO_FAR = "accumulated_slip", "dissipation_density", "worn_depth"  # also where the contact was before
 _WITH_ARROWS = 9  # maps in a picture up to which arrows are visible
 
 
@@ -45,8 +46,26 @@ def mesh_of(view: StepView, values: Array, vanishes: bool) -> ZoneMesh:
     vanishes : bool
         Whether it is zero at the edge, like tractions.
     """
-    stride = int(np.ceil(np.sqrt((1 + int(view.contact.sum())) / DRAWN_NODES)))
+    stride = _stride(view.contact)
     return view.edges(stride).contact_mesh(values[::stride, ::stride], vanishes)
+
+
+def _whole_mesh(view: StepView, values: Array) -> ZoneMesh:
+    """Return triangles that fill the contact and all else where a field is not zero."""
+    shown = view.contact | (values != 0.0)
+    stride = _stride(shown)
+    x, y, values, shown = (field[::stride, ::stride] for field in (view.x, view.y, values, shown))
+    number = np.arange(shown.size).reshape(shown.shape)
+    corners = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
+    triangles = np.concatenate(
+        [np.stack([corners[k].ravel() for k in three], axis=1) for three in ((0, 1, 2), (1, 3, 2))]
+    )
+    inside = shown.ravel()[triangles].any(axis=1)
+    return ZoneMesh(x.ravel(), y.ravel(), values.ravel(), triangles[inside])
+
+
+def _stride(shown: Mask) -> int:
+    return int(np.ceil(np.sqrt((1 + int(shown.sum())) / DRAWN_NODES)))
 
 
 def finer(mesh: ZoneMesh, view: StepView, field: Callable[[Array, Array], Array]) -> ZoneMesh:
@@ -150,7 +169,8 @@ def draw_field(
     factor, unit = scaled(largest, field.unit)
     shades: TriMesh | None = None
     for axes, view, field_values in zip(panels, views, values, strict=True):
-        mesh = mesh_of(view, field_values, field.unit == "Pa")
+        left = name in _SO_FAR and bool(np.any(field_values[~view.contact]))
+        mesh = _whole_mesh(view, field_values) if left else mesh_of(view, field_values, field.unit == "Pa")
         if field.unit == "Pa":
             mesh = finer(mesh, view, partial(field.at, view, name))
         if not mesh.triangles.size:
@@ -191,6 +211,8 @@ def field_map(
     source: str | None = None,
 ) -> Figure:
     """Draw a field over the contact area: tractions to the edges, others linear between the nodes.
+
+    What adds up over the load steps is also drawn where the contact was before.
 
     Parameters
     ----------

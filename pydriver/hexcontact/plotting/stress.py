@@ -18,7 +18,7 @@ from ..variables import EDGES
 from .registry import figure
 from .report_data import kept_steps
 from .sections import Cut, Point
-from .style import COMPUTED, EXACT, GUIDE, legend_below, new_figure, set_title
+from .style import COMPUTED, EXACT, GUIDE, drawing, legend_below, mark_largest, new_figure, set_title
 from .zones import draw_zone_bars
 
 if TYPE_CHECKING:
@@ -68,14 +68,12 @@ def stress(
     found = _below(view, points, "von_mises_stress")
     values = found["von_mises_stress"].values
 
-    canvas = new_figure(5.6, 3.4)
-    axes = canvas.add_subplot()
+    canvas, axes = drawing(None, 5.6, 3.4, equal=True)
     to_stress, unit = scaled(float(values.max()), "Pa")
     length = cut.lengths[0]
     drawn = axes.contourf(cut.along(along), depth * length, values * to_stress, _LEVELS)
     canvas.colorbar(drawn, ax=axes, label=f"von Mises stress in body {found.attrs['body']} ({unit})")
-    low = np.unravel_index(np.argmax(values), values.shape)
-    axes.plot(cut.along(along)[low[1]], depth[low[0]] * length, "+", color="white", label="largest")
+    mark_largest(axes, *np.meshgrid(cut.along(along), depth * length), values)
     place = np.linspace(0.0, cut.line.length, 8 * _POINTS)
     draw_zone_bars(axes, view, cut.line.points(place), cut.along(place), -0.02 * depth[-1] * length)
     axes.legend(loc="lower right", labelcolor="white", handlelength=1.2)

@@ -14,11 +14,15 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
+
+from ..arrays import Array
 
 # the Okabe-Ito palette, for any color vision
 COMPUTED, EXACT, THIRD, GUIDE = "#0072B2", "#D55E00", "#009E73", "0.55"
 IN_CONTACT = "#56B4E9"
+EDGED = [Stroke(linewidth=2.4, foreground="black"), Normal()]
 _NAMED = 10  # labels of a color scale
 _PASSES = 8  # of the layout at most; three to five are usual
 STYLE: dict[Any, Any] = {
@@ -127,3 +131,10 @@ def shades(count: int) -> Sequence[Any]:
     """Return colors of a family of curves, from dark to light."""
     map_ = matplotlib.colormaps["viridis"]
     return [map_(0.88 * k / max(count - 1, 1)) for k in range(count)]
+
+
+def mark_largest(axes: Axes, x: Array, y: Array, values: Array) -> None:
+    """Mark the point of the largest value by a cross that is seen on every color."""
+    place = np.unravel_index(np.nanargmax(values), values.shape)
+    look: dict[str, Any] = {"color": "white", "path_effects": EDGED, "zorder": 5, "clip_on": False}
+    axes.plot(x[place], y[place], "+", label="largest", **look)

@@ -178,6 +178,10 @@ def step_rows(history: History) -> list[Row]:
     ]
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
+    if history.get("wear_cycles", -1.0) >= 0.0:
+        rows.append(("cycles of wear", f"{history['wear_cycles']:,.0f}"))
+        names = "wear_volume", "max_worn_depth"
+        rows += [(spelled(name), quantity(history[name], VARIABLES[name].units)) for name in names]
     if (error := step_error_share(history)) is not None:
         change = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
         words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias, cast
 
 import numpy as np
 
-from ..analytic.hertz_gap import QuadraticGap, friction_of, pressure_is_frictionless
+from ..analytic.hertz_gap import QuadraticGap, friction_of, is_worn, pressure_is_frictionless
 from ..arrays import Array, Mask
 from ..core.edges import ContactEdges, TractionField, ZoneMesh
 from ..core.interpolation import linear
 from ..text import visible, worded
-from ..variables import LARGEST, TRACTIONS, VARIABLES, WORN, spelled
+from ..variables import BULK_STRESS, LARGEST, TRACTIONS, VARIABLES, WORN, spelled
 from .interpolate import is_kept, tractions_of
 from .layout import lattice_of, step_of
 
@@ -69,7 +69,7 @@ class StepView:
     center : tuple of float
         Center of the Hertz contact, else of the pressure.
     hertz : EllipticContact or None
-        Hertz solution, if the initial gap is a quadratic form.
+        Hertz solution, if the gap of the unworn surfaces is a quadratic form, and they are not worn.
     source : str or None
         Source of the tractions that are shown, "edges" or "nodes"; None: the edges where they are known.
     """
@@ -89,7 +89,7 @@ class StepView:
             weight = max(float(self.pressure.sum()), np.finfo(float).tiny)
             x, y = (float((self.pressure * place).sum() / weight) for place in (self.x, self.y))
         self.center = (x, y) if gap is None else gap.center
-        self.hertz = gap.contact(load) if gap and load > 0.0 else None
+        self.hertz = gap.contact(load) if gap and load > 0.0 and not is_worn(self.data) else None
         several = f"step {self.number}" if dataset.sizes["step"] > 1 else ""
         named = ", ".join(filter(None, (title_of(dataset), several)))
         self.title = f"{named} ({_loads(self.data)})".lstrip()
@@ -219,8 +219,9 @@ class StepView:
         return np.asarray(self.at(x, y, distances) > 0.0)
 
     def window(self, margin: float = 1.25) -> tuple[float, float, float, float]:
-        """Return the limits of a picture of the contact: x_min, x_max, y_min, y_max."""
-        zone = self.contact if self.contact.any() else np.ones_like(self.contact)
+        """Return the limits of a picture of the contact, and of what is worn: x_min, x_max, y_min, y_max."""
+        zone = self.contact | (self.field("worn_depth") > 0.0) if self.has("worn_depth") else self.contact
+        zone = zone if zone.any() else np.ones_like(zone)
         x, y = self.x[zone], self.y[zone]
         middle_x, middle_y = 0.5 * (x.max() + x.min()), 0.5 * (y.max() + y.min())
         half_x = max(0.5 * margin * (x.max() - x.min()), 2 * self.spacing)
@@ -229,7 +230,7 @@ class StepView:
 
 
 def _loads(one: xarray.Dataset) -> str:
-    """Name the loads of a step: the normal load, and tangential ones that are more than noise."""
+    """Name the loads of a step: the normal load, tangential ones that are more than noise, bulk stress."""
     normal = float(one["normal_load"])
     mu = float(one.attrs.get("friction_coefficient", 1.0))
     carried = (mu if mu < 1.0 else 1.0) * normal
@@ -243,7 +244,10 @@ def _loads(one: xarray.Dataset) -> str:
         value = float(one.get(name, 0.0))
         if abs(value) > share:
             named.append(f"${VARIABLES[name].symbol}$ = {worded(value, VARIABLES[name].units)}")
-    return ", ".join(named)
+    for name in BULK_STRESS:
+        if value := float(one.get(name, 0.0)):
+            named.append(rf"bulk $\sigma_{{{name[-2:]}}}$ = {worded(value, 'Pa')}")
+    return ", ".join(named).replace("-", "\u2212")
 
 
 def as_list(results: Results) -> list[AnyResult]:

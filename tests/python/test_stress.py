@@ -305,6 +305,9 @@ def test_large_boxes_are_refused_before_memory_is_taken(pressed) -> None:
         pressed[1].stress(depths=np.linspace(0, 1, 1_000_000))
     with pytest.raises(ResourceError, match="the plane needs 240 GB"):
         pressed[1].stress(plane=[[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]], count=(100_000, 100_000))
+    box = {"depths": [1e-6], "box": [[-10.0, 10.0], [-10.0, 10.0]]}
+    with pytest.raises(ResourceError, match=r"stress\.2 needs .* GB .*choose a smaller region, fewer points"):
+        hertz(5)[1].changed({"stress": [{"points": [[0, 0, 0]]}, box]}).run()
 
 
 def test_histories_of_many_steps() -> None:

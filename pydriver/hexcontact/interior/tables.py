@@ -71,7 +71,10 @@ def of_table(
 ) -> xarray.Dataset:
     """Return what a table of a deck wants; arguments and errors as of `computed`."""
     if isinstance(table, Fatigue):
-        found = of_cycle(result, table)
+        try:
+            found = of_cycle(result, table)
+        except DeckError as error:
+            raise DeckError(f"fatigue {name}: {error}") from error
     else:
         kept = kept or []
         steps = kept[-1:] if table.steps is None else kept

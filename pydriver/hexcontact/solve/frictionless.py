@@ -67,23 +67,28 @@ def peak_memory(case: Problem, lattice: Lattice) -> int:
 
 def _stress_memory(case: Problem, lattice: Lattice, kept: bool = False) -> int:
     """Return the memory (bytes) of the tables [[stress]] and [[fatigue]] after the run."""
+    return max(_stress_needs(case, lattice, kept).values(), default=0)
+
+
+def _stress_needs(case: Problem, lattice: Lattice, kept: bool = False) -> dict[str, int]:
+    """Return the memory (bytes) of each table [[stress]] and [[fatigue]] after the run, by its key."""
     if not (case.deck.stress or case.deck.fatigue):
-        return 0
+        return {}
     from ..interior import fatigue, stress
     from ..interior.region import region
 
-    needed = 0
-    for table in case.deck.stress:
+    needs = {}
+    for number, table in enumerate(case.deck.stress, 1):
         all_steps = math.ceil(len(case.load_steps) / case.output.every)
         steps = all_steps if table.steps == "all" else len(table.steps or (1,))
         below = stress.memory_needed(lattice, region(lattice, **table.where), steps, kept)
-        needed = max(needed, below, _tractions_memory(case, lattice, steps, table.source))
-    for cycle in case.deck.fatigue:
+        needs[f"stress.{number}"] = max(below, _tractions_memory(case, lattice, steps, table.source))
+    for number, cycle in enumerate(case.deck.fatigue, 1):
         steps = len(cycle.steps or _cycle_of(case, cycle.segment or ()))
         points = region(lattice, **cycle.where)
         below = fatigue.memory_needed(lattice, points, steps) + _ITEM * 5 * steps * lattice.size
-        needed = max(needed, below, _tractions_memory(case, lattice, steps, None))
-    return needed + _LOADED_AFTER
+        needs[f"fatigue.{number}"] = max(below, _tractions_memory(case, lattice, steps, None))
+    return {key: needed + _LOADED_AFTER for key, needed in needs.items()}
 
 
 def _cycle_of(case: Problem, labels: Sequence[str]) -> range:
@@ -151,7 +156,7 @@ def _parts(case: Problem, lattice: Lattice) -> int:
 
 
 def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None:
-    """Refuse a window that does not fit into memory.
+    """Refuse a window, or a table [[stress]] or [[fatigue]], that does not fit into memory.
 
     Parameters
     ----------
@@ -168,8 +173,7 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
         If less memory is available.
     """
     kept = steps_held * len(fields_of(case)) * _ITEM * lattice.size
-    needed = max(memory_needed(case, lattice), _stress_memory(case, lattice)) + kept
-    there = memory.available()
+    needed, there = memory_needed(case, lattice) + kept, memory.available()
     fitting = lattice.spacing * math.sqrt(1.1 * needed / max(there, 1))
     fits = f', such as "{readable(fitting)}"' if lattice.spacing < fitting < math.inf else ""
     advice = ["a smaller window" if case.window_fixed else f"a larger grid.spacing{fits}"]
@@ -183,6 +187,10 @@ def require_memory(case: Problem, lattice: Lattice, steps_held: int = 0) -> None
         f"choose {listed(advice, 'or')}",
         there,
     )
+    for key, below in _stress_needs(case, lattice).items():
+        if below + kept > needed:
+            fewer = "a smaller region, fewer points or steps, or a larger grid.spacing"
+            memory.require(below + kept, key, f"choose {fewer}", there)
 
 
 def fields_of(case: Problem) -> tuple[str, ...]:

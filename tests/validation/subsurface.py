@@ -98,6 +98,7 @@ def influence_functions() -> Comparison:
 
 
 _PROFILES: dict[str, dict] = {
+    "sphere": {"shape": "sphere", "radius": 0.02},
     "ellipse, 1.6:1": {"shape": "paraboloid", "radius_x": 0.02, "radius_y": 0.04},
     "cone": {"shape": "cone", "slope": 0.03},
     "profile r⁴": {"shape": "power", "exponent": 4.0, "coefficient": 1.5e7},
@@ -131,9 +132,8 @@ def below_edges() -> Iterator[tuple[str, dict[str, Array]]]:
         "friction_coefficient": 0.3,
         "loads": [*normal["loads"], {"tangential_load_x": 180.0}],
     }
-    sphere = {"shape": "sphere", "radius": 0.02}
     given = [(name, surface, _BODY, normal) for name, surface in _PROFILES.items()]
-    given.append(("steel on aluminum, sheared", sphere, _ALUMINUM, slid))
+    given.append(("steel on aluminum, sheared", _PROFILES["sphere"], _ALUMINUM, slid))
     for name, surface, body_2, loads in given:
         coarse = _solved(surface, body_2, None, loads)
         h = coarse.lattice.spacing

@@ -130,7 +130,7 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     """
     if unit in ("", "1") or not math.isfinite(largest) or largest == 0.0:
         return 1.0, unit.replace("1", "")
-    shown, power = _POWERS.get(unit, (unit, 1))
+    shown, power = _POWERS.get(unit, (unit.replace("m2", "m²"), 1))
     size = math.log10(abs(largest) * 1.0000001) + (power - 1)
     exponent = 3 * math.floor(size / (3 * power))
     exponent = min(max(exponent, -12), 9)

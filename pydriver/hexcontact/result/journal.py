@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import os
 import re
-import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +23,7 @@ from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..files import beginning, reading
-from .check import MATERIALS, fault_of_record
+from .check import fault_of_record, fault_of_sequence
 from .layout import Layout, Metadata, assemble
 from .step import Step
 
@@ -40,11 +38,6 @@ _TEMPORARY = ".tmp"
 VERSION = 1
 _ABOUT = "about"  # name of the text among the arrays
 _COMPANION = "companion_"  # prefix of the names of fields of a second solution
-_CLOSE = 1e-9  # relative difference of equal moduli
-PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that belong to the problem
-_NOT_PHYSICS = ("title", "solver", "output", "stress")  # tables of a deck that do not
-_OF_NODES = {"spacing", "origin"}  # keys of [grid] that a session writes with a load
-_OF_SESSIONS = ("grid", "load", "accuracy")  # tables of a deck that it changes
 
 
 def journal_of(path: Path) -> Path:
@@ -233,39 +226,3 @@ def begins_like_record(path: Path) -> bool:
     """Test whether a file begins like a record, which may be damaged."""
     head = beginning(path, 30 + len(_ABOUT))
     return head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode()
-
-
-def fault_of_sequence(before: Metadata, after: Metadata) -> str:
-    """Return the reason why a record cannot follow another of the same journal; empty if it can.
-
-    Tolerances may change when a run is resumed, and a session adds loads.
-    """
-    for name in ("run", "created", "title", "version", "fields", "every"):
-        if getattr(before, name) != getattr(after, name):
-            return f"its {name} is another"
-    if after.resumed[: len(before.resumed)] != before.resumed:
-        return "it was written before them"
-    for name in MATERIALS:
-        if not _same(before.parameters.get(name), after.parameters.get(name)):
-            return f"its {name} is another"
-    if before.deck != after.deck:
-        was, now = physics(before.deck), physics(after.deck)
-        if now.get("grid", {}).keys() >= _OF_NODES:
-            was, now = ({k: v for k, v in deck.items() if k not in _OF_SESSIONS} for deck in (was, now))
-        if was != now:
-            return "its deck is of another problem"
-    return ""
-
-
-def physics(deck: str) -> dict[str, Any]:
-    """Return the tables of a deck that belong to the problem, without those of solution and output."""
-    tables = tomllib.loads(deck)
-    solver = {key: value for key, value in tables.get("solver", {}).items() if key in PHYSICS}
-    return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Compare parameters of a case; numbers may differ by rounding."""
-    numbers = isinstance(one, float) and isinstance(other, float)
-    close = numbers and (math.isclose(one, other, rel_tol=_CLOSE) or (math.isnan(one) and math.isnan(other)))
-    return bool(one == other or close)

@@ -42,6 +42,8 @@ _TEMPORARY = ".tmp"
 VERSION = 2
 _ABOUT = "about"  # name of the text among the arrays
 _LACKS = "{0} lacks the record of step {1}, {1:06d}" + SUFFIX
+_KIND = "a record of a journal"
+_NO_FOLLOWER = "{} does not belong to the records before it: {}"
 _FIELDS, _COMPANION = "fields", "companion"  # parts with fields: of the step, of a second solution
 
 
@@ -59,10 +61,12 @@ class Journal:
         The folder; a missing one is an empty journal.
     companions : bool
         Read the companions of steps, too.
+    ours : bool
+        Whether this process has written or read the records already: only their checksums are compared.
     """
 
-    def __init__(self, folder: Path, companions: bool = False) -> None:
-        self.folder, self._companions = folder, companions
+    def __init__(self, folder: Path, companions: bool = False, ours: bool = False) -> None:
+        self.folder, self._companions, self._ours = folder, companions, ours
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
         unfinished = [name for name in names if _is_temporary(name, folder)]
@@ -79,10 +83,10 @@ class Journal:
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
                 raise DeckError(_LACKS.format(self.folder, number))
-            about, step = read_step(record, self._companions, known.whole if known else None)
+            about, step = read_step(record, self._companions, known.whole if known else None, not self._ours)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
-            with reading(record, "a record of a journal"):
+            with reading(record, _KIND):
                 fault = ""
                 if isinstance(about, Growth):
                     fault = "their deck is another" if known is None else known.follow(about)
@@ -90,7 +94,7 @@ class Journal:
                     fault = fault_of_sequence(known.metadata, about) if known else ""
                     known = Description(about, number)
                 if fault:
-                    raise DeckError(f"{record} does not belong to the records before it: {fault}")
+                    raise DeckError(_NO_FOLLOWER.format(record, fault))
             yield step
         self._last = known
 
@@ -344,13 +348,13 @@ def read_record(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
 
 
 def read_step(
-    path: Path, companion: bool = True, whole: Metadata | None = None
+    path: Path, companion: bool = True, whole: Metadata | None = None, check: bool = True
 ) -> tuple[Metadata | Growth, Step]:
     """Read a record, as `read_record`, without the metadata that it refers to.
 
-    These are given by `whole`, or read to check the step.
+    To `check` the step, these are given by `whole`, or read.
     """
-    with reading(path, "a record of a journal"), zipfile.ZipFile(path) as file:
+    with reading(path, _KIND), zipfile.ZipFile(path) as file:
         known = _known(file, path)
         about = _about(known)
         fields = _fields(file, _FIELDS, known)
@@ -361,6 +365,8 @@ def read_step(
             companion=fields_beside,
             control=known["control"],
         )
+        if not check:
+            return about, step
         if isinstance(about, Metadata):
             metadata = about
         else:
@@ -390,14 +396,15 @@ def described(record: Path) -> Description:
             raise DeckError(_LACKS.format(record.parent, number))
     known = Description(about, number)
     for path, growth in reversed(growths):
-        if fault := known.follow(growth):
-            raise DeckError(f"{path} does not belong to the records before it: {fault}")
+        with reading(path, _KIND):
+            if fault := known.follow(growth):
+                raise DeckError(_NO_FOLLOWER.format(path, fault))
     return known
 
 
 def read_about(path: Path) -> Metadata | Growth:
     """Read what a record holds of the metadata."""
-    with reading(path, "a record of a journal"), zipfile.ZipFile(path) as file:
+    with reading(path, _KIND), zipfile.ZipFile(path) as file:
         return _about(_known(file, path))
 
 

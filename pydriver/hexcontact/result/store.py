@@ -372,13 +372,13 @@ class Store:
             if due and self.interim and not self._in_the_way:
                 with self.writing("the output"):
                     layout = Layout(self.metadata, self.heads)
-                    self._put_together(layout, Journal(self.folder), complete=False)
+                    self._put_together(layout, Journal(self.folder, ours=True), complete=False)
                 self._published = (len(self.heads), time.monotonic())
 
     def _lighten(self, record: Path) -> None:
         """Take from the record before the last what only the next step starts from."""
         with self.writing("the journal"):
-            about, before = read_step(record, companion=False, whole=self._about.whole)
+            about, before = read_step(record, companion=False, check=False)
             with self._replacing(record) as path:
                 write_record(path, about, before)
 
@@ -393,7 +393,7 @@ class Store:
         with self._mutex:
             self._require_open()  # a signal may have closed it during the last step
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
-            self._finish(Layout(self.metadata, self.heads), Journal(self.folder))
+            self._finish(Layout(self.metadata, self.heads), Journal(self.folder, ours=True))
 
     def finish_with(
         self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]

@@ -86,12 +86,12 @@ def test_a_failure_to_write_leaves_no_reference_to_it(out: Path, monkeypatch: py
         raise OSError(28, "No space left on device")
 
     with pressed().start(out) as session:
-        session.advance(normal_load=10.0)
-        with monkeypatch.context() as patched:
-            patched.setattr(store, "write_record", full)
-            with pytest.raises(ResourceError, match="step 2"):
-                session.advance(tangential_load_x=1.0)
-        session.advance(tangential_load_x=0.5)
+        for number, load in enumerate(({"normal_load": 10.0}, {"tangential_load_x": 0.5}), start=1):
+            with monkeypatch.context() as patched:
+                patched.setattr(store, "write_record", full)
+                with pytest.raises(ResourceError, match=f"step {number}"):
+                    session.advance(**load)
+            session.advance(**load)
         session.advance(tangential_load_x=0.6)
         assert loads_of(Journal(journal_of(out)).records[-1]) == [(10.0, 0.0), (10.0, 0.5), (10.0, 0.6)]
     assert len(open_result(out)) == 3

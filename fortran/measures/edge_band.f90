@@ -182,12 +182,15 @@ contains
     !> Nodes of the part
     logical, intent(in) :: part(:)
     logical :: beside(self%n)
-    integer :: k
+    integer :: k, j
 
+    beside = .false.
     do k = 1, self%n
-      associate (around => self%beside(:, k))
-        beside(k) = any(part(pack(around, around > 0)))
-      end associate
+      do j = 1, n_beside
+        associate (m => self%beside(j, k))
+          if (m > 0) beside(k) = beside(k) .or. part(m)
+        end associate
+      end do
     end do
   end function next_to
 
@@ -215,19 +218,27 @@ contains
     real(wp), intent(inout) :: values(:)
     !> Nodes that have a value
     logical, intent(inout) :: known(:)
-    logical :: had(self%n), beside_has(n_beside)
-    integer :: k, step
+    logical :: had(self%n)
+    real(wp) :: total
+    integer :: k, j, step, n_known
 
     do step = 1, self%reach
       had = known
       do k = 1, self%n
         if (had(k)) cycle
-        associate (around => self%beside(:, k))
-          beside_has = around > 0
-          where (beside_has) beside_has = had(max(around, 1))
-          known(k) = any(beside_has)
-          if (known(k)) values(k) = sum(values(pack(around, beside_has)))/count(beside_has)
-        end associate
+        total = 0.0_wp
+        n_known = 0
+        do j = 1, n_beside
+          associate (m => self%beside(j, k))
+            if (m == 0) cycle
+            if (.not. had(m)) cycle
+            total = total + values(m)
+            n_known = n_known + 1
+          end associate
+        end do
+        if (n_known == 0) cycle
+        known(k) = .true.
+        values(k) = total/n_known
       end do
     end do
   end subroutine extend

@@ -6,7 +6,7 @@
 !>
 !> Equations: docs/theory/edges.md, (B5).
 module hc_zone_edge
-  use, intrinsic :: iso_fortran_env, only: int8
+  use, intrinsic :: iso_fortran_env, only: int8, int64
   use hc_precision, only: wp, pi
   use hc_options, only: edge_options_t
   use hc_lattice, only: lattice_t
@@ -121,6 +121,7 @@ contains
     real(wp), allocatable :: segments(:, :, :)
     logical, allocatable :: can_touch(:)
     real(wp) :: covered, moments(6), sign
+    integer(int64) :: whole(6, 2)  ! whole triangles, and sums of columns, rows and their products over them
     integer :: n_with(0:3), inside(2), corners(2, 3), at(3), lone, col, row, half, n
 
     padded = with_rim(zone)
@@ -130,16 +131,17 @@ contains
     n = 0
     covered = n_with(3)
     moments = 0.0_wp
+    whole = 0_int64
     do row = 0, size(zone, 2)
       do col = 0, size(zone, 1)
         inside = nodes_inside(padded(col:col + 1, row:row + 1))
         do half = 1, 2
           if (inside(half) == 0) cycle
-          corners = reshape([half - 1, half - 1, 1, 0, 0, 1], [2, 3]) + spread([col, row], 2, 3)
           if (inside(half) == 3) then
-            moments = moments + moments_of(real(corners, wp))
+            whole(:, half) = whole(:, half) + [1, col, row, col*col, col*row, row*row]
             cycle
           end if
+          corners = corners_of(half) + spread([col, row], 2, 3)
           at = [band%place(corners(1, 1), corners(2, 1)), band%place(corners(1, 2), corners(2, 2)), &
                 band%place(corners(1, 3), corners(2, 3))]
           if (all(can_touch(at))) then
@@ -159,6 +161,9 @@ contains
         end do
       end do
     end do
+    do half = 1, 2
+      moments = moments + moments_of_whole(half, real(whole(:, half), wp))
+    end do
     edge%area = 0.5_wp*lattice%cell_area()*covered
     if (moments(1) > 0.0_wp) edge%ellipse = ellipse_of(lattice, moments)
     allocate (edge%segments(2, 2, n))
@@ -168,6 +173,32 @@ contains
       end do
     end do
   end function edge_of_zone
+
+  !> Return the corners of the lower or upper triangle of the cell at column and row 0.
+  pure function corners_of(half) result(corners)
+    !> 1: the lower triangle, 2: the upper one
+    integer, intent(in) :: half
+    !> Columns and rows
+    integer :: corners(2, 3)
+    corners = reshape([half - 1, half - 1, 1, 0, 0, 1], [2, 3])
+  end function corners_of
+
+  !> Add up the moments of lower or upper triangles, as `moments_of`: those of one, shifted to each cell.
+  pure function moments_of_whole(half, sums) result(moments)
+    !> 1: lower triangles, 2: upper ones
+    integer, intent(in) :: half
+    !> Their number, and sums of column, row, and products (column**2, column*row, row**2) of their cells
+    real(wp), intent(in) :: sums(6)
+    real(wp) :: moments(6)
+
+    associate (one => moments_of(real(corners_of(half), wp)))
+      moments = one*sums(1)
+      moments(2:3) = moments(2:3) + one(1)*sums(2:3)
+      moments(4) = moments(4) + 2.0_wp*one(2)*sums(2) + one(1)*sums(4)
+      moments(5) = moments(5) + one(2)*sums(3) + one(3)*sums(2) + one(1)*sums(5)
+      moments(6) = moments(6) + 2.0_wp*one(3)*sums(3) + one(1)*sums(6)
+    end associate
+  end function moments_of_whole
 
   !> Return the place of a column and row, counted from 1 [m].
   pure function position(lattice, index)

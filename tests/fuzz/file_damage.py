@@ -159,8 +159,8 @@ def _rewrite_record(record: Path, kind: str, rng: random.Random) -> None:
     if kind == "text":
         about = rng.choice(({}, [], 1, None, "x", {"journal_version": 1}, about | {"journal_version": 99}))
     elif kind == "text value":
-        metadata = about["metadata"]
-        table = rng.choice((about, metadata, metadata["parameters"], about["lattice"], about["history"]))
+        known = about.get("growth") or rng.choice((about["metadata"], about["metadata"]["parameters"]))
+        table = rng.choice((about, known, about["lattice"], about["history"]))
         name = rng.choice(list(table))
         table[name] = rng.choice((None, "", "x", -1, 0, 10**12, 1e308, [], {}, [1], {"a": 1}, True))
     arrays["about"] = np.frombuffer(json.dumps(about).encode(), "u1")

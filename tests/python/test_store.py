@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import netCDF4
 import pytest
@@ -30,7 +31,6 @@ from hexcontact.result import journal as journal_module
 from hexcontact.result import store as store_module
 from hexcontact.result.journal import Journal, journal_of, read_record
 from hexcontact.result.layout import Metadata, assemble
-from hexcontact.result.step import Step
 from hexcontact.result.store import Store, open_result
 
 
@@ -165,14 +165,14 @@ def test_the_journal_of_another_run_does_not_mix_in(out: Path) -> None:
 def test_interim_outputs_cost_linear_time(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store_module, "PUBLISH_INTERVAL", 0.0)
     reads = 0
-    original = journal_module.read_record
+    original = journal_module.read_step
 
-    def counted(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
+    def counted(*arguments: Any) -> Any:
         nonlocal reads
         reads += 1
-        return original(path, companion)
+        return original(*arguments)
 
-    monkeypatch.setattr(journal_module, "read_record", counted)
+    monkeypatch.setattr(journal_module, "read_step", counted)
     written(out, count=33, planned=34)
     assert reads == 1 + 2 + 4 + 8 + 16 + 32
 

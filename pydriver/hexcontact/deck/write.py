@@ -43,6 +43,16 @@ def as_toml(data: Mapping[str, Any]) -> str:
     return tomli_w.dumps(plain(data))
 
 
+def load_as_toml(entry: Mapping[str, Any]) -> str:
+    """Return the text of an entry of [[load]], which can follow that of other tables and entries."""
+    import tomli_w
+
+    long = {"label": "-" * 100}  # beside it no entry is written as an array in a line
+    return "\n" + tomli_w.dumps({"load": [entry, long]}).removesuffix(
+        f'\n[[load]]\nlabel = "{long["label"]}"\n'
+    )
+
+
 def written(deck: Deck) -> str:
     """Return the text of a deck with every key that has a value, defaults included, in SI.
 

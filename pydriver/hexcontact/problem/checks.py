@@ -20,7 +20,7 @@ from .loads import MOTIONS, LoadStep, cycle_entries, load_steps
 _LONGEST_NAME = 60  # bytes of the name of a table of stresses, which is part of the name of a file
 
 
-def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, tuple[LoadStep, ...]]:
+def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, Sequence[LoadStep]]:
     """Check a deck, table by table and as a whole.
 
     Parameters
@@ -36,7 +36,7 @@ def checked(given: Assembled, gap_given: bool) -> tuple[Deck, Solver, tuple[Load
         The deck.
     solver : Solver
         Its solver, with the algorithm.
-    load_steps : tuple of LoadStep
+    load_steps : sequence of LoadStep
         Its history.
 
     Raises

@@ -59,7 +59,7 @@ class Problem:
         Table [solver], with the algorithm.
     accuracy : Accuracy or None
         Target accuracy; None: the lattice is not refined.
-    load_steps : tuple of LoadStep
+    load_steps : sequence of LoadStep
         The history; a segment in adaptive steps is one of them.
     output : Output
         Table [output].

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,11 @@ _ALWAYS = names_where(lambda v: v.required == "always")
 _WITH_FRICTION = names_where(lambda v: bool(v.required))
 _NOISE = 1e-3  # of energies beside the normal load times the contact radius
 _NO_STEP = "{} holds numbers that no load step has"
+_EQUAL = 1e-9  # relative difference of equal moduli
+PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that belong to the problem
+_NOT_PHYSICS = ("title", "solver", "output", "stress")  # tables of a deck that do not
+_OF_NODES = {"spacing", "origin"}  # keys of [grid] that a session writes with a load
+_OF_SESSIONS = ("grid", "load", "accuracy")  # tables of a deck that it changes
 
 
 Fits = Callable[[Any], bool]  # test of a value
@@ -316,3 +322,42 @@ def _fault_of_step(step: Step) -> str:
         if not isinstance(value, str if VARIABLES[name].dtype == "str" else int | float):
             return f"{name} is of another kind"
     return ""
+
+
+# --- records of one run -------------------------------------------------------------------------------------
+
+
+def fault_of_sequence(before: Metadata, after: Metadata) -> str:
+    """Return the reason why a record cannot follow another of the same journal; empty if it can.
+
+    Tolerances may change when a run is resumed, and a session adds loads.
+    """
+    for name in ("run", "created", "title", "version", "fields", "every"):
+        if getattr(before, name) != getattr(after, name):
+            return f"its {name} is another"
+    if after.resumed[: len(before.resumed)] != before.resumed:
+        return "it was written before them"
+    for name in MATERIALS:
+        if not _same(before.parameters.get(name), after.parameters.get(name)):
+            return f"its {name} is another"
+    if before.deck != after.deck:
+        was, now = physics(before.deck), physics(after.deck)
+        if now.get("grid", {}).keys() >= _OF_NODES:
+            was, now = ({k: v for k, v in deck.items() if k not in _OF_SESSIONS} for deck in (was, now))
+        if was != now:
+            return "its deck is of another problem"
+    return ""
+
+
+def physics(deck: str) -> dict[str, Any]:
+    """Return the tables of a deck that belong to the problem, without those of solution and output."""
+    tables = tomllib.loads(deck)
+    solver = {key: value for key, value in tables.get("solver", {}).items() if key in PHYSICS}
+    return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Compare parameters of a case; numbers may differ by rounding."""
+    numbers = isinstance(one, float) and isinstance(other, float)
+    close = numbers and (math.isclose(one, other, rel_tol=_EQUAL) or (math.isnan(one) and math.isnan(other)))
+    return bool(one == other or close)

@@ -1,20 +1,21 @@
 """The journal of a run: its finished load steps, each in a file of its own beside the output.
 
-A record is an uncompressed zip archive of the fields in the format of numpy, and a text (JSON) with all other
-data. It is written and read several times faster than a netCDF file of as many variables; checksums cover all
-of it, so that damage is an error.
+A record is an uncompressed zip archive of the fields, an array for each type of numbers in the format of
+numpy, and a text (JSON) with all other data. It is written and read several times faster than a netCDF file
+of as many variables; checksums cover all of it, so that damage is an error. The metadata of the run with the
+whole deck are in the first record, and in those at which they changed; the others refer to it, and add the
+loads of a session. So records do not grow with the number of steps.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import os
 import re
-import tomllib
 import zipfile
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +26,9 @@ from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import DeckError
 from ..files import beginning, reading
-from .check import MATERIALS, fault_of_record
-from .layout import Layout, Metadata, assemble
+from ..variables import VARIABLES
+from .check import fault_of_record, fault_of_sequence
+from .layout import Metadata, assemble
 from .step import Step
 
 if TYPE_CHECKING:
@@ -37,14 +39,12 @@ STOPPED = "stopped.txt"  # the reason of an early end
 _LONGEST_REASON = 10_000  # bytes of it
 _RECORD = re.compile(r"\d{6}" + re.escape(SUFFIX))
 _TEMPORARY = ".tmp"
-VERSION = 1
+VERSION = 2
 _ABOUT = "about"  # name of the text among the arrays
-_COMPANION = "companion_"  # prefix of the names of fields of a second solution
-_CLOSE = 1e-9  # relative difference of equal moduli
-PHYSICS = ("algorithm", "coupling", "entry")  # keys of [solver] that belong to the problem
-_NOT_PHYSICS = ("title", "solver", "output", "stress")  # tables of a deck that do not
-_OF_NODES = {"spacing", "origin"}  # keys of [grid] that a session writes with a load
-_OF_SESSIONS = ("grid", "load", "accuracy")  # tables of a deck that it changes
+_LACKS = "{0} lacks the record of step {1}, {1:06d}" + SUFFIX
+_KIND = "a record of a journal"
+_NO_FOLLOWER = "{} does not belong to the records before it: {}"
+_FIELDS, _COMPANION = "fields", "companion"  # parts with fields: of the step, of a second solution
 
 
 def journal_of(path: Path) -> Path:
@@ -61,14 +61,17 @@ class Journal:
         The folder; a missing one is an empty journal.
     companions : bool
         Read the companions of steps, too.
+    ours : bool
+        Whether this process has written or read the records already: only their checksums are compared.
     """
 
-    def __init__(self, folder: Path, companions: bool = False) -> None:
-        self.folder, self._companions = folder, companions
+    def __init__(self, folder: Path, companions: bool = False, ours: bool = False) -> None:
+        self.folder, self._companions, self._ours = folder, companions, ours
         names = sorted(os.listdir(folder)) if folder.is_dir() else []
         self.records = [folder / name for name in names if _RECORD.fullmatch(name)]
         unfinished = [name for name in names if _is_temporary(name, folder)]
         self._besides = [folder / name for name in names if name == STOPPED or name in unfinished]
+        self._last: Description | None = None  # in the last record, once it was read
 
     def __len__(self) -> int:
         """Return the number of finished steps."""
@@ -76,23 +79,36 @@ class Journal:
 
     def __iter__(self) -> Iterator[Step]:
         """Read the steps; DeckError if one is missing, damaged or of another run."""
-        before = None
+        known: Description | None = None
         for number, record in enumerate(self.records, start=1):
             if int(record.stem) != number:
-                raise DeckError(f"{self.folder} lacks the record of step {number}, {number:06d}{SUFFIX}")
-            metadata, step = read_record(record, self._companions)
+                raise DeckError(_LACKS.format(self.folder, number))
+            about, step = read_step(record, self._companions, known.whole if known else None, not self._ours)
             if step.number != number:
                 raise DeckError(f"{record} is damaged: it holds step {step.number}")
-            with reading(record, "a record of a journal"):
-                if fault := fault_of_sequence(before or metadata, metadata):
-                    raise DeckError(f"{record} does not belong to the records before it: {fault}")
-            before = metadata
+            with reading(record, _KIND):
+                fault = ""
+                if isinstance(about, Growth):
+                    fault = "their deck is another" if known is None else known.follow(about)
+                else:
+                    fault = fault_of_sequence(known.metadata, about) if known else ""
+                    known = Description(about, number)
+                if fault:
+                    raise DeckError(_NO_FOLLOWER.format(record, fault))
             yield step
+        self._last = known
 
     @property
     def metadata(self) -> Metadata:
         """Metadata of the run in the last record."""
-        return read_record(self.records[-1], companion=False)[0]
+        if self._last is None:
+            self._last = described(self.records[-1])
+        return self._last.metadata
+
+    @property
+    def run(self) -> str:
+        """Unique name of the run, in the last record."""
+        return read_about(self.records[-1]).run
 
     @property
     def stopped(self) -> str:
@@ -102,8 +118,8 @@ class Journal:
     @property
     def complete(self) -> bool:
         """Whether it has all planned steps."""
-        metadata, last = read_record(self.records[-1], companion=False)
-        return len(self) == metadata.planned_steps or last.done == 1.0
+        about, last = read_step(self.records[-1], companion=False)
+        return len(self) == about.planned_steps or last.done == 1.0
 
     def result(self, path: Path) -> Result:
         """Return all finished steps as a result in memory; `path` is its name."""
@@ -146,15 +162,123 @@ def _is_temporary(name: str, folder: Path) -> bool:
 # --- records ------------------------------------------------------------------------------------------------
 
 
-def write_record(path: Path, metadata: Metadata, step: Step) -> None:
+@dataclasses.dataclass(frozen=True)
+class Growth:
+    """Reference of a record to metadata in an earlier one, and the text that it adds to the deck.
+
+    Attributes
+    ----------
+    run : str
+        Unique name of the run.
+    of : int
+        Number of the record with the metadata.
+    planned_steps : int
+        As in `Metadata`.
+    kept : int
+        Characters of the deck of the record before that remain.
+    added : str
+        Text that follows them.
+    checksum : int
+        CRC-32 of the whole deck.
+    """
+
+    run: str
+    of: int
+    planned_steps: int
+    kept: int
+    added: str
+    checksum: int
+
+
+class Description:
+    """Metadata of a run whose deck grows.
+
+    Parameters
+    ----------
+    metadata : Metadata
+        The metadata at first.
+    number : int
+        Number of the record that holds them; 0: none.
+
+    Attributes
+    ----------
+    whole : Metadata
+        The metadata at first.
+    planned_steps : int
+        As in `Metadata`.
+    """
+
+    def __init__(self, metadata: Metadata, number: int = 0) -> None:
+        self._begin(metadata, number)
+
+    def _begin(self, metadata: Metadata, number: int) -> None:
+        self.whole, self.number, self.planned_steps = metadata, number, metadata.planned_steps
+        self._pieces: list[str] = []  # of the deck
+        self._ends = [(0, 0)]  # lengths and checksums before each, and of all
+        self._add(metadata.deck)
+
+    @property
+    def metadata(self) -> Metadata:
+        """The metadata at present."""
+        deck = "".join(self._pieces)
+        return dataclasses.replace(self.whole, deck=deck, planned_steps=self.planned_steps)
+
+    def next(
+        self, number: int, added: str = "", kept: int | None = None, planned_steps: int | None = None
+    ) -> Metadata | Growth:
+        """Add text to the deck, and return what the next record holds of the metadata.
+
+        Parameters
+        ----------
+        number : int
+            Number of the record.
+        added, kept, planned_steps : optional
+            As the attributes of `Growth`; by default nothing is added.
+        """
+        kept = self._ends[-1][0] if kept is None else kept
+        self._replace(kept, added)
+        self.planned_steps = self.planned_steps if planned_steps is None else planned_steps
+        if not self.number:
+            self._begin(self.metadata, number)
+            return self.whole
+        checksum = self._ends[-1][1]
+        return Growth(self.whole.run, self.number, self.planned_steps, kept, added, checksum)
+
+    def follow(self, growth: Growth) -> str:
+        """Follow the reference of the next record; return why it cannot be that, else empty text."""
+        if growth.run != self.whole.run:
+            return "its run is another"
+        if growth.of != self.number or growth.kept > self._ends[-1][0]:
+            return "its metadata are others"
+        self._replace(growth.kept, growth.added)
+        self.planned_steps = growth.planned_steps
+        return "" if self._ends[-1][1] == growth.checksum else "its deck is another"
+
+    def _replace(self, kept: int, added: str) -> None:
+        """Replace all but the first `kept` characters of the deck."""
+        last = ""
+        while self._ends[-1][0] > kept:
+            self._ends.pop()
+            last = self._pieces.pop()
+        self._add(last[: kept - self._ends[-1][0]])
+        self._add(added)
+
+    def _add(self, piece: str) -> None:
+        if piece:
+            length, checksum = self._ends[-1]
+            self._pieces.append(piece)
+            self._ends.append((length + len(piece), zlib.crc32(piece.encode(), checksum)))
+
+
+def write_record(path: Path, about: Metadata | Growth, step: Step) -> None:
     """Write a record.
 
     Parameters
     ----------
     path : Path
         File to write or replace.
-    metadata : Metadata
-        Metadata of the run.
+    about : Metadata or Growth
+        Metadata of the run, or a reference to those of earlier records.
     step : Step
         The step.
 
@@ -163,27 +287,55 @@ def write_record(path: Path, metadata: Metadata, step: Step) -> None:
     OSError
         If the file cannot be written.
     """
-    layout = Layout(metadata, [step.head])
-    about = {
+    fields = {name: np.asarray(values, VARIABLES[name].dtype) for name, values in step.fields.items()}
+    for name, values in fields.items():
+        if values.shape != step.lattice.shape:
+            raise ValueError(
+                f"{name} of step {step.number} has shape {values.shape}, not {step.lattice.shape}"
+            )
+    parts = {_FIELDS: _alike(fields), _COMPANION: _alike(step.companion)}
+    known = {
         "journal_version": VERSION,
         "hexcontact_version": __version__,
-        "metadata": dataclasses.asdict(metadata),
+        "growth" if isinstance(about, Growth) else "metadata": vars(about),
         "index": step.index,
         "lattice": dataclasses.asdict(step.lattice),
         "history": dict(step.history),
-        "fields": list(step.fields),
-        "companion": list(step.companion),
+        **{part: [list(group) for group in groups] for part, groups in parts.items()},
         "control": dict(step.control),
     }
-    text = json.dumps(about, default=np.generic.item).encode()
-    fields = {name: layout.padded(name, step) for name in step.fields}
-    fields |= {_COMPANION + name: values for name, values in step.companion.items()}
-    with path.open("wb") as file:
-        np.savez(file, **{_ABOUT: np.frombuffer(text, "u1")}, **fields)  # type: ignore[arg-type]
+    text = json.dumps(known, default=np.generic.item).encode()
+    with zipfile.ZipFile(path, "w") as file:
+        _write_array(file, _ABOUT, [np.frombuffer(text, "u1")])
+        for part, groups in parts.items():
+            for number, group in enumerate(groups):
+                _write_array(file, f"{part}_{number}", [values[np.newaxis] for values in group.values()])
+
+
+def _alike(fields: Mapping[str, NDArray[Any]]) -> list[dict[str, NDArray[Any]]]:
+    """Return fields in groups of one type and shape."""
+    groups: dict[Any, dict[str, NDArray[Any]]] = {}
+    for name, values in fields.items():
+        groups.setdefault((values.dtype, values.shape), {})[name] = values
+    return list(groups.values())
+
+
+def _write_array(archive: zipfile.ZipFile, name: str, parts: Sequence[NDArray[Any]]) -> None:
+    """Write an array that consists of parts along its first axis."""
+    first = parts[0]
+    header = {
+        "descr": np.lib.format.dtype_to_descr(first.dtype),
+        "fortran_order": False,
+        "shape": (sum(map(len, parts)), *first.shape[1:]),
+    }
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        np.lib.format.write_array_header_1_0(member, header)
+        for part in parts:
+            member.write(np.ascontiguousarray(part).data)
 
 
 def read_record(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
-    """Read a record, with its companion or without.
+    """Read a record, with its companion or without, and the metadata that it refers to.
 
     Raises
     ------
@@ -192,32 +344,95 @@ def read_record(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
     FileNotFoundError
         If it is missing.
     """
-    with reading(path, "a record of a journal"):
-        with zipfile.ZipFile(path) as file:
-            about = json.loads(_array(file, _ABOUT).tobytes())
-            if about["journal_version"] != VERSION:
-                raise DeckError(
-                    f"{path} was kept by hexcontact {about['hexcontact_version']}, whose journal has the "
-                    f"layout {about['journal_version']}; this version reads layout {VERSION}"
-                )
-            fields = {name: _array(file, name) for name in about["fields"]}
-            beside = about.get("companion", ())
-            fields_beside = {name: _array(file, _COMPANION + name) for name in beside if companion}
-        origin = tuple(about["lattice"].pop("origin"))
-        lattice = Lattice(**about["lattice"], origin=origin)
-        metadata = Metadata.from_plain(about["metadata"])
+    return described(path).metadata, read_step(path, companion)[1]
+
+
+def read_step(
+    path: Path, companion: bool = True, whole: Metadata | None = None, check: bool = True
+) -> tuple[Metadata | Growth, Step]:
+    """Read a record, as `read_record`, without the metadata that it refers to.
+
+    To `check` the step, these are given by `whole`, or read.
+    """
+    with reading(path, _KIND), zipfile.ZipFile(path) as file:
+        known = _known(file, path)
+        about = _about(known)
+        fields = _fields(file, _FIELDS, known)
+        fields_beside = _fields(file, _COMPANION, known) if companion else {}
+        lattice = Lattice(**known["lattice"] | {"origin": tuple(known["lattice"]["origin"])})
         step = Step(
-            *(about["index"], lattice, fields, about["history"]),
+            *(known["index"], lattice, fields, known["history"]),
             companion=fields_beside,
-            control=about.get("control", {}),
+            control=known["control"],
         )
+        if not check:
+            return about, step
+        if isinstance(about, Metadata):
+            metadata = about
+        else:
+            whole = whole or described(_record(path.parent, about.of)).whole
+            metadata = dataclasses.replace(whole, planned_steps=about.planned_steps)
         fault = fault_of_record(metadata, step)
         adaptive = step.control and "until" not in step.control
-        if not fault and adaptive and bool(beside) != isinstance(step.control.get("companion"), dict):
+        if (
+            not fault
+            and adaptive
+            and bool(known[_COMPANION]) != isinstance(step.control.get("companion"), dict)
+        ):
             fault = "its second solution is not whole"
         if fault:
             raise DeckError(f"{path} is damaged: {fault}")
-        return metadata, step
+        return about, step
+
+
+def described(record: Path) -> Description:
+    """Return the metadata of a record, and read for it those before it to which it refers."""
+    number, growths = int(record.stem), []
+    while isinstance(about := read_about(record), Growth):
+        growths.append((record, about))
+        number -= 1
+        record = _record(record.parent, number)
+        if not record.exists() and growths[0][0].exists():
+            raise DeckError(_LACKS.format(record.parent, number))
+    known = Description(about, number)
+    for path, growth in reversed(growths):
+        with reading(path, _KIND):
+            if fault := known.follow(growth):
+                raise DeckError(_NO_FOLLOWER.format(path, fault))
+    return known
+
+
+def read_about(path: Path) -> Metadata | Growth:
+    """Read what a record holds of the metadata."""
+    with reading(path, _KIND), zipfile.ZipFile(path) as file:
+        return _about(_known(file, path))
+
+
+def _record(folder: Path, number: int) -> Path:
+    return folder / f"{number:06d}{SUFFIX}"
+
+
+def _known(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
+    """Return the text of a record."""
+    known: dict[str, Any] = json.loads(_array(archive, _ABOUT).tobytes())
+    if known["journal_version"] != VERSION:
+        raise DeckError(
+            f"{path} was kept by hexcontact {known['hexcontact_version']}, whose journal has the "
+            f"layout {known['journal_version']}; this version reads layout {VERSION}"
+        )
+    return known
+
+
+def _about(known: Mapping[str, Any]) -> Metadata | Growth:
+    return Growth(**known["growth"]) if "growth" in known else Metadata.from_plain(known["metadata"])
+
+
+def _fields(archive: zipfile.ZipFile, part: str, known: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Return the fields of a part of a record."""
+    fields: dict[str, NDArray[Any]] = {}
+    for number, names in enumerate(known[part]):
+        fields |= zip(names, _array(archive, f"{part}_{number}"), strict=True)
+    return fields
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
@@ -233,39 +448,3 @@ def begins_like_record(path: Path) -> bool:
     """Test whether a file begins like a record, which may be damaged."""
     head = beginning(path, 30 + len(_ABOUT))
     return head[:4] == b"PK\x03\x04" and head[30:] == _ABOUT.encode()
-
-
-def fault_of_sequence(before: Metadata, after: Metadata) -> str:
-    """Return the reason why a record cannot follow another of the same journal; empty if it can.
-
-    Tolerances may change when a run is resumed, and a session adds loads.
-    """
-    for name in ("run", "created", "title", "version", "fields", "every"):
-        if getattr(before, name) != getattr(after, name):
-            return f"its {name} is another"
-    if after.resumed[: len(before.resumed)] != before.resumed:
-        return "it was written before them"
-    for name in MATERIALS:
-        if not _same(before.parameters.get(name), after.parameters.get(name)):
-            return f"its {name} is another"
-    if before.deck != after.deck:
-        was, now = physics(before.deck), physics(after.deck)
-        if now.get("grid", {}).keys() >= _OF_NODES:
-            was, now = ({k: v for k, v in deck.items() if k not in _OF_SESSIONS} for deck in (was, now))
-        if was != now:
-            return "its deck is of another problem"
-    return ""
-
-
-def physics(deck: str) -> dict[str, Any]:
-    """Return the tables of a deck that belong to the problem, without those of solution and output."""
-    tables = tomllib.loads(deck)
-    solver = {key: value for key, value in tables.get("solver", {}).items() if key in PHYSICS}
-    return {**{key: value for key, value in tables.items() if key not in _NOT_PHYSICS}, "solver": solver}
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Compare parameters of a case; numbers may differ by rounding."""
-    numbers = isinstance(one, float) and isinstance(other, float)
-    close = numbers and (math.isclose(one, other, rel_tol=_CLOSE) or (math.isnan(one) and math.isnan(other)))
-    return bool(one == other or close)

@@ -12,7 +12,7 @@ import hashlib
 import os
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +33,10 @@ if TYPE_CHECKING:
 
     from .result import Result
 
+# Words of a deck with tables [[stress]] or [[fatigue]], whose keys may be written with escapes.
+_BELOW = ("stress", "fatigue", "\\")
 _CHUNK = 512  # nodes of a chunk along row and col
+_STEPS = 64**2  # nodes of a chunk with several steps
 _MARK = b"hexcontact sha-2"
 _SIZE = len(_MARK) + 32
 _BLOCK = 1 << 22  # bytes
@@ -87,10 +90,12 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             mesh.write_mesh(file, layout.window)
         gap_column = columns.pop("initial_gap", None)
         gap: Any = None
+        block: list[Step] = []
         for position, step in enumerate(steps):
-            with _alone():
-                for name, column in columns.items():
-                    column[position] = layout.field(name, position, step)
+            block.append(step)
+            if len(block) == _block(layout) or position == len(layout.steps) - 1:
+                _write_block(columns, layout, position - len(block) + 1, block)
+                block.clear()
             if gap_column is not None:
                 gap = layout.initial_gap(gap, step)
         if gap_column is not None:
@@ -118,13 +123,30 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     seal(path)
 
 
+def _block(layout: Layout) -> int:
+    """Return the number of load steps in a chunk."""
+    return max(1, _STEPS // layout.window.size)
+
+
+def _write_block(
+    columns: Mapping[str, netCDF4.Variable], layout: Layout, first: int, steps: Sequence[Step]
+) -> None:
+    """Write the fields of load steps, of which `first` is the place of the first."""
+    with _alone():
+        for name, column in columns.items():
+            values = [layout.field(name, first + place, step) for place, step in enumerate(steps)]
+            block = values[0][np.newaxis] if len(values) == 1 else np.stack(values)
+            column[first : first + len(values)] = block
+
+
 def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variable:
     """Create the variable `name` with its attributes."""
     variable = VARIABLES[name]
     options: dict[str, Any] = {}
     if variable.dims[-2:] == ("row", "col"):
-        sizes = [1 if dim == "step" else len(file.dimensions[dim]) for dim in variable.dims]
-        options = {"compression": "zlib", "complevel": 1, "chunksizes": [min(_CHUNK, n) for n in sizes]}
+        block = {"step": _block(layout), "row": _CHUNK, "col": _CHUNK}
+        sizes = [min(block[dim], layout.sizes[dim]) for dim in variable.dims]
+        options = {"compression": "zlib", "complevel": 1, "chunksizes": sizes}
         options["fletcher32"] = True  # damage is an error
         if variable.dtype == "f8":
             options["fill_value"] = variable.missing
@@ -189,6 +211,15 @@ def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
                 f"{path} does not hold stresses that hexcontact has written, so it is not overwritten; "
                 "delete it, or choose another output or name of [[stress]] or [[fatigue]]"
             )
+
+
+def stress_files(deck: str, output: Path) -> Iterable[Path]:
+    """Return the files beside an output that hold the tables [[stress]] and [[fatigue]] of its deck."""
+    if not any(name in deck for name in _BELOW):
+        return ()
+    from ..interior.tables import files_of
+
+    return files_of(deck, output).values()
 
 
 def _names_of_attributes(path: Path) -> set[str]:

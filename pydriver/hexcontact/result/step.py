@@ -142,7 +142,7 @@ class Step:
     @property
     def head(self) -> Step:
         """The same step without the values of its fields."""
-        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, np.empty(0)), companion={})
+        return dataclasses.replace(self, fields=dict.fromkeys(self.fields, _NO_VALUES), companion={})
 
     @property
     def done(self) -> float:
@@ -222,6 +222,11 @@ class Step:
 
 
 def _read_only(values: NDArray[Any]) -> NDArray[Any]:
+    if isinstance(values, np.ndarray) and not values.flags.writeable:
+        return values
     view = np.asarray(values).view()
     view.flags.writeable = False
     return view
+
+
+_NO_VALUES = _read_only(np.empty(0))  # of the fields of a head

@@ -23,17 +23,15 @@ from typing import TYPE_CHECKING, Any, Self
 from ..errors import LACKING, DeckError, HexcontactError, ResourceError
 from ..files import flush, make_anew, reading, replacing, require_utf8
 from ..lock import Lock, names_a_run
-from .journal import STOPPED, SUFFIX, Journal, journal_of, read_record, write_record
+from .journal import STOPPED, SUFFIX, Description, Journal, journal_of, read_step, write_record
 from .layout import Layout, Metadata
-from .netcdf import is_ours, read_output, require_free, write
+from .netcdf import is_ours, read_output, require_free, stress_files, write
 from .step import Step
 from .trials import TrialFolder, foreign_file, linked_folder, remove_all
 
 if TYPE_CHECKING:
     from .result import Result
 
-# Words of a deck with tables [[stress]] or [[fatigue]], whose keys may be written with escapes.
-_BELOW = ("stress", "fatigue", "\\")
 PUBLISH_INTERVAL = 30.0  # s, at least, between two interim versions of the output
 _LACKING = {*LACKING, None}
 
@@ -86,16 +84,7 @@ def _continues(journal: Journal, output: Result) -> bool:
 
 def same_run(journal: Journal, output: Result) -> bool:
     """Test whether `output` and the steps of `journal` are of one run."""
-    return journal.metadata.run == output.dataset.attrs.get("run")
-
-
-def _stress_files(deck: str, output: Path) -> Iterable[Path]:
-    """Return the files beside an output that hold the tables [[stress]] and [[fatigue]] of its deck."""
-    if not any(name in deck for name in _BELOW):
-        return ()
-    from ..interior.tables import files_of
-
-    return files_of(deck, output).values()
+    return journal.run == output.dataset.attrs.get("run")
 
 
 class Store:
@@ -129,6 +118,15 @@ class Store:
             self.close()
             raise
         self._in_the_way = self.path.exists()
+
+    @property
+    def metadata(self) -> Metadata:
+        """Metadata of the run; the next record has all of them if they are set."""
+        return self._about.metadata
+
+    @metadata.setter
+    def metadata(self, metadata: Metadata) -> None:
+        self._about = Description(metadata)
 
     @classmethod
     def reopened(cls, path: str | os.PathLike[str]) -> tuple[Self, Step | None]:
@@ -276,7 +274,7 @@ class Store:
                 f"{self.path} is not a result of hexcontact that can be read, so it is not overwritten; "
                 "delete it or choose another output"
             )
-        require_free(_stress_files(self.metadata.deck, self.path), overwrite)
+        require_free(stress_files(self.metadata.deck, self.path), overwrite)
         with self.writing("the journal"):
             if left:  # they become the old output, which a complete new one replaces
                 with contextlib.suppress(DeckError):
@@ -303,14 +301,14 @@ class Store:
     def has_all_steps(self) -> bool:
         """Whether all planned steps are finished."""
         return bool(self.heads) and (
-            len(self.heads) == self.metadata.planned_steps or self.heads[-1].done == 1.0
+            len(self.heads) == self._about.planned_steps or self.heads[-1].done == 1.0
         )
 
     @property
     def kept(self) -> str:
         """Sentence about the finished steps: number, place, how to resume; empty without any."""
         where = self.folder if self.folder.exists() else self.path
-        planned, count = self.metadata.planned_steps, len(self.heads)
+        planned, count = self._about.planned_steps, len(self.heads)
         finished = TrialFolder(self.folder).kept
         if self.heads and planned:
             finished = f"{count} of {planned} load steps are finished"
@@ -338,16 +336,15 @@ class Store:
             raise kind(f"cannot write {what} of {self.path}: {reason}") from error
 
     def _replacing(self, target: Path) -> contextlib.AbstractContextManager[Path]:
-        """Yield a name in the journal for a file that then replaces `target`."""
-        return replacing(target, self.folder / (target.name + ".tmp"))
+        return replacing(target, self.folder / (target.name + ".tmp"))  # a name in the journal
 
     def _put_together(self, layout: Layout, steps: Iterable[Step], complete: bool) -> None:
         """Write the output of finished steps."""
         with self._replacing(self.path) as path:
             write(path, layout, steps, complete)
 
-    def append(self, step: Step) -> None:
-        """Record a finished step on the disk.
+    def append(self, step: Step, **growth: Any) -> None:
+        """Record a finished step on the disk; `growth` changes the deck as in `Description.next`.
 
         Raises
         ------
@@ -359,8 +356,13 @@ class Store:
             if step.number != len(self.heads) + 1:
                 raise ValueError(f"step {len(self.heads) + 1} is next, not step {step.number}")
             record = self.folder / f"{step.number:06d}{SUFFIX}"
-            with self.writing(f"step {step.number}"), self._replacing(record) as path:
-                write_record(path, self.metadata, step)
+            try:
+                about = self._about.next(step.number, **growth)
+                with self.writing(f"step {step.number}"), self._replacing(record) as path:
+                    write_record(path, about, step)
+            except BaseException:
+                self._about.number = 0  # the next record does not refer to this one
+                raise
             if step.companion and "until" in step.control:
                 self._lighten(self.folder / f"{len(self.heads):06d}{SUFFIX}")
             self.heads.append(step.head)
@@ -370,15 +372,15 @@ class Store:
             if due and self.interim and not self._in_the_way:
                 with self.writing("the output"):
                     layout = Layout(self.metadata, self.heads)
-                    self._put_together(layout, Journal(self.folder), complete=False)
+                    self._put_together(layout, Journal(self.folder, ours=True), complete=False)
                 self._published = (len(self.heads), time.monotonic())
 
     def _lighten(self, record: Path) -> None:
         """Take from the record before the last what only the next step starts from."""
         with self.writing("the journal"):
-            metadata, before = read_record(record, companion=False)
+            about, before = read_step(record, companion=False, check=False)
             with self._replacing(record) as path:
-                write_record(path, metadata, before)
+                write_record(path, about, before)
 
     def finish(self) -> None:
         """Write the output and delete the journal.
@@ -391,7 +393,7 @@ class Store:
         with self._mutex:
             self._require_open()  # a signal may have closed it during the last step
             self.metadata = dataclasses.replace(self.metadata, planned_steps=len(self.heads))
-            self._finish(Layout(self.metadata, self.heads), Journal(self.folder))
+            self._finish(Layout(self.metadata, self.heads), Journal(self.folder, ours=True))
 
     def finish_with(
         self, metadata: Metadata, steps: Iterable[Step], trials: Mapping[str, Sequence[Any]]

@@ -15,7 +15,8 @@ from typing import Any
 from .._version import __version__
 from ..errors import DeckError, HexcontactError
 from ..problem.problem import Problem
-from ..result.journal import PHYSICS, journal_of, physics
+from ..result.check import PHYSICS, physics
+from ..result.journal import journal_of
 from ..result.layout import Metadata, now
 from ..result.netcdf import read_output
 from ..result.result import Result

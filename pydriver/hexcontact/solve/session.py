@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..deck.faults import NOWHERE, deck_error
 from ..deck.tables import Load
-from ..deck.write import plain
+from ..deck.write import as_toml, load_as_toml, plain
 from ..errors import DeckError
 from ..problem.arguments import known_keywords, middle_of, with_radians
 from ..problem.loads import History, LoadStep
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from ..result.result import Result
 
-_AT_REST = ("tangential_load_x", "tangential_load_y", "twist")  # zero unless they are given
+_AT_REST = frozenset(("tangential_load_x", "tangential_load_y", "twist"))  # zero unless they are given
 _FINENESS = ("spacing", "nodes_across", "nodes_in_radius", "origin")
 
 
@@ -97,6 +97,8 @@ class Session:
         self._log = Log()
         self._log.begun(case.title, case.planned_steps)
         self._loads: list[dict[str, Any]] = []  # entries of [[load]] that `advance` applied
+        self._resting = _AT_REST  # those that were zero in all steps
+        self._length = self._end = 0  # characters of the deck in the last record, without and with `advance`
         self._history: History | None = None  # of these loads; None: not unrolled
         self._driven = copy.copy(case)
         self._closed = False
@@ -233,7 +235,7 @@ class Session:
         if not self._by_hand:
             self._by_hand, self._loads, self._solving = True, before, None
             self._log.begun(self.case.title, 0)
-        self._driven.load_steps = tuple(history.steps)
+        self._driven.load_steps = history.steps
         segment = int(self._steps[-1].history["segment"]) if self._steps else 0
         done = len(self._steps)
         for target in history.steps[-steps:]:
@@ -243,13 +245,14 @@ class Session:
                 self._solving = solving.steps(self._driven, False, self._steps, queued, self._log)
             last = len(self._steps) + 1 == done + steps
             try:
-                self._next_step(done, [entry] if last else None)
+                self._next_step(done, entry if last else None)
             except BaseException:
                 self._queue.clear()
                 self._loads += self._resolved(self._steps[done:])
+                self._length = self._end
                 raise
         self._loads.append(entry)
-        self._history = history
+        self._length, self._history = self._end, history
         return self.step
 
     def back(self, steps: int = 1) -> None:
@@ -271,29 +274,32 @@ class Session:
         if not 1 <= steps <= len(self._steps):
             raise DeckError(f"steps = {steps!r}: expected 1 to {len(self._steps)}, as many as are finished")
         del self._steps[-steps:]
-        self._solving = None
+        self._solving, self._resting = None, _AT_REST
+        for step in self._steps:
+            self._resting = self._resting_in(step)
         if self._by_hand:
             self._loads, self._history = self._resolved(self._steps), None
 
-    def _next_step(self, done: int = 0, loads: list[dict[str, Any]] | None = None) -> Step:
+    def _next_step(self, done: int = 0, load: dict[str, Any] | None = None) -> Step:
         """Solve the next load step and record it; after a failure the last finished step is the start again.
 
         Parameters
         ----------
         done : int
             Number of steps before `advance` was called.
-        loads : list of dict, optional
-            Entries of [[load]] from there to the step; default: one for each step.
+        load : dict, optional
+            Entry of [[load]] for all steps from there, after the last one; default: one for each step.
         """
         assert self._solving is not None
         try:
             step = next(self._solving)
+            resting = self._resting_in(step)
             if self._store is not None:
-                if self._by_hand:
-                    loads = loads or self._resolved([*self._steps[done:], step])
-                    self._store.metadata = self._described([*self._loads, *loads], step.number)
-                self._store.append(step)
+                growth = self._grown(step, done, load) if self._by_hand else {}
+                self._store.append(step, **growth)
+                self._end = growth.get("kept", 0) + len(growth.get("added", ""))
                 self._steps[-1:] = [before.head for before in self._steps[-1:]]
+            self._resting = resting
         except BaseException:
             self._solving = None
             raise
@@ -311,13 +317,15 @@ class Session:
             return list(tomllib.loads(self.case.deck_text)["load"])
         return self._resolved(self._steps)
 
+    def _resting_in(self, step: Step) -> frozenset[str]:
+        """Return the loads and motions that were zero in all steps, also in this one."""
+        return frozenset(name for name in self._resting if step.prescribed.get(name) == 0.0)
+
     def _resolved(self, steps: Sequence[Step]) -> list[dict[str, Any]]:
         """Return an entry of [[load]] for each step."""
-        resting = {
-            name
-            for name in _AT_REST
-            if all(step.prescribed.get(name) == 0.0 for step in (*self._steps, *steps))
-        }
+        resting = self._resting
+        for step in steps:
+            resting = resting & self._resting_in(step)
         return [
             with_radians(
                 {name: value for name, value in step.prescribed.items() if name not in resting}
@@ -325,6 +333,21 @@ class Session:
             )
             for step in steps
         ]
+
+    def _grown(self, step: Step, done: int, load: dict[str, Any] | None) -> dict[str, Any]:
+        """Return how the deck in the record of a step differs from that before; arguments as `_next_step`."""
+        assert self._store is not None
+        if not self._length:
+            self._store.metadata = self._described(self._loads, step.number)
+            self._length = self._end = len(self._store.metadata.deck)
+        if load is not None:
+            kept, loads = self._length, [load]
+        elif self._resting_in(step) == self._resting:
+            kept, loads = self._end, self._resolved([step])
+        else:  # entries of earlier steps name the loads that are no longer zero
+            kept, loads = self._length, self._resolved([*self._steps[done:], step])
+        added = "".join(map(load_as_toml, loads))
+        return {"added": added, "kept": kept, "planned_steps": step.number}
 
     def _unrolled(self, before: Sequence[dict[str, Any]], entry: dict[str, Any]) -> History:
         """Return the history with a new entry; DeckError for a wrong one."""
@@ -342,8 +365,6 @@ class Session:
 
     def _described(self, loads: Sequence[dict[str, Any]], count: int) -> Metadata:
         """Return the metadata of the result with a deck of these loads, and the number of their steps."""
-        import tomli_w
-
         tables = tomllib.loads(self.case.deck_text)
         lattice = self._steps[-1].lattice if self._steps else self.case.lattice
         # the same nodes, whatever the largest load is
@@ -352,8 +373,9 @@ class Session:
         if self.case.window_fixed:
             grid = {key: value for key, value in grid.items() if key != "extent"}
             grid |= {"window": list(lattice.shape), "center": middle_of(lattice)}
-        tables.pop("accuracy", None)  # on this lattice only
-        deck = tomli_w.dumps({**tables, "grid": grid, "load": list(loads)})
+        # on this lattice only
+        others = {key: table for key, table in tables.items() if key not in ("accuracy", "load")}
+        deck = "".join([as_toml({**others, "grid": grid}), *map(load_as_toml, loads)])
         return dataclasses.replace(self._about, deck=deck, planned_steps=count)
 
     # --- end ------------------------------------------------------------------------------------------------

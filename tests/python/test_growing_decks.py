@@ -1,0 +1,170 @@
+"""Records that refer to the deck in earlier ones: sessions, whose deck grows by the loads of each step."""
+
+import dataclasses
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fuzz.file_made import made_step, written
+from numpy.testing import assert_array_equal
+
+import hexcontact
+from hexcontact import Case, DeckError, ResourceError, open_result
+from hexcontact.deck.surfaces import Sphere
+from hexcontact.result import journal, store
+from hexcontact.result.journal import Growth, Journal, described, journal_of, read_step, write_record
+from hexcontact.result.layout import Metadata, assemble
+from hexcontact.result.store import Store
+
+STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
+
+
+def pressed(**arguments: Any) -> Case:
+    """Press a sphere on a flat, 3 spacings in the contact radius."""
+    return Case(
+        body_1={**STEEL, "surface": Sphere(radius=10e-3)},
+        body_2=STEEL,
+        nodes_in_radius=3,
+        friction_coefficient=0.3,
+        **{"normal_load": 10.0, **arguments},
+    )
+
+
+def loads_of(record: Path) -> list[tuple[float, float]]:
+    """Return the loads along z and x that the deck of a record leads to."""
+    return [
+        (step.z.value, step.x.value) for step in Case.from_text(described(record).metadata.deck).load_steps
+    ]
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "out.nc"
+
+
+def test_records_of_a_session_do_not_grow(out: Path) -> None:
+    with pressed().start(out) as session:
+        session.advance(normal_load=10.0)
+        for turn in range(12):
+            session.advance(tangential_load_x=1.0 + turn % 2)
+        sizes = [record.stat().st_size for record in Journal(journal_of(out)).records]
+    assert max(sizes[2:]) - min(sizes[2:]) < 128  # digits of numbers; an entry has 33 characters
+    assert max(sizes[2:]) < sizes[0]
+    assert len(Case.from_text(open_result(out).deck).load_steps) == 13
+
+
+def test_the_deck_of_each_record_has_the_loads_so_far(out: Path, tmp_path: Path) -> None:
+    """Wherever a session is killed, its deck leads to the finished steps, and the output is completed."""
+    session = pressed().start(out)
+    next(session)  # the deck of the case
+    session.advance(normal_load=12.0, steps=2)
+    session.advance(tangential_load_x=1.5, steps=3)  # entries before it have no tangential load
+    with pytest.raises(DeckError, match="gross sliding"):
+        session.advance(tangential_load_x=9.0)
+    session.advance(normal_load=20.0)
+    expected = [(10.0, 0.0), (11.0, 0.0), (12.0, 0.0), (12.0, 0.5), (12.0, 1.0), (12.0, 1.5), (20.0, 1.5)]
+    records = Journal(journal_of(out)).records
+    for count, record in enumerate(records, start=1):
+        assert np.array(loads_of(record)) == pytest.approx(np.array(expected[:count]), rel=1e-12), count
+        killed = tmp_path / f"{count}.nc"
+        shutil.copytree(journal_of(out), journal_of(killed))
+        (journal_of(killed) / "lock").unlink()
+        for later in records[count:]:
+            (journal_of(killed) / later.name).unlink()
+        result = hexcontact.resume(killed)
+        assert result.complete
+        assert len(result) == count
+        assert_array_equal(result.approach.values, [step.approach for step in session.steps[:count]])
+    session.close()
+    assert open_result(out).deck == result.deck
+
+
+def test_a_failure_to_write_leaves_no_reference_to_it(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pressed().start(out) as session:
+        for number, load in enumerate(({"normal_load": 10.0}, {"tangential_load_x": 0.5}), start=1):
+            with monkeypatch.context() as patched:
+                patched.setattr(store, "write_record", full)
+                with pytest.raises(ResourceError, match=f"step {number}"):
+                    session.advance(**load)
+            session.advance(**load)
+        session.advance(tangential_load_x=0.6)
+        assert loads_of(Journal(journal_of(out)).records[-1]) == [(10.0, 0.0), (10.0, 0.5), (10.0, 0.6)]
+    assert len(open_result(out)) == 3
+
+
+def test_a_record_after_a_resumption_has_all_metadata(out: Path) -> None:
+    def changed(count: int) -> Any:
+        return lambda step: step.number == count
+
+    pressed(steps=5).run(out, on_step=changed(2))
+    hexcontact.resume(out, overrides={"solver.tolerance": 1e-7}, on_step=changed(4))
+    held = [read_step(record)[0] for record in Journal(journal_of(out)).records]
+    assert [about.of if isinstance(about, Growth) else 0 for about in held] == [0, 1, 0, 3]
+    last = Journal(journal_of(out)).metadata
+    assert last.parameters["tolerance"] == 1e-7
+    assert "tolerance = 1e-07" in last.resumed[0]
+    assert hexcontact.resume(out).complete
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"added": "\n[[load]]\n"}, "its deck is another"),
+        ({"kept": 3}, "its deck is another"),
+        ({"kept": 9000}, "its metadata are others"),
+        ({"of": 2}, "its metadata are others"),
+        ({"run": "another"}, "its run is another"),
+        ({"kept": "x"}, "is damaged"),
+        ({"planned_steps": 0}, "planned_steps is no count"),
+    ],
+)
+def test_a_reference_to_other_metadata_is_refused(out: Path, changes: dict[str, Any], fault: str) -> None:
+    written(out, count=3, planned=4)
+    record = journal_of(out) / "000002.npz"
+    about, step = read_step(record)
+    assert isinstance(about, Growth)
+    write_record(record, about, step)
+    assert len(open_result(out)) == 3
+    write_record(record, dataclasses.replace(about, **changes), step)
+    for read in (open_result, Store.reopened):
+        with pytest.raises(DeckError, match=rf"000002\.npz .*{fault}"):
+            read(out)
+
+
+def test_a_journal_without_its_first_record_is_refused(out: Path) -> None:
+    written(out, count=3, planned=4)
+    (journal_of(out) / "000001.npz").unlink()
+    for read in (open_result, Store.reopened):
+        with pytest.raises(DeckError, match=r"lacks the record of step 1, 000001\.npz"):
+            read(out)
+
+
+def test_metadata_of_a_long_journal_are_read_once(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that opening, too, takes time in proportion to the steps."""
+    written(out, count=20, planned=21)
+    reads: list[Path] = []
+    original = journal.read_about
+
+    def counted(path: Path) -> Metadata | Growth:
+        reads.append(path)
+        return original(path)
+
+    monkeypatch.setattr(journal, "read_about", counted)
+    assert len(open_result(out)) == 20
+    assert len(reads) <= 20 + 2
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_steps_that_are_written_at_once_are_those_of_the_run(out: Path, every: int) -> None:
+    metadata = Metadata(planned_steps=100, every=every)  # three blocks of up to 45 steps
+    steps = [made_step(index) for index in range(100)]
+    with Store(out, metadata) as file:
+        for step in steps:
+            file.append(step)
+        file.finish()
+    assert open_result(out).dataset.load().identical(assemble(metadata, steps))

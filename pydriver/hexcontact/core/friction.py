@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import math
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, has_entries, integer, number, reals, word
-from ..errors import DeckError
+from ..errors import DeckError, ResourceError
 from ..variables import BULK_STRAIN, CORE
 from . import _core
 from .calls import called
@@ -35,7 +37,7 @@ from .contact import (
 )
 from .lattice import Lattice
 
-_api = _core.hc_f2py_friction
+_api, _states = _core.hc_f2py_friction, _core.hc_f2py_states
 
 Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
@@ -163,6 +165,52 @@ class ContactState(NormalSolution):
     cuts: int = 0
 
 
+class _Held:
+    """A state in the memory of the core, which is freed with the last array that is a view of it.
+
+    Parameters
+    ----------
+    address : int
+        Address of the state.
+    shape : tuple of int
+        Shape of its fields.
+    """
+
+    def __init__(self, address: int, shape: tuple[int, int]) -> None:
+        self.address, self._shape = address, shape
+        self._places = dict(zip(_FIELDS, _states.state_places(address).tolist(), strict=True))
+        self._recorded: tuple[Any, ...] = ()
+        # at the end of the process arrays may still be in use
+        weakref.finalize(self, _states.free_state, address).atexit = False
+
+    def view(self, name: str) -> Array:
+        """Return a field, which is no copy."""
+        memory: Any = (ctypes.c_double * math.prod(self._shape)).from_address(self._places[name])
+        memory.held = self
+        return np.frombuffer(memory).reshape(self._shape)
+
+    def record(self, gap: Array, numbers: list[float]) -> None:
+        """Remember gap and numbers of the state in Python, which may differ where nothing can touch."""
+        self._recorded = weakref.ref(gap), numbers
+
+    @staticmethod
+    def of(state: ContactState) -> _Held | None:
+        """Return what a state is the record of, if fields and numbers that a step starts from are unchanged."""
+        pressure = getattr(state.pressure, "base", None)
+        held = getattr(getattr(pressure, "base", None), "held", None)
+        if held is None or not held._recorded:
+            return None
+        gap, numbers = held._recorded
+        same = gap() is state.gap and numbers == [getattr(state, name) for name in _NUMBERS]
+        viewed = [name for name in _FIELDS if name != "gap" and name not in _SLIP]
+        return held if same and all(held._is_view(name, getattr(state, name)) for name in viewed) else None
+
+    def _is_view(self, name: str, values: Any) -> bool:
+        if not isinstance(values, np.ndarray) or values.shape != self._shape:
+            return False
+        return values.ctypes.data == self._places[name] and values.flags.c_contiguous
+
+
 class FrictionalContact(Contact):
     """A contact problem with friction; `advance` solves the step from one load to the next.
 
@@ -228,9 +276,9 @@ class FrictionalContact(Contact):
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
-        zero = np.zeros(self.lattice.shape)
-        fields: dict[str, Any] = {name: zero.copy() for name in _FIELDS}
-        fields["gap"] = np.where(self._mask, self._gap, np.nan)
+        # not copies of one array: zeros that are not written take no memory
+        fields: dict[str, Any] = {name: np.zeros(self.lattice.shape) for name in _FIELDS}
+        fields["gap"] = self._recorded_gap(self._gap)
         return ContactState(**fields, zone=np.zeros(self.lattice.shape, dtype=np.int8))
 
     def advance(
@@ -296,24 +344,22 @@ class FrictionalContact(Contact):
         if guess is not None:
             traction = np.reshape(np.asarray(guess[0], dtype=float), (3, self.lattice.size))
             called(_api.set_guess, self._handle, traction.T, [*guess[1]])
+        before = self._held(state)
         out = self._solve(
             _api.advance_friction,
             *([_CONTROLS[word] for word in control], [*targets, *strain], static, entry == "interpolated"),
             *(tolerance, integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
-            *(self._vector(state, name) for name in _FIELDS if name not in _SLIP),
-            [number(getattr(state, name), name) for name in _NUMBERS],
+            *(self.lattice.size, before.address),
         )
-        new_fields, zone, new_numbers, residuals, sweeps, cuts, work, flags = out
-        shape = self.lattice.shape
-        arrays: dict[str, Any] = {
-            name: np.ascontiguousarray(new_fields[:, column]).reshape(shape)
-            for column, name in enumerate(_FIELDS)
-        }
-        arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
+        address, new_numbers, residuals, sweeps, cuts, work, flags = out
+        after, numbers = _Held(address, self.lattice.shape), new_numbers.tolist()
+        arrays: dict[str, Any] = {name: after.view(name) for name in _FIELDS}
+        arrays["gap"] = self._recorded_gap(arrays["gap"])
+        after.record(arrays["gap"], numbers)
         found = ContactState(
             **arrays,
-            zone=zone.reshape(shape).astype(np.int8),
-            **dict(zip(_NUMBERS, new_numbers.tolist(), strict=True)),
+            zone=_states.take_zones(address, self.lattice.size).astype(np.int8).reshape(self.lattice.shape),
+            **dict(zip(_NUMBERS, numbers, strict=True)),
             **dict(zip(_RESIDUALS, residuals.tolist(), strict=True)),
             converged=bool(flags[0]),
             sliding=bool(flags[1]),
@@ -356,6 +402,21 @@ class FrictionalContact(Contact):
         for column, name in enumerate(_FIELDS):
             columns[:, column] = self._vector(state, name)
         return columns
+
+    def _recorded_gap(self, gap: Array) -> Array:
+        """Return a gap with NaN where nothing can touch, which is no copy if all nodes can."""
+        return gap if self._mask.all() else np.where(self._mask, gap, np.nan)
+
+    def _held(self, state: ContactState) -> _Held:
+        """Return a state in the memory of the core, which is no copy if it was found there."""
+        if (held := _Held.of(state)) is not None and state.pressure.shape == self.lattice.shape:
+            return held
+        fields = [self._vector(state, name) for name in _FIELDS if name not in _SLIP]
+        numbers = [number(getattr(state, name), name) for name in _NUMBERS]
+        address = _states.hold_state(*self.lattice.extent, *fields, numbers)
+        if not address:
+            raise ResourceError("not enough memory for the state of the contact: choose a smaller window")
+        return _Held(address, self.lattice.shape)
 
     def _vector(self, state: ContactState, name: str) -> Array:
         """Return a field of a state as a vector, which is no copy if it can be."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import dataclasses
 import math
-import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -14,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, has_entries, integer, number, reals, word
-from ..errors import DeckError, ResourceError
+from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
 from . import _core
-from .calls import called
+from .calls import SLIP, HeldState, called
 from .contact import (
     UNILATERAL,
     Contact,
@@ -37,14 +35,13 @@ from .contact import (
 )
 from .lattice import Lattice
 
-_api, _states = _core.hc_f2py_friction, _core.hc_f2py_states
+_api = _core.hc_f2py_friction
 
 Coupling = Literal["full", "goodman"]
 Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS, _NUMBERS, _RESIDUALS = (CORE[name] for name in ("fields", "numbers", "residuals"))
-_SLIP = ("slip_increment_x", "slip_increment_y")  # of a step, from which the next one does not start
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 """Motions of the remote parts, in the order of the core."""
 
@@ -165,52 +162,6 @@ class ContactState(NormalSolution):
     cuts: int = 0
 
 
-class _Held:
-    """A state in the memory of the core, which is freed with the last array that is a view of it.
-
-    Parameters
-    ----------
-    address : int
-        Address of the state.
-    shape : tuple of int
-        Shape of its fields.
-    """
-
-    def __init__(self, address: int, shape: tuple[int, int]) -> None:
-        self.address, self._shape = address, shape
-        self._places = dict(zip(_FIELDS, _states.state_places(address).tolist(), strict=True))
-        self._recorded: tuple[Any, ...] = ()
-        # at the end of the process arrays may still be in use
-        weakref.finalize(self, _states.free_state, address).atexit = False
-
-    def view(self, name: str) -> Array:
-        """Return a field, which is no copy."""
-        memory: Any = (ctypes.c_double * math.prod(self._shape)).from_address(self._places[name])
-        memory.held = self
-        return np.frombuffer(memory).reshape(self._shape)
-
-    def record(self, gap: Array, numbers: list[float]) -> None:
-        """Remember gap and numbers of the state in Python, which may differ where nothing can touch."""
-        self._recorded = weakref.ref(gap), numbers
-
-    @staticmethod
-    def of(state: ContactState) -> _Held | None:
-        """Return what a state is the record of, if fields and numbers that a step starts from are unchanged."""
-        pressure = getattr(state.pressure, "base", None)
-        held = getattr(getattr(pressure, "base", None), "held", None)
-        if held is None or not held._recorded:
-            return None
-        gap, numbers = held._recorded
-        same = gap() is state.gap and numbers == [getattr(state, name) for name in _NUMBERS]
-        viewed = [name for name in _FIELDS if name != "gap" and name not in _SLIP]
-        return held if same and all(held._is_view(name, getattr(state, name)) for name in viewed) else None
-
-    def _is_view(self, name: str, values: Any) -> bool:
-        if not isinstance(values, np.ndarray) or values.shape != self._shape:
-            return False
-        return values.ctypes.data == self._places[name] and values.flags.c_contiguous
-
-
 class FrictionalContact(Contact):
     """A contact problem with friction; `advance` solves the step from one load to the next.
 
@@ -278,8 +229,8 @@ class FrictionalContact(Contact):
         """Return the state before the first load: nothing touches, nothing is displaced."""
         # not copies of one array: zeros that are not written take no memory
         fields: dict[str, Any] = {name: np.zeros(self.lattice.shape) for name in _FIELDS}
-        fields["gap"] = self._recorded_gap(self._gap)
-        return ContactState(**fields, zone=np.zeros(self.lattice.shape, dtype=np.int8))
+        fields["gap"] = np.where(self._mask, self._gap, np.nan)
+        return ContactState(**fields, zone=np.zeros(self.lattice.shape, np.int8))
 
     def advance(
         self,
@@ -352,13 +303,14 @@ class FrictionalContact(Contact):
             *(self.lattice.size, before.address),
         )
         address, new_numbers, residuals, sweeps, cuts, work, flags = out
-        after, numbers = _Held(address, self.lattice.shape), new_numbers.tolist()
+        after, numbers = HeldState(address, self.lattice.shape), new_numbers.tolist()
         arrays: dict[str, Any] = {name: after.view(name) for name in _FIELDS}
-        arrays["gap"] = self._recorded_gap(arrays["gap"])
+        if not self._mask.all():
+            arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
         after.record(arrays["gap"], numbers)
         found = ContactState(
             **arrays,
-            zone=_states.take_zones(address, self.lattice.size).astype(np.int8).reshape(self.lattice.shape),
+            zone=after.take_zones(),
             **dict(zip(_NUMBERS, numbers, strict=True)),
             **dict(zip(_RESIDUALS, residuals.tolist(), strict=True)),
             converged=bool(flags[0]),
@@ -398,25 +350,15 @@ class FrictionalContact(Contact):
 
     def _columns(self, state: ContactState) -> Array:
         """Return the fields of a state as columns of one array."""
-        columns = np.empty((self.lattice.size, len(_FIELDS)), order="F")
-        for column, name in enumerate(_FIELDS):
-            columns[:, column] = self._vector(state, name)
-        return columns
+        return np.array([self._vector(state, name) for name in _FIELDS]).T
 
-    def _recorded_gap(self, gap: Array) -> Array:
-        """Return a gap with NaN where nothing can touch, which is no copy if all nodes can."""
-        return gap if self._mask.all() else np.where(self._mask, gap, np.nan)
-
-    def _held(self, state: ContactState) -> _Held:
+    def _held(self, state: ContactState) -> HeldState:
         """Return a state in the memory of the core, which is no copy if it was found there."""
-        if (held := _Held.of(state)) is not None and state.pressure.shape == self.lattice.shape:
+        if (held := HeldState.of(state)) is not None and state.pressure.shape == self.lattice.shape:
             return held
-        fields = [self._vector(state, name) for name in _FIELDS if name not in _SLIP]
-        numbers = [number(getattr(state, name), name) for name in _NUMBERS]
-        address = _states.hold_state(*self.lattice.extent, *fields, numbers)
-        if not address:
-            raise ResourceError("not enough memory for the state of the contact: choose a smaller window")
-        return _Held(address, self.lattice.shape)
+        fields = [self._vector(state, name) for name in _FIELDS if name not in SLIP]
+        given = [number(getattr(state, name), name) for name in _NUMBERS]
+        return HeldState.copied(self.lattice.shape, fields, given)
 
     def _vector(self, state: ContactState, name: str) -> Array:
         """Return a field of a state as a vector, which is no copy if it can be."""

@@ -94,11 +94,12 @@ contains
     !> The materials are unlike
     logical, intent(in) :: unlike
     integer, parameter :: long = selected_int_kind(18)
-    integer(long) :: finest
+    integer(long) :: given
 
     ! initial gap, candidates
-    finest = operators_memory(extent, threads, unlike) + 12*int(extent(1), long)*extent(2)
-    frictional_contact_memory = finest + finest/3
+    given = 12*int(extent(1), long)*extent(2)
+    frictional_contact_memory = given + operators_memory(extent, threads, unlike, shared=.false.) &
+                                + (given + operators_memory(extent, threads, unlike, shared=.true.))/3
   end function frictional_contact_memory
 
   !> Count the additional bytes while a step is solved; the coarse lattices have done by then.
@@ -119,10 +120,8 @@ contains
     integer(long) :: n, everywhere, building, iterating, inside, recording
 
     n = int(extent(1), long)*extent(2)
-    ! state before without its slip increment, tractions to start from
-    everywhere = (8 + 3)*field
     ! iterate with traction estimates; shear system; weights of its preconditioner
-    everywhere = everywhere + (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 3*field + 2*half
+    everywhere = (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 3*field + 2*half
     if (coupled) then
       ! unknowns, slope, constraints thrice, and either what makes them or product, right-hand side
       everywhere = everywhere + (3 + 1)*field + 3*half
@@ -140,8 +139,8 @@ contains
       ! packed: vectors of conjugate gradients, constraints twice
       inside = 2*(7 + 2*max(n_force - 1, 1))*field
     end if
-    ! state after, traction and displacements
-    recording = (10 + 2 + 3)*field + half
+    ! state after, displacements and their tractions, without the displacements of the iterate
+    recording = (10 + 3 + 3 - 4)*field + half
     friction_step_memory = n*everywhere + max(n*building, n*iterating + n_contact*inside, n*recording)
   end function friction_step_memory
 

@@ -102,7 +102,7 @@ contains
   end subroutine new_fft_flexibility
 
   !> Count the bytes that the operator takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike)
+  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> The operator is applied to the pressure alone, for the gap alone
@@ -111,11 +111,15 @@ contains
     integer, intent(in) :: threads
     !> The materials are unlike: the odd blocks do not vanish; absent: they are
     logical, intent(in), optional :: unlike
-    integer :: n_kernel
+    !> Row transforms share the memory of others; absent: they have their own
+    logical, intent(in), optional :: shared
+    integer :: n_kernel, n_component
 
     n_kernel = merge(1, n_block, normal_only)
     if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, first_odd_block - 1), unlike)
-    fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, components_at_once(n_kernel), threads)
+    n_component = components_at_once(n_kernel)
+    if (present(shared)) n_component = merge(0, n_component, shared)
+    fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, n_component, threads)
   end function fft_memory
 
   !> Return the components that are multiplied together: without odd blocks, pressure and shear traction are apart.

@@ -70,8 +70,8 @@ class Variable:
         narrower than the lattice resolves.
     core : str
         Array of fortran/python/f2py_friction.f90 or f2py_states.f90 that holds it: ``"fields"``, ``"zone"``,
-        ``"numbers"``, ``"residuals"``. The order there is that of the rows here. ``"wear"``: a field of cycles
-        that wear.
+        ``"numbers"``, ``"residuals"``. The order there is that of the rows here. ``"wear"``: a field of
+        cycles that wear.
     """
 
     dims: tuple[str, ...]

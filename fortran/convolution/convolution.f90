@@ -11,12 +11,14 @@
 !>
 !> Equations: docs/theory/discretisation.md, (D4).
 module hc_convolution
-  use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_null_ptr, c_associated, c_intptr_t, c_loc, c_int, c_f_pointer
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_field_space, only: field_space_t
   use hc_fftw, only: fftw_plan_many_dft, fftw_execute_dft, fftw_destroy_plan, fftw_forward, fftw_estimate
   use hc_lock, only: lock, unlock, fftw_planner
+  use hc_scratch, only: scratch_t, release_scratch
   use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, release
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_fft_layout, only: block_width, even
@@ -51,8 +53,11 @@ module hc_convolution
     type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
     !> Address of the object that frees them: its copies, which use the same plans and spectra, do not
     integer(c_intptr_t), private :: owner = 0
-    !> Row transforms (leading, n_row or one more, component)
-    complex(wp), allocatable, private :: work(:, :, :)
+    !> Row transforms (leading, n_row or one more, component), in memory that convolutions may share
+    complex(wp), pointer, contiguous, private :: work(:, :, :) => null()
+    !> The same, the rows of a component one after the other
+    complex(wp), pointer, contiguous, private :: lines(:, :) => null()
+    type(scratch_t), pointer, private :: scratch => null()
     !> Two padded rows before and after their transform, for each thread
     complex(wp), allocatable, private :: row_buffer(:, :, :)
     !> One column block of each component before and after its transform, for each thread; column by column
@@ -119,10 +124,15 @@ contains
     self%width = block_width(padded(2))
     self%n_block = (self%n_frequency + self%width - 1)/self%width
     self%leading = self%n_block*self%width
+    if (associated(space%scratch)) then
+      self%scratch => space%scratch
+    else
+      allocate (self%scratch)
+    end if
+    call self%scratch%reserve(int(self%leading, int64)*even(extent(2))*n_component*(storage_size((1.0_wp, 0.0_wp))/8), stat)
     associate (column => self%width*padded(2))
-      ! the columns that only fill up the last block are transformed too: zeros stay zeros
-      allocate (self%work(self%leading, even(extent(2)), n_component), self%row_buffer(padded(1), 2, space%threads), &
-                self%block_buffer(column, n_component, 2, space%threads), source=(0.0_wp, 0.0_wp), stat=stat)
+      if (stat == 0) allocate (self%row_buffer(padded(1), 2, space%threads), &
+                               self%block_buffer(column, n_component, 2, space%threads), source=(0.0_wp, 0.0_wp), stat=stat)
     end associate
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
@@ -306,6 +316,8 @@ contains
 
     n = self%extent
     thread = 1
+    call c_f_pointer(self%scratch%place(), self%work, [self%leading, even(n(2)), max(size(field, 3), size(result, 3))])
+    self%lines(1:self%leading*even(n(2)), 1:size(self%work, 3)) => self%work
     !$omp parallel num_threads(self%space%threads) private(i, o, row, b) firstprivate(thread)
     !$ thread = omp_get_thread_num() + 1
     self%row_buffer(n(1) + 1:, 1, thread) = 0.0_wp
@@ -349,6 +361,8 @@ contains
     integer :: last
 
     last = min(row + 1, self%extent(2))
+    ! the columns that only fill up the last block are transformed, too
+    self%work(self%n_frequency + 1:, row:row + 1, component) = 0.0_wp
     associate (n => self%extent(1), given => self%row_buffer(:, 1, thread), transformed => self%row_buffer(:, 2, thread))
       ! rows off the contact need no transform
       if (all(abs(field(:, row:last)) <= 0.0_wp)) then
@@ -376,12 +390,13 @@ contains
     !> Index of the thread, whose buffer is used
     integer, intent(in) :: thread
 
-    integer :: i, o, first
+    integer :: i, o, first, last
 
     first = (b - 1)*self%width + 1
+    last = first + self%leading*(self%extent(2) - 1) + self%width - 1
     associate (given => self%block_buffer(:, :, 1, thread), transformed => self%block_buffer(:, :, 2, thread))
       do i = 1, size(kernel, 2)
-        call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%work(first, 1, i), given(:, i))
+        call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%lines(first:last, i), given(:, i))
         call fftw_execute_dft(self%column_plan, given(:, i), transformed(:, i))
       end do
 
@@ -393,7 +408,8 @@ contains
 
       do o = 1, size(kernel, 1)
         call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))
-        call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), self%work(first, 1, o))
+        call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), &
+                             self%lines(first:last, o))
       end do
     end associate
   end subroutine convolve_block
@@ -440,6 +456,9 @@ contains
     self%column_plan = c_null_ptr
     self%spectrum => null()
     call release(self%shared)
+    self%work => null()
+    self%lines => null()
+    call release_scratch(self%scratch)
   end subroutine free
 
 end module hc_convolution

@@ -70,8 +70,8 @@ module hc_friction_iterate
   contains
     !> Set the tractions and motions of a start
     procedure :: set_start
-    !> Displacements of the present tractions, from scratch
-    procedure :: refresh
+    !> Displacements of the present tractions, from scratch; free them until then
+    procedure :: refresh, forget_displacements
     !> Gap of the present tractions and approach, and its residual
     procedure :: find_gap, gap_residual
     !> Relative displacement since the beginning of the step, along one row
@@ -127,7 +127,7 @@ contains
     if (target%control(normal) /= force_control .and. .not. self%pressure_feels_shear) highest = target%value(normal)
     self%h(1:n) => problem%initial_gap
     self%origin(1:2*n) => reference
-    allocate (self%p(n), self%q(2*n), self%w(n), self%closing(n), self%u(2*n))
+    allocate (self%p(n), self%q(2*n))
     allocate (self%candidate(n), self%contact(n))
     if (problem%normal_law%is_compliant()) allocate (self%pressure%compliance(n), self%pressure%offset(n), source=0.0_wp)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
@@ -173,6 +173,7 @@ contains
     space = self%operators%space
     self%cut = .false.
     self%joint = .false.
+    if (.not. allocated(self%w)) allocate (self%w(n), self%closing(n), self%u(2*n))
     allocate (moved(3*n))
     if (self%shear_feels_pressure .and. .not. (self%without_start .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
@@ -196,6 +197,13 @@ contains
     end if
     call space%add(moved(n + 1:), self%u)
   end subroutine refresh
+
+  !> Free the displacements; the next ones come from `refresh`.
+  subroutine forget_displacements(self)
+    class(friction_iterate_t), intent(inout) :: self
+
+    deallocate (self%w, self%closing, self%u)
+  end subroutine forget_displacements
 
   !> Compute the gap of the present tractions and approach.
   subroutine find_gap(self, gap)

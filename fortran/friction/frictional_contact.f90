@@ -10,6 +10,7 @@ module hc_frictional_contact
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: space_over
+  use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count, build_levels
   use hc_flexibility, only: check_operator
   use hc_contact_state, only: contact_state_t, new_friction_state, copy_tractions, load_target_t
@@ -52,6 +53,7 @@ contains
     integer, intent(in), optional :: n_threads
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
+    type(scratch_t), pointer :: scratch
     integer :: l, n_level
 
     call check_operator(problem%lattice, problem%pair, error, n_threads)
@@ -60,6 +62,9 @@ contains
     n_level = level_count(problem%lattice%extent, problem%options%multilevel%smallest_side)
     allocate (self%operators(n_level), self%coarse(2:n_level))
     call build_levels(self%problem, self%coarse)
+    ! transforms of all lattices take turns
+    scratch => problem%space%scratch
+    if (.not. associated(scratch)) allocate (scratch)
     call prepare(self%problem, self%operators(1))
     do l = 2, n_level
       if (allocated(error)) return
@@ -74,6 +79,7 @@ contains
       type(operators_t), intent(out) :: operators
 
       level%space = space_over(level%lattice%extent, n_threads)
+      level%space%scratch => scratch
       call new_operators(operators, level%lattice, level%pair, level%space, error, cache, level%options%preconditioner)
     end subroutine prepare
 
@@ -88,11 +94,12 @@ contains
     !> The materials are unlike
     logical, intent(in) :: unlike
     integer, parameter :: long = selected_int_kind(18)
-    integer(long) :: finest
+    integer(long) :: given
 
     ! initial gap, candidates
-    finest = operators_memory(extent, threads, unlike) + 12*int(extent(1), long)*extent(2)
-    frictional_contact_memory = finest + finest/3
+    given = 12*int(extent(1), long)*extent(2)
+    frictional_contact_memory = given + operators_memory(extent, threads, unlike, shared=.false.) &
+                                + (given + operators_memory(extent, threads, unlike, shared=.true.))/3
   end function frictional_contact_memory
 
   !> Count the additional bytes while a step is solved; the coarse lattices have done by then.
@@ -113,10 +120,8 @@ contains
     integer(long) :: n, everywhere, building, iterating, inside, recording
 
     n = int(extent(1), long)*extent(2)
-    ! state before without its slip increment, tractions to start from
-    everywhere = (8 + 3)*field
     ! iterate with traction estimates; shear system; weights of its preconditioner
-    everywhere = everywhere + (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 3*field + 2*half
+    everywhere = (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 3*field + 2*half
     if (coupled) then
       ! unknowns, slope, constraints thrice, and either what makes them or product, right-hand side
       everywhere = everywhere + (3 + 1)*field + 3*half
@@ -134,8 +139,8 @@ contains
       ! packed: vectors of conjugate gradients, constraints twice
       inside = 2*(7 + 2*max(n_force - 1, 1))*field
     end if
-    ! state after, traction and displacements
-    recording = (10 + 2 + 3)*field + half
+    ! state after, displacements and their tractions, without the displacements of the iterate
+    recording = (10 + 3 + 3 - 4)*field + half
     friction_step_memory = n*everywhere + max(n*building, n*iterating + n_contact*inside, n*recording)
   end function friction_step_memory
 
@@ -195,8 +200,11 @@ contains
     call attempt(guess)
     if (allocated(error)) return
     ! the start by coarse lattices may not converge where the old state does
-    if (guessed .and. .not. (state%converged .or. state%sliding)) call attempt(start)
-    if (allocated(error)) return
+    if (guessed .and. .not. (state%converged .or. state%sliding)) then
+      call copy_tractions(start, guess, self%problem%space)
+      call attempt(guess)
+      if (allocated(error)) return
+    end if
     ! a first step has no state to fall back on: it goes on from where it stands
     if (.not. (state%converged .or. state%sliding .or. touching)) then
       call copy_tractions(state, guess, self%problem%space)
@@ -210,8 +218,8 @@ contains
 
     !> Solve on the finest lattice, and count what it takes.
     subroutine attempt(from)
-      !> State to start from
-      type(contact_state_t), intent(in) :: from
+      !> State to start from, whose tractions are freed
+      type(contact_state_t), intent(inout) :: from
 
       call solve_on_lattice(self%problem, self%operators(1), from, reference, target, tolerance, max_sweeps, state, error)
       sweeps = sweeps + state%sweeps

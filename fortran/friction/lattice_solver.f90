@@ -32,8 +32,8 @@ contains
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners
     type(operators_t), intent(inout), target :: operators
-    !> State to start from
-    type(contact_state_t), intent(in) :: start
+    !> State to start from, whose tractions are freed once they are taken over
+    type(contact_state_t), intent(inout) :: start
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
     real(wp), intent(in), contiguous, target :: reference(:, :, :)
     !> Loads or motions to be reached
@@ -58,6 +58,7 @@ contains
     call operators%reset()
     call now%set_start(problem, operators, start, reference, target, tolerance, error)
     if (allocated(error)) return
+    deallocate (start%pressure, start%traction)
     ! sweeps that find pressure and shear traction one after the other
     staggered = max_sweeps
     if (now%pressure_feels_shear) staggered = options%staggered_sweeps
@@ -87,6 +88,7 @@ contains
           .and. .not. now%unsupported .and. fixed < options%max_fixed_sweeps) cycle
 
       ! the recorded tractions are admissible exactly, and judged by a product of their own
+      call now%forget_displacements()
       if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
       call record(now, state)
       state%motion = now%motion

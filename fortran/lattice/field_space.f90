@@ -4,6 +4,7 @@
 !> so that they do not depend on the number of threads.
 module hc_field_space
   use hc_precision, only: wp, sp
+  use hc_scratch, only: scratch_t
   !$ use omp_lib, only: omp_get_max_threads
   implicit none
   private
@@ -21,6 +22,8 @@ module hc_field_space
   type :: field_space_t
     !> Number of threads
     integer :: threads = 1
+    !> Memory that the transforms of a solver share; not there: each has its own
+    type(scratch_t), pointer :: scratch => null()
   contains
     !> Assign and combine vectors
     procedure :: fill, copy, add, add_columns

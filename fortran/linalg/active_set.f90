@@ -183,7 +183,7 @@ contains
     integer, intent(in) :: from, to
     integer :: k, n_run
 
-    part%space = self%space
+    part%space%threads = self%space%threads
     n_run = count(self%first <= to .and. self%last >= from)
     allocate (part%first(n_run), part%last(n_run))
     n_run = 0
@@ -203,7 +203,7 @@ contains
     integer, intent(in) :: n, times
     integer :: m
 
-    all_of_them%space = self%space
+    all_of_them%space%threads = self%space%threads
     associate (n_run => size(self%first))
       allocate (all_of_them%first(times*n_run), all_of_them%last(times*n_run))
       do m = 0, times - 1

@@ -79,16 +79,19 @@ contains
   end subroutine new_operators
 
   !> Count the bytes that operator and preconditioners take, for a window of the given size.
-  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, unlike)
+  pure integer(selected_int_kind(18)) function operators_memory(extent, threads, unlike, shared)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
     !> The materials are unlike
     logical, intent(in) :: unlike
+    !> Row transforms share the memory of those of a finer lattice
+    logical, intent(in) :: shared
 
-    operators_memory = fft_memory(extent, .false., threads, unlike) + preconditioner_memory(extent, threads, .false.) &
-                       + preconditioner_memory(extent, threads, .true.)
+    operators_memory = fft_memory(extent, .false., threads, unlike, shared) &
+                       + preconditioner_memory(extent, threads, .false., shared=.true.) &
+                       + preconditioner_memory(extent, threads, .true., shared=.true.)
   end function operators_memory
 
   !> Multiply some components, given as vectors.

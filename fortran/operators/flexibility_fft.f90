@@ -80,7 +80,7 @@ contains
     ! the odd blocks of like materials vanish
     if (.not. abs(pair%lambda_2) > 0.0_wp) n_kernel = min(n_kernel, first_odd_block - 1)
     call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), n_kernel, &
-                         operator%n_component, shared, error, first_odd=first_odd_block)
+                         components_at_once(n_kernel), shared, error, first_odd=first_odd_block)
     if (allocated(error)) return
     operator%convolution%factor = pair%lambda_1*lattice%spacing()
     key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, pair)
@@ -102,7 +102,7 @@ contains
   end subroutine new_fft_flexibility
 
   !> Count the bytes that the operator takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike)
+  pure integer(selected_int_kind(18)) function fft_memory(extent, normal_only, threads, unlike, shared)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> The operator is applied to the pressure alone, for the gap alone
@@ -111,12 +111,25 @@ contains
     integer, intent(in) :: threads
     !> The materials are unlike: the odd blocks do not vanish; absent: they are
     logical, intent(in), optional :: unlike
-    integer :: n_kernel
+    !> Row transforms share the memory of others; absent: they have their own
+    logical, intent(in), optional :: shared
+    integer :: n_kernel, n_component
 
     n_kernel = merge(1, n_block, normal_only)
     if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, first_odd_block - 1), unlike)
-    fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, merge(1, 3, normal_only), threads)
+    n_component = components_at_once(n_kernel)
+    if (present(shared)) n_component = merge(0, n_component, shared)
+    fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, n_component, threads)
   end function fft_memory
+
+  !> Return the components that are multiplied together: without odd blocks, pressure and shear traction are apart.
+  pure integer function components_at_once(n_kernel)
+    !> Number of blocks
+    integer, intent(in) :: n_kernel
+
+    components_at_once = 1
+    if (n_kernel > 1) components_at_once = merge(3, 2, n_kernel >= first_odd_block)
+  end function components_at_once
 
   !> Count the additional bytes while the full operator is set up.
   pure integer(selected_int_kind(18)) function fft_setup_memory(extent)
@@ -158,7 +171,14 @@ contains
       call raise(error, status%invalid_input, 'the operator was set up for normal contact only')
       return
     end if
-    call self%convolution%convolve(block_index(onto, from), traction, displacement)
+    if (max(size(from), size(onto)) <= components_at_once(size(self%convolution%spectrum, 3))) then
+      call self%convolution%convolve(block_index(onto, from), traction, displacement)
+    else if (any(from(2:) == normal) .or. any(onto(2:) == normal)) then
+      call raise(error, status%invalid_input, 'of several components the pressure is the first')
+      return
+    else
+      call apply_apart(self, from, traction, onto, displacement)
+    end if
     if (self%pair%tangential_layer > 0.0_wp) then
       do i = 1, size(from)
         do o = 1, size(onto)
@@ -169,5 +189,22 @@ contains
     end if
     call self%count(from, onto)
   end subroutine fft_apply
+
+  !> Multiply pressure and shear traction one after the other, which do not move each other; the pressure is the first component.
+  subroutine apply_apart(self, from, traction, onto, displacement)
+    class(fft_flexibility_t), intent(inout) :: self
+    integer, intent(in) :: from(:)
+    real(wp), intent(in), contiguous :: traction(:, :, :)
+    integer, intent(in) :: onto(:)
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    integer :: i, o
+
+    i = merge(1, 0, from(1) == normal)
+    o = merge(1, 0, onto(1) == normal)
+    if (i == 0 .or. i == size(from)) displacement = 0.0_wp
+    if (i*o > 0) call self%convolution%convolve(block_index(onto(:o), from(:i)), traction(:, :, :i), displacement(:, :, :o))
+    if (i == size(from) .or. o == size(onto)) return
+    call self%convolution%convolve(block_index(onto(o + 1:), from(i + 1:)), traction(:, :, i + 1:), displacement(:, :, o + 1:))
+  end subroutine apply_apart
 
 end module hc_flexibility_fft

@@ -151,17 +151,22 @@ contains
   end function inverse
 
   !> Count the bytes that the preconditioner takes, for a window of the given size.
-  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, threads, tangential)
+  pure integer(selected_int_kind(18)) function preconditioner_memory(extent, threads, tangential, shared)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
     !> Threads to use
     integer, intent(in) :: threads
     !> For shear tractions instead of the pressure
     logical, intent(in) :: tangential
+    !> Row transforms share the memory of others; absent: they have their own
+    logical, intent(in), optional :: shared
     integer, parameter :: long = selected_int_kind(18)
+    integer :: n_component
 
-    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), &
-                                               merge(2, 1, tangential), threads)
+    n_component = merge(2, 1, tangential)
+    if (present(shared)) n_component = merge(0, n_component, shared)
+    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), n_component, &
+                                               threads)
     ! fields in single precision; those of the tangential one belong to the shear system
     if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
   end function preconditioner_memory

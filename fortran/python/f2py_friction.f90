@@ -1,15 +1,14 @@
 !> Contact problems with friction for Python: flat procedures for f2py, no mathematics.
 !>
-!> A state is three arrays: fields (node, field), zones, and numbers; their
-!> order is that of the parameters below.
+!> States are kept by hc_f2py_states, which has the order of their fields and numbers.
 module hc_f2py_friction
   use iso_c_binding, only: c_double, c_int, c_int64_t
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_f2py_handles, only: slot_t, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
-    normal_law_of, kernel_cache
+    normal_law_of, kernel_cache, state_at, address_of, unpack_state, numbers_of, n_number
   use hc_lattice, only: lattice_t, new_lattice
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, n_load, n_motion
+  use hc_contact_state, only: contact_state_t, load_target_t, n_load
   use hc_friction_law, only: friction_law_t
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_contact_solver, only: friction_solver_t
@@ -27,11 +26,6 @@ module hc_f2py_friction
   integer, parameter :: fft_based = 1, as_written = 2
   !> Bytes of its fields over the nodes; matrices are checked where they are allocated
   integer(c_int64_t), parameter :: dense_fields = 500
-  !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path,
-  !> dissipated energy by area
-  integer, parameter :: n_field = 10
-  !> Numbers of a state: loads, motions with the bulk strain, dissipated energy
-  integer, parameter :: n_number = n_load + n_motion + 1
   !> Fields that the entry of nodes takes
   integer, parameter :: entry_fields = 45
 
@@ -169,10 +163,8 @@ contains
   end subroutine set_guess
 
   !> Advance a state to given loads or motions.
-  subroutine advance_friction(handle, control, target, static, interpolated, tolerance, max_sweeps, max_cuts, n_node, &
-                              pressure, traction_x, traction_y, gap, displacement_x, displacement_y, slip, density, numbers, &
-                              new_fields, zone, new_numbers, residuals, sweeps, cuts, operator_applications, flags, &
-                              code, message)
+  subroutine advance_friction(handle, control, target, static, interpolated, tolerance, max_sweeps, max_cuts, n_node, before, &
+                              after, numbers, residuals, sweeps, cuts, operator_applications, flags, code, message)
     !f2py threadsafe
     !> Handle of the problem
     integer(c_int64_t), intent(in) :: handle
@@ -190,13 +182,11 @@ contains
     integer(c_int), intent(in) :: max_sweeps, max_cuts
     !> Number of nodes of the window
     integer(c_int), intent(in) :: n_node
-    !> The state to go on from: the fields of a state but for the slip increment, each by itself, so that none is copied
-    real(c_double), intent(in) :: pressure(n_node), traction_x(n_node), traction_y(n_node), gap(n_node), displacement_x(n_node), &
-                                  displacement_y(n_node), slip(n_node), density(n_node), numbers(12)
-    !> The new state
-    real(c_double), intent(out) :: new_fields(n_node, 10)
-    integer(c_int), intent(out) :: zone(n_node)
-    real(c_double), intent(out) :: new_numbers(12)
+    !> Address of the state to go on from, which does not change, and of the new state, 0 if there is none
+    integer(c_int64_t), intent(in) :: before
+    integer(c_int64_t), intent(out) :: after
+    !> Numbers of the new state
+    real(c_double), intent(out) :: numbers(12)
     !> R_n, R_t, R_P, R_Q, R_M
     real(c_double), intent(out) :: residuals(5)
     !> Active sets that were tried, times that the step was halved
@@ -211,46 +201,35 @@ contains
     type(slot_t), pointer :: slot
     class(friction_solver_t), pointer :: solver
     type(error_t), allocatable :: error
-    type(contact_state_t) :: state, next
-    integer :: n(2)
+    type(contact_state_t), pointer :: state, next
 
+    after = 0
+    numbers = 0.0_c_double
+    flags = 0
+    allocate (next)
     call enter(handle, n_node, slot, error, merge(entry_fields*8_c_int64_t*n_node, 0_c_int64_t, interpolated /= 0))
     if (.not. allocated(error)) then
       call with_friction(slot, solver, error)
       if (.not. allocated(error)) then
-        n = slot%lattice%extent
-        allocate (state%traction(n(1), n(2), 2), state%relative_displacement(n(1), n(2), 2))
-        state%pressure = reshape(pressure, n)
-        state%traction(:, :, 1) = reshape(traction_x, n)
-        state%traction(:, :, 2) = reshape(traction_y, n)
-        state%gap = reshape(gap, n)
-        state%relative_displacement(:, :, 1) = reshape(displacement_x, n)
-        state%relative_displacement(:, :, 2) = reshape(displacement_y, n)
-        state%accumulated_slip = reshape(slip, n)
-        state%dissipation_density = reshape(density, n)
-        call unpack_numbers(numbers, state)
+        state => state_at(before)
         call advance(solver, state, load_target_t(control, target), static /= 0, tolerance, max_sweeps, max_cuts, &
                      next, error, interpolated /= 0)
         if (allocated(solver%guess)) deallocate (solver%guess)
       end if
       call leave(slot)
     end if
-    if (.not. allocated(error)) then
-      call pack_state(next, new_fields, new_numbers)
-      zone = reshape(next%zone, [n_node])
-      flags = [merge(1, 0, [next%converged, next%sliding, next%clipped]), next%stopped]
-    else
-      ! not before: until there is a new state its arrays take no memory
-      new_fields = 0.0_c_double
-      zone = 0
-      new_numbers = 0.0_c_double
-      flags = 0
-    end if
     residuals = [next%residual_normal, next%residual_tangential, next%residual_force, next%residual_shear_force, &
                  next%residual_torque]
     sweeps = next%sweeps
     cuts = next%cuts
     operator_applications = next%operator_applications
+    if (allocated(error)) then
+      deallocate (next)
+    else
+      after = address_of(next)
+      numbers = numbers_of(next)
+      flags = [merge(1, 0, [next%converged, next%sliding, next%clipped]), next%stopped]
+    end if
     call report(error, code, message)
   end subroutine advance_friction
 
@@ -348,49 +327,5 @@ contains
       call raise(error, status%bad_handle, 'the handle is not that of a contact problem with friction')
     end if
   end subroutine with_friction
-
-  !> Unpack a state from its arrays.
-  subroutine unpack_state(lattice, fields, numbers, state)
-    type(lattice_t), intent(in) :: lattice
-    real(c_double), intent(in) :: fields(:, :), numbers(:)
-    type(contact_state_t), intent(out) :: state
-
-    call new_friction_state(state, lattice)
-    state%pressure = reshape(fields(:, 1), lattice%extent)
-    state%traction = reshape(fields(:, 2:3), [lattice%extent, 2])
-    state%gap = reshape(fields(:, 4), lattice%extent)
-    state%relative_displacement = reshape(fields(:, 5:6), [lattice%extent, 2])
-    state%slip_increment = reshape(fields(:, 7:8), [lattice%extent, 2])
-    state%accumulated_slip = reshape(fields(:, 9), lattice%extent)
-    state%dissipation_density = reshape(fields(:, n_field), lattice%extent)
-    call unpack_numbers(numbers, state)
-  end subroutine unpack_state
-
-  !> Unpack the numbers of a state.
-  subroutine unpack_numbers(numbers, state)
-    real(c_double), intent(in) :: numbers(:)
-    type(contact_state_t), intent(inout) :: state
-
-    state%load(:n_load) = numbers(:n_load)
-    state%motion = numbers(n_load + 1:n_load + n_motion)
-    state%dissipated_energy = numbers(n_number)
-  end subroutine unpack_numbers
-
-  !> Pack a state into its arrays.
-  subroutine pack_state(state, fields, numbers)
-    type(contact_state_t), intent(in) :: state
-    real(c_double), intent(out) :: fields(:, :), numbers(:)
-    integer :: n
-
-    n = size(fields, 1)
-    fields(:, 1) = reshape(state%pressure, [n])
-    fields(:, 2:3) = reshape(state%traction, [n, 2])
-    fields(:, 4) = reshape(state%gap, [n])
-    fields(:, 5:6) = reshape(state%relative_displacement, [n, 2])
-    fields(:, 7:8) = reshape(state%slip_increment, [n, 2])
-    fields(:, 9) = reshape(state%accumulated_slip, [n])
-    fields(:, n_field) = reshape(state%dissipation_density, [n])
-    numbers = [state%load(:n_load), state%motion, state%dissipated_energy]
-  end subroutine pack_state
 
 end module hc_f2py_friction

@@ -4,7 +4,7 @@
 !> an error and never another object. A handle in use by one thread is refused
 !> in another. The cache of spectra is here, too. No other module has state; this one is not part of the Fortran library.
 module hc_f2py_handles
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_intptr_t, c_loc, c_null_ptr, c_f_pointer
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_error, only: error_t, status, raise
   use hc_lock, only: lock, unlock, handle_table
@@ -19,6 +19,7 @@ module hc_f2py_handles
   use hc_orthotropic_coulomb, only: orthotropic_coulomb_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   use hc_power_interface, only: power_interface_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, n_load, n_motion
   use hc_contact_solver, only: contact_solver_t
   use hc_spectrum_cache, only: kernel_cache_t
   implicit none
@@ -26,6 +27,13 @@ module hc_f2py_handles
 
   public :: slot_t, kernel_cache, take_slot, check_size, secure, enter, leave, free_slot, report, pair_of, friction_of, &
             normal_law_of
+  public :: state_at, address_of, unpack_state, unpack_numbers, numbers_of, n_number
+
+  !> Fields of a state: pressure, traction x y, gap, relative displacement x y, slip increment x y, slip path,
+  !> dissipated energy by area
+  integer, parameter :: n_field = 10
+  !> Numbers of a state: loads, motions with the bulk strain, dissipated energy
+  integer, parameter :: n_number = n_load + n_motion + 1
 
   !> Largest number of objects.
   integer, parameter :: n_slot = 4096
@@ -252,6 +260,57 @@ contains
       allocate (law, source=power_interface_t(interface(1), interface(2)))
     end if
   end function normal_law_of
+
+  !> Return the state at an address.
+  function state_at(address) result(state)
+    !> Address, of `address_of`
+    integer(c_int64_t), intent(in) :: address
+    type(contact_state_t), pointer :: state
+
+    call c_f_pointer(transfer(int(address, c_intptr_t), c_null_ptr), state)
+  end function state_at
+
+  !> Return the address of a state.
+  integer(c_int64_t) function address_of(state)
+    type(contact_state_t), intent(in), target :: state
+
+    address_of = transfer(c_loc(state), 0_c_intptr_t)
+  end function address_of
+
+  !> Unpack a state from its arrays.
+  subroutine unpack_state(lattice, fields, numbers, state)
+    type(lattice_t), intent(in) :: lattice
+    real(c_double), intent(in) :: fields(:, :), numbers(:)
+    type(contact_state_t), intent(out) :: state
+
+    call new_friction_state(state, lattice)
+    state%pressure = reshape(fields(:, 1), lattice%extent)
+    state%traction = reshape(fields(:, 2:3), [lattice%extent, 2])
+    state%gap = reshape(fields(:, 4), lattice%extent)
+    state%relative_displacement = reshape(fields(:, 5:6), [lattice%extent, 2])
+    state%slip_increment = reshape(fields(:, 7:8), [lattice%extent, 2])
+    state%accumulated_slip = reshape(fields(:, 9), lattice%extent)
+    state%dissipation_density = reshape(fields(:, n_field), lattice%extent)
+    call unpack_numbers(numbers, state)
+  end subroutine unpack_state
+
+  !> Return the numbers of a state.
+  pure function numbers_of(state) result(numbers)
+    type(contact_state_t), intent(in) :: state
+    real(c_double) :: numbers(n_number)
+
+    numbers = [state%load(:n_load), state%motion, state%dissipated_energy]
+  end function numbers_of
+
+  !> Unpack the numbers of a state.
+  subroutine unpack_numbers(numbers, state)
+    real(c_double), intent(in) :: numbers(:)
+    type(contact_state_t), intent(inout) :: state
+
+    state%load(:n_load) = numbers(:n_load)
+    state%motion = numbers(n_load + 1:n_load + n_motion)
+    state%dissipated_energy = numbers(n_number)
+  end subroutine unpack_numbers
 
   !> Return an error as a code and a message.
   pure subroutine report(error, code, message)

@@ -69,8 +69,9 @@ class Variable:
         Whether it depends on the width of the slip zone, so that its error decreases slowly while that is
         narrower than the lattice resolves.
     core : str
-        Array of fortran/python/f2py_friction.f90 that holds it: ``"fields"``, ``"zone"``, ``"numbers"``,
-        ``"residuals"``. The order there is that of the rows here. ``"wear"``: a field of cycles that wear.
+        Array of fortran/python/f2py_friction.f90 or f2py_states.f90 that holds it: ``"fields"``, ``"zone"``,
+        ``"numbers"``, ``"residuals"``. The order there is that of the rows here. ``"wear"``: a field of
+        cycles that wear.
     """
 
     dims: tuple[str, ...]

@@ -2,6 +2,7 @@ from typing import Any
 
 hc_f2py_normal: Any
 hc_f2py_friction: Any
+hc_f2py_states: Any
 hc_f2py_influence: Any
 hc_f2py_interior: Any
 hc_f2py_cache: Any

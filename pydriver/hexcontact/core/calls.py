@@ -1,13 +1,23 @@
-"""Calls of the core, with exceptions for its status and warnings for faults of the kernel cache."""
+"""Calls of the core, with exceptions for its status and warnings for faults of the cache; states."""
 
 from __future__ import annotations
 
+import ctypes
+import math
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array
 from ..errors import ConvergenceError, DeckError, HexcontactError, ResourceError
+from ..variables import CORE
 from . import _core, kernel_cache
+
+SLIP = ("slip_increment_x", "slip_increment_y")
+"""Fields of a step with friction, from which the next one does not start."""
 
 _ERRORS: dict[int, type[HexcontactError]] = {
     1: DeckError,
@@ -41,3 +51,65 @@ class Handle:
             return called(procedure, self._handle, *arguments)
         finally:
             kernel_cache.warn_of_faults()
+
+
+class HeldState:
+    """A state in the memory of the core, which is freed with the last array that is a view of it.
+
+    Parameters
+    ----------
+    address : int
+        Address of the state.
+    shape : tuple of int
+        Rows and columns of its window.
+    """
+
+    def __init__(self, address: int, shape: tuple[int, int]) -> None:
+        self.address, self._shape = address, shape
+        self._places = dict(
+            zip(CORE["fields"], _core.hc_f2py_states.state_places(address).tolist(), strict=True)
+        )
+        self._recorded: tuple[Any, ...] = ()
+        # at the end of the process arrays may still be in use
+        weakref.finalize(self, _core.hc_f2py_states.free_state, address).atexit = False
+
+    @classmethod
+    def copied(cls, shape: tuple[int, int], fields: Sequence[Array], numbers: Sequence[float]) -> HeldState:
+        """Return a copy of a state: its fields but for the slip of the step, and its numbers."""
+        if address := _core.hc_f2py_states.hold_state(shape[1], shape[0], *fields, numbers):
+            return cls(address, shape)
+        raise ResourceError("not enough memory for the state of the contact: choose a smaller window")
+
+    @staticmethod
+    def of(state: Any) -> HeldState | None:
+        """Return what a state is the record of, if all that a step starts from is unchanged."""
+        view = getattr(state.pressure, "base", None)
+        held = getattr(getattr(view, "base", None), "held", None)
+        return held if isinstance(held, HeldState) and held._is_record(state) else None
+
+    def view(self, name: str) -> Array:
+        """Return a field, which is no copy."""
+        memory: Any = (ctypes.c_double * math.prod(self._shape)).from_address(self._places[name])
+        memory.held = self
+        return np.frombuffer(memory).reshape(self._shape)
+
+    def take_zones(self) -> NDArray[np.int8]:
+        """Return the zones, which the core then forgets."""
+        zones: NDArray[Any] = _core.hc_f2py_states.take_zones(self.address, math.prod(self._shape))
+        return zones.astype(np.int8).reshape(self._shape)
+
+    def record(self, gap: Array, numbers: list[float]) -> None:
+        """Remember the recorded gap, which differs where nothing can touch, and numbers of the state."""
+        self._recorded = weakref.ref(gap), numbers
+
+    def _is_record(self, state: Any) -> bool:
+        gap, numbers = self._recorded
+        if gap() is not state.gap or numbers != [getattr(state, name) for name in CORE["numbers"]]:
+            return False
+        names = (name for name in self._places if name != "gap" and name not in SLIP)
+        return all(self._is_view(name, getattr(state, name)) for name in names)
+
+    def _is_view(self, name: str, values: Any) -> bool:
+        if not isinstance(values, np.ndarray) or values.shape != self._shape:
+            return False
+        return values.ctypes.data == self._places[name] and values.flags.c_contiguous

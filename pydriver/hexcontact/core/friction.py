@@ -15,7 +15,7 @@ from ..arrays import Array, has_entries, integer, number, reals, word
 from ..errors import DeckError
 from ..variables import BULK_STRAIN, CORE
 from . import _core
-from .calls import called
+from .calls import SLIP, HeldState, called
 from .contact import (
     UNILATERAL,
     Contact,
@@ -42,7 +42,6 @@ Entry = Literal["implicit", "interpolated"]
 
 _CONTROLS = {"force": 1, "displacement": 2}
 _FIELDS, _NUMBERS, _RESIDUALS = (CORE[name] for name in ("fields", "numbers", "residuals"))
-_SLIP = ("slip_increment_x", "slip_increment_y")  # of a step, from which the next one does not start
 MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 """Motions of the remote parts, in the order of the core."""
 
@@ -228,10 +227,10 @@ class FrictionalContact(Contact):
 
     def virgin(self) -> ContactState:
         """Return the state before the first load: nothing touches, nothing is displaced."""
-        zero = np.zeros(self.lattice.shape)
-        fields: dict[str, Any] = {name: zero.copy() for name in _FIELDS}
+        # not copies of one array: zeros that are not written take no memory
+        fields: dict[str, Any] = {name: np.zeros(self.lattice.shape) for name in _FIELDS}
         fields["gap"] = np.where(self._mask, self._gap, np.nan)
-        return ContactState(**fields, zone=np.zeros(self.lattice.shape, dtype=np.int8))
+        return ContactState(**fields, zone=np.zeros(self.lattice.shape, np.int8))
 
     def advance(
         self,
@@ -296,24 +295,23 @@ class FrictionalContact(Contact):
         if guess is not None:
             traction = np.reshape(np.asarray(guess[0], dtype=float), (3, self.lattice.size))
             called(_api.set_guess, self._handle, traction.T, [*guess[1]])
+        before = self._held(state)
         out = self._solve(
             _api.advance_friction,
             *([_CONTROLS[word] for word in control], [*targets, *strain], static, entry == "interpolated"),
             *(tolerance, integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
-            *(self._vector(state, name) for name in _FIELDS if name not in _SLIP),
-            [number(getattr(state, name), name) for name in _NUMBERS],
+            *(self.lattice.size, before.address),
         )
-        new_fields, zone, new_numbers, residuals, sweeps, cuts, work, flags = out
-        shape = self.lattice.shape
-        arrays: dict[str, Any] = {
-            name: np.ascontiguousarray(new_fields[:, column]).reshape(shape)
-            for column, name in enumerate(_FIELDS)
-        }
-        arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
+        address, new_numbers, residuals, sweeps, cuts, work, flags = out
+        after, numbers = HeldState(address, self.lattice.shape), new_numbers.tolist()
+        arrays: dict[str, Any] = {name: after.view(name) for name in _FIELDS}
+        if not self._mask.all():
+            arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)
+        after.record(arrays["gap"], numbers)
         found = ContactState(
             **arrays,
-            zone=zone.reshape(shape).astype(np.int8),
-            **dict(zip(_NUMBERS, new_numbers.tolist(), strict=True)),
+            zone=after.take_zones(),
+            **dict(zip(_NUMBERS, numbers, strict=True)),
             **dict(zip(_RESIDUALS, residuals.tolist(), strict=True)),
             converged=bool(flags[0]),
             sliding=bool(flags[1]),
@@ -352,10 +350,15 @@ class FrictionalContact(Contact):
 
     def _columns(self, state: ContactState) -> Array:
         """Return the fields of a state as columns of one array."""
-        columns = np.empty((self.lattice.size, len(_FIELDS)), order="F")
-        for column, name in enumerate(_FIELDS):
-            columns[:, column] = self._vector(state, name)
-        return columns
+        return np.array([self._vector(state, name) for name in _FIELDS]).T
+
+    def _held(self, state: ContactState) -> HeldState:
+        """Return a state in the memory of the core, which is no copy if it was found there."""
+        if (held := HeldState.of(state)) is not None and state.pressure.shape == self.lattice.shape:
+            return held
+        fields = [self._vector(state, name) for name in _FIELDS if name not in SLIP]
+        given = [number(getattr(state, name), name) for name in _NUMBERS]
+        return HeldState.copied(self.lattice.shape, fields, given)
 
     def _vector(self, state: ContactState, name: str) -> Array:
         """Return a field of a state as a vector, which is no copy if it can be."""

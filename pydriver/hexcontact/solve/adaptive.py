@@ -95,7 +95,9 @@ class GivenPath:
         """
         started = time.perf_counter()
         state, reached = self._reached(state, target, target.values(begun))
-        yield self.window.step(target, reached, state, started), reached
+        step = self.window.step(target, reached, state, started)
+        del state  # its memory goes before the step is written
+        yield step, reached
 
     def _reached(
         self, state: Any, target: LoadStep, values: tuple[float, ...], **how: Any

@@ -35,9 +35,9 @@ from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, STATE, WORN, names_wh
 from .events import Listener
 
 # Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap
-# and zones, with the copies of f2py. With friction: the state before and gaps, and holes in the heap of the C
-# library; the new state takes no memory before it is solved.
-ARRAYS = {False: 8, True: 21}
+# and zones, with the copies of f2py. With friction: the state before, which the core holds, gaps, and holes
+# in the heap of the C library.
+ARRAYS = {False: 8, True: 20}
 S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 
 _ITEM = 8  # bytes of a float
@@ -46,7 +46,7 @@ _STEPPED = names_where(lambda v: v.dims == ("step",))
 _WRITING = 18 * 2**20  # bytes of netCDF and HDF5, which are loaded to write the output
 _LOADED = 3 * 2**20  # bytes of modules that a run imports
 _LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
-_LEFT = 0.5  # share of operators and states, which remain for the output, in the memory of solving
+_LEFT = {False: 0.5, True: 0.75}  # share of operators and states, which remain for the output, by friction
 _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction
 _COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
 _LAW_ARRAYS = 6  # coefficients by node, here, in the core, on its lattices and parts
@@ -136,7 +136,7 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
-    return _LOADED + max(needed, int(_LEFT * needed) + _WRITING)
+    return _LOADED + max(needed, int(_LEFT[case.frictional] * needed) + _WRITING)
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:

@@ -135,8 +135,9 @@ def _solved(path: GivenPath, before: Sequence[Step], targets: Iterable[LoadStep]
             segment, begun = target.segment, reached_by_now
         for step, reached in path.steps(state, target, begun):
             _warn_of_path(path.case, step, state, path.window.listener)
-            yield step
+            # before the step is written, so that the memory of the state before it goes
             state, reached_by_now = reached, _standing(step.history)
+            yield step
     yield from path.after(state)
 
 

@@ -1,0 +1,61 @@
+!> Memory that several transforms share, of which only one runs at a time.
+module hc_scratch
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
+  use, intrinsic :: iso_fortran_env, only: int64
+  use hc_precision, only: wp
+  implicit none
+  private
+
+  public :: scratch_t, release_scratch
+
+  !> As much memory as the largest of its users needs, with a count of them; the last one frees it.
+  type :: scratch_t
+    private
+    real(wp), allocatable :: values(:)
+    integer :: users = 0
+  contains
+    !> Count one user more, who needs so many bytes
+    procedure :: reserve
+    !> Address of the memory, whose contents are those of the last user
+    procedure :: place
+  end type scratch_t
+
+contains
+
+  !> Count one user more, who needs so many bytes; what is there is lost.
+  subroutine reserve(self, bytes, stat)
+    class(scratch_t), intent(inout) :: self
+    integer(int64), intent(in) :: bytes
+    !> Not zero: there is not enough memory
+    integer, intent(out) :: stat
+    integer(int64) :: n
+
+    stat = 0
+    self%users = self%users + 1
+    n = (bytes + storage_size(1.0_wp)/8 - 1)/(storage_size(1.0_wp)/8)
+    if (allocated(self%values)) then
+      if (size(self%values, kind=int64) >= n) return
+      deallocate (self%values)
+    end if
+    allocate (self%values(n), source=0.0_wp, stat=stat)
+  end subroutine reserve
+
+  !> Return the address of the memory.
+  type(c_ptr) function place(self)
+    class(scratch_t), intent(in), target :: self
+
+    place = c_loc(self%values)
+  end function place
+
+  !> Count one user less.
+  subroutine release_scratch(scratch)
+    !> Memory of the caller; not associated afterwards
+    type(scratch_t), pointer, intent(inout) :: scratch
+
+    if (.not. associated(scratch)) return
+    scratch%users = scratch%users - 1
+    if (scratch%users == 0) deallocate (scratch)
+    scratch => null()
+  end subroutine release_scratch
+
+end module hc_scratch

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import html
 import json
 import math
 import re
@@ -37,6 +36,8 @@ def visible(text: str) -> str:
 
 def escaped(text: str) -> str:
     """Write text of a user for HTML and XML."""
+    import html
+
     return html.escape(visible(text))
 
 

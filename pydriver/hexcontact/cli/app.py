@@ -11,6 +11,7 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..solve import interruption
@@ -33,13 +34,19 @@ MODULES = {
 
 def main() -> None:
     """Entry point of the command."""
-    # By default waiting threads spin, which on a busy machine takes cores from working threads.
+    # By default waiting threads spin, which on a busy machine takes cores from working threads; those of
+    # OpenBLAS for 2^26 cycles after it was loaded, though a run with transforms gives them nothing to do.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    # Plugins of pydantic watch the models of other programs; looking for them reads every installed package.
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
+    os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "20")
+    # Plugins of pydantic watch the models of other programs; looking for them reads every installed package,
+    # and what looks takes 10 ms to import.
+    if os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1") == "1":
+        none = ModuleType("pydantic.plugin._loader")
+        none.get_plugins = tuple  # type: ignore[attr-defined]
+        sys.modules.setdefault(none.__name__, none)
     # Most objects of a short process are functions and classes of modules, which stay: with Python's own
     # threshold of 700 a sixth of the time of `check` goes into looking for garbage among them.
-    gc.set_threshold(20_000)
+    gc.set_threshold(50_000)
     interruption.ends_process = True
     warn_plainly()
     try:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import html
 import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -27,6 +26,8 @@ _UNSEEN = re.compile(
     "|\r(?!\n)"
 )
 
+_DOUBTFUL = re.compile("[^ -~\u00a1-\u00ac\u00ae-\u02ff]")  # not one column wide for sure
+
 
 def visible(text: str) -> str:
     r"""Replace what a terminal would obey and XML forbids: an escape character becomes ``\u001b``."""
@@ -35,6 +36,8 @@ def visible(text: str) -> str:
 
 def escaped(text: str) -> str:
     """Write text of a user for HTML and XML."""
+    import html
+
     return html.escape(visible(text))
 
 
@@ -188,20 +191,66 @@ def _numbers(cells: Iterable[str]) -> bool:
     return bool(found) and all(cell.lstrip("+-").replace("inf", "0")[:1].isdigit() for cell in found)
 
 
-def rich_table(title: str, headers: Sequence[str], rows: Iterable[Row], tight: bool = False) -> Table:
-    """Return a table for terminals; columns of names and labels may wrap, those of numbers do not."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
+class TextTable(NamedTuple):
+    """A table for terminals; columns of names and labels may wrap, those of numbers do not.
 
-    shown = Table(
-        title=Text(visible(title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD,
-        show_header=any(headers),
-        pad_edge=False, collapse_padding=tight,
-    )  # fmt: skip
-    for header in headers:
-        text = header in ("", "label")
-        shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
-    for row in rows:
-        shown.add_row(*(Text(visible(cell)) for cell in row))
-    return shown
+    Attributes
+    ----------
+    title : str
+        Its title.
+    headers : sequence of str
+        Headers of its columns; none if all are empty.
+    rows : sequence of Row
+        Its cells.
+    tight : bool
+        Whether its columns stand closer.
+    """
+
+    title: str
+    headers: Sequence[str]
+    rows: Sequence[Row]
+    tight: bool = False
+
+    def plain(self, width: int) -> str | None:
+        """Return the table as `__rich__` looks without colors, in a hundredth of the time.
+
+        None if it is wider than `width`, or if the width of some of its characters is in doubt.
+        """
+        rows = [[visible(cell) for cell in row] for row in self.rows]
+        widths = [max(map(len, column)) for column in zip(self.headers, *rows, strict=True)]
+        between = " " * (2 if self.tight else 3)
+        whole = sum(widths) + len(between) * (len(widths) - 1)
+        title = visible(self.title)
+        doubtful = any(_DOUBTFUL.search(cell) for row in ([title], self.headers, *rows) for cell in row)
+        if doubtful or max(whole, len(title)) + 2 > width or len(title) > whole + 2:
+            return None
+
+        def line(row: Sequence[str]) -> str:
+            cells = zip(row, self.headers, widths, strict=True)
+            return " " + between.join(c.ljust(w) if _wraps(h) else c.rjust(w) for c, h, w in cells).rstrip()
+
+        head = [line(self.headers), " " + "─" * whole] if any(self.headers) else []
+        return "\n".join([*([title] if title else []), "", *head, *(line(row).rstrip() for row in rows), ""])
+
+    def __rich__(self) -> Table:
+        """Return the table of `rich`."""
+        from rich import box
+        from rich.table import Table
+        from rich.text import Text
+
+        shown = Table(
+            title=Text(visible(self.title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD,
+            show_header=any(self.headers),
+            pad_edge=False, collapse_padding=self.tight,
+        )  # fmt: skip
+        for header in self.headers:
+            text = _wraps(header)
+            shown.add_column(Text(header), justify="left" if text else "right", no_wrap=not text)
+        for row in self.rows:
+            shown.add_row(*(Text(visible(cell)) for cell in row))
+        return shown
+
+
+def _wraps(header: str) -> bool:
+    """Return whether a column is one of names or labels."""
+    return header in ("", "label")

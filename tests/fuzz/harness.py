@@ -2,7 +2,6 @@
 
 import contextlib
 import hashlib
-import inspect
 import io
 import json
 import re
@@ -11,9 +10,6 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import click
-import typer
 
 CLEAN = {0, 2, 3, 4}  # exit codes of the documentation: done, input, no convergence, resources
 LONGEST = 20.0  # s of processor time, of which a command that hangs takes more
@@ -53,14 +49,11 @@ def time_limit() -> Iterator[None]:
 def ending(command: Callable[..., Any], **options: Any) -> Ending:
     """Run a command as the command line would, but for reading the arguments."""
     out, error, code = io.StringIO(), io.StringIO(), 0
-    context = click.Context(click.Command("fuzz"))
-    if "context" in inspect.signature(command).parameters:
-        options["context"] = context
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), time_limit(), context:
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), time_limit():
         try:
             command(**options)
-        except typer.Exit as exit_:
-            code = exit_.exit_code
+        except SystemExit as exit_:
+            code = int(exit_.code or 0)
     return Ending(code, out.getvalue(), error.getvalue())
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from ..errors import DeckError
-from ..text import html_table, quantity, rich_table, text_table
+from ..text import TextTable, html_table, quantity, text_table
 from ..variables import VARIABLES, spelled
 from .recognise import Exact, closed_solutions
 
@@ -119,7 +119,7 @@ class Comparison(Sequence[Entry]):
 
     def __rich__(self) -> Table:
         """Return the table for a terminal."""
-        shown = rich_table(self._title, _HEADERS, self._rows())
+        shown = TextTable(self._title, _HEADERS, self._rows()).__rich__()
         shown.caption = self.note or None
         return shown
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..core.analytic import flat
+from ..core.measures import line_of
 from .elliptic import EllipticContact
 from .friction import LubkinTorsion, MindlinContact
 from .hertz_gap import SIMILAR, QuadraticGap, attribute_of, friction_of, is_strained, is_worn
@@ -234,29 +235,6 @@ class ClosedForms:
             return None
         turned = _until_sliding(loads.tolist(), _BEFORE_SLIDING * contact.sliding_torque)
         return _curve(turned, _lubkin(contact, max(map(abs, turned))))
-
-
-def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | None:
-    """Return the direction of the line on which tangential loads lie.
-
-    Parameters
-    ----------
-    load : ndarray, shape (2, n)
-        The loads, N.
-    least, aside : float
-        Largest size of no load, and largest distance from the line (N).
-
-    Returns
-    -------
-    tuple of float or None
-        A unit vector whose larger component is positive; None if there is no load, or no such line.
-    """
-    size = np.hypot(*load)
-    largest = load[:, int(np.argmax(size))]
-    if not size.max() > least:
-        return None
-    x, y = largest / size.max() * np.sign(largest[int(np.argmax(np.abs(largest)))])
-    return (float(x), float(y)) if np.abs(x * load[1] - y * load[0]).max() <= aside else None
 
 
 class History:

@@ -10,14 +10,16 @@ import gc
 import importlib
 import os
 import sys
-from typing import Annotated, Any
+from collections.abc import Sequence
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from .._version import __version__
 from ..solve import interruption
-from .guard import app as _app
-from .guard import standard_streams, warn_plainly
+from .guard import COMMANDS, standard_streams, warn_plainly
+from .options import plain
+
+if TYPE_CHECKING:
+    from typer import Typer
 
 MODULES = {
     "run": ("run", "resume"),
@@ -32,47 +34,59 @@ MODULES = {
 
 def main() -> None:
     """Entry point of the command."""
-    # By default waiting threads spin, which on a busy machine takes cores from working threads.
+    # By default waiting threads spin, which on a busy machine takes cores from working threads; those of
+    # OpenBLAS for 2^26 cycles after it was loaded, though a run with transforms gives them nothing to do.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    # Plugins of pydantic watch the models of other programs; looking for them reads every installed package.
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
+    os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "20")
+    # Plugins of pydantic watch the models of other programs; looking for them reads every installed package,
+    # and what looks takes 10 ms to import.
+    if os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1") == "1":
+        none = ModuleType("pydantic.plugin._loader")
+        none.get_plugins = tuple  # type: ignore[attr-defined]
+        sys.modules.setdefault(none.__name__, none)
     # Most objects of a short process are functions and classes of modules, which stay: with Python's own
     # threshold of 700 a sixth of the time of `check` goes into looking for garbage among them.
-    gc.set_threshold(20_000)
+    gc.set_threshold(50_000)
     interruption.ends_process = True
     warn_plainly()
-    with standard_streams():
-        _with_commands(next((word for word in sys.argv[1:] if not word.startswith("-")), ""))()
+    try:
+        with standard_streams():
+            _called(sys.argv[1:])
+            raise SystemExit(0)
+    finally:
+        # The process ends, and its memory with it: the interpreter need not look for garbage once more.
+        gc.disable()
+        gc.freeze()
 
 
-def _with_commands(name: str = "") -> typer.Typer:
-    """Return the command with the sub-commands of one module, or with all if none is of that name."""
+def _called(words: Sequence[str]) -> None:
+    """Call the sub-command that the words of a command line name."""
+    _import_commands(next((word for word in words if not word.startswith("-")), ""))
+    command = COMMANDS.get(words[0]) if words else None
+    given = plain(command.function, words[1:]) if command else None
+    if command and given is not None:
+        command.function(**given)
+    else:
+        _whole()()
+
+
+def _import_commands(name: str = "") -> None:
+    """Import the sub-commands of one module, or all if none is of that name."""
     found = [module for module, names in MODULES.items() if name in names]
     for module in found or MODULES:
         importlib.import_module(f".{module}", __package__)
-    return _app
+
+
+def _whole() -> Typer:
+    """Return the parser that knows everything about the sub-commands that are imported."""
+    from .parser import parser
+
+    return parser()
 
 
 def __getattr__(name: str) -> Any:
     """Return the whole command as `app`."""
     if name == "app":
-        return _with_commands()
+        _import_commands()
+        return _whole()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        print(f"hexcontact {__version__}")
-        raise typer.Exit()
-
-
-@_app.callback(epilog="Example: hexcontact new sphere, then hexcontact run sphere.toml --plot")
-def _hexcontact(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Elastic contact in 3-D from a deck in TOML: pressure, shear traction, stick and slip, approach, shift.
-
-    Exit codes: 0 done, 2 wrong input, 3 no convergence or accuracy, 4 memory or disk; 130, 138, 143 stopped.
-    """

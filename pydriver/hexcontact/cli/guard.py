@@ -13,9 +13,6 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
 
-import typer
-from typer.core import TyperGroup
-
 from ..errors import LACKING, DeckError, HexcontactError, KernelFolderWarning, PathWarning, ResourceError
 from ..text import visible
 from . import json_output
@@ -38,7 +35,7 @@ class Failure(HexcontactError):
         self.exit_code = exit_code
 
 
-class _Report(NamedTuple):
+class Report(NamedTuple):
     """The message of an error, its exit code, and details for ``--json``."""
 
     message: str
@@ -64,44 +61,42 @@ def guarded(command: Callable[P, Content]) -> Callable[P, None]:
             content = command(*args, **kwargs)
             if name:
                 json_output.write(name, content or {})
-        except typer.Exit:
-            raise
         except (Exception, KeyboardInterrupt) as error:
             report = None if os.environ.get("HEXCONTACT_DEBUG") else _report_of(error)
             if report is not None:
                 print_error(report.message)
             if name:
-                unforeseen = _Report(f"{type(error).__name__}: {error}", HexcontactError.exit_code)
+                unforeseen = Report(f"{type(error).__name__}: {error}", HexcontactError.exit_code)
                 (report or unforeseen).print_json(name)
             if report is None:
                 raise
-            raise typer.Exit(report.exit_code) from None
+            raise SystemExit(report.exit_code) from None
         if content and content.get("exit_code"):
-            raise typer.Exit(content["exit_code"])
+            raise SystemExit(content["exit_code"])
 
     return wrapped
 
 
-def _report_of(error: BaseException) -> _Report | None:
+def _report_of(error: BaseException) -> Report | None:
     """Return the report of an error; None if it is a mistake of the program."""
     if isinstance(error, KeyboardInterrupt):
-        return _Report("interrupted", 130)
+        return Report("interrupted", 130)
     if isinstance(error, HexcontactError):
         message, faults = (
             "\n".join([str(error), *getattr(error, "__notes__", ())]),
             getattr(error, "faults", ()),
         )
-        return _Report(message, error.exit_code, faults, getattr(error, "details", None))
+        return Report(message, error.exit_code, faults, getattr(error, "details", None))
     if isinstance(error, UnicodeEncodeError):  # bytes of a name or an argument that are no text
-        return _Report(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
+        return Report(f"{error.object[:100]}: expected UTF-8 text", DeckError.exit_code)
     if isinstance(error, MemoryError) or any(sign in str(error) for sign in _NO_MEMORY):
-        return _Report("the machine has not enough memory for this", ResourceError.exit_code)
+        return Report("the machine has not enough memory for this", ResourceError.exit_code)
     if isinstance(error, OSError) and error.strerror:
         named = f"{error.filename}: " if error.filename else ""
         kind = ResourceError if error.errno in LACKING else DeckError
-        return _Report(named + error.strerror, kind.exit_code)
+        return Report(named + error.strerror, kind.exit_code)
     if isinstance(error, RuntimeError | OSError) and "NetCDF" in str(error):
-        return _Report(f"the result file is damaged ({error})", DeckError.exit_code)
+        return Report(f"the result file is damaged ({error})", DeckError.exit_code)
     return None
 
 
@@ -192,32 +187,32 @@ def warn_plainly() -> None:
     warnings.showwarning = show
 
 
-# --- the command and its sub-commands -----------------------------------------------------------------------
+# --- the sub-commands ---------------------------------------------------------------------------------------
 
 
-class Commands(TyperGroup):
-    """The sub-commands; with ``--json`` wrong options and arguments give an object, too."""
+class Command(NamedTuple):
+    """A sub-command.
 
-    def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
-        """Run the command that the arguments name."""
-        given = sys.argv[1:] if args is None else list(args)
-        try:
-            return super().main(args, *more, **options)
-        except SystemExit as ending:
-            usage = getattr(ending.__context__, "format_message", None)  # printed by typer before
-            if "--json" in given and usage is not None:
-                name = next((word for word in given if word in self.commands), "")
-                _Report(usage(), DeckError.exit_code).print_json(name)
-            raise
+    Attributes
+    ----------
+    function : callable
+        What it does, guarded.
+    example : str
+        Example in its help.
+    short_help : str or None
+        Its line in the list of commands; None: the first sentence of its help.
+    help : callable or None
+        Writes its help; None: the docstring of the function.
+    """
+
+    function: Callable[..., None]
+    example: str
+    short_help: str | None = None
+    help: Callable[[], str] | None = None
 
 
-app = typer.Typer(
-    name="hexcontact",
-    cls=Commands,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+COMMANDS: dict[str, Command] = {}
+"""The sub-commands of the modules that are imported."""
 
 
 def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Callable[P, None]]:
@@ -228,10 +223,11 @@ def command(example: str, **options: Any) -> Callable[[Callable[P, Content]], Ca
     example : str
         Example in the help.
     **options
-        Further arguments of `typer.Typer.command`.
+        Further attributes of `Command`.
     """
 
     def register(function: Callable[P, Content]) -> Callable[P, None]:
-        return app.command(epilog=f"Example: {example}", **options)(guarded(function))
+        COMMANDS[function.__name__] = Command(guarded(function), example, **options)
+        return COMMANDS[function.__name__].function
 
     return register

@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-import typer
-
 from ..errors import AccuracyWarning, DeckError
 from ..files import require_replaceable
 from ..result.store import open_result
@@ -100,7 +98,7 @@ class Messages:
             files = f"{target}, {picture}" if picture else f"{target}"
             tables.console().print(visible(f"written: {files}"), soft_wrap=True)
         if shortfall:
-            raise typer.Exit(AccuracyWarning.exit_code)
+            raise SystemExit(AccuracyWarning.exit_code)
         return None
 
     def was_finished(self, file: Path, picture: Path | None) -> dict[str, Any] | None:

@@ -8,15 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-from typer.core import TyperCommand
-
 from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError
 from ..files import MADE_BY, require_replaceable
 from ..text import did_you_mean, listed
 from .guard import command, print_output
-from .options import Shown, argument, beside, labels_of, output_to, steps_of, steps_option
+from .options import Shown, argument, beside, labels_of, option, output_to, steps_of, steps_option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,20 +32,8 @@ Arrows = enum.StrEnum("Arrows", ["none", "traction", "slip"])
 """Arrows on zone maps."""
 
 
-class _Plot(TyperCommand):
-    """The command; its help lists the figures, which imports the packages that draw."""
-
-    @property
-    def help(self) -> str:
-        """Description of the command, and a line for each figure."""
-        return _help()
-
-    @help.setter
-    def help(self, text: str) -> None:
-        pass
-
-
 def _help() -> str:
+    """Return the help, with a line for each figure: this imports the packages that draw."""
     from ..plotting.registry import entries
 
     choices = [(entry.of_a_result, name, entry.help) for name, entry in entries().items()]
@@ -67,15 +52,15 @@ def _help() -> str:
 
 @command(
     "hexcontact plot fretting.nc --what tractions --step 15,20,25,30 --output cuts.pdf",
-    cls=_Plot,
     short_help=_DRAWS,
+    help=_help,
 )
 def plot(
     files: Annotated[
         list[Path] | None,
         argument("FILE", "The result, a netCDF file; several for zones, outlines and compliance."),
     ] = None,
-    what: Annotated[str, typer.Option("--what", "-w", help="Which picture; see above.")] = "overview",
+    what: Annotated[str, option("--what", "-w", help="Which picture; see above.")] = "overview",
     step: Annotated[
         str | None,
         steps_option(
@@ -85,29 +70,33 @@ def plot(
     ] = None,
     angle: Annotated[
         str | None,
-        typer.Option(metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."),
+        option(
+            "--angle", metavar="ANGLE", help="Direction of the line of section and tractions from x, degrees."
+        ),
     ] = None,
     through: Annotated[
         str | None,
-        typer.Option(metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."),
+        option("--through", metavar="X,Y", help="A point of that line, as 10um,0um; default: the center."),
     ] = None,
     cycle: Annotated[
         str | None,
-        typer.Option(metavar="N,...", help="Cycles of loop and torsion: 2, or 1,2, or all; -1: the last."),
+        option(
+            "--cycle", metavar="N,...", help="Cycles of loop and torsion: 2, or 1,2, or all; -1: the last."
+        ),
     ] = None,
     over: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
+        option("--over", metavar="NAME", help="Variable of the horizontal axis, as tangential_load_x."),
     ] = None,
     arrows: Annotated[
-        Arrows | None, typer.Option(help="Arrows on zone maps: shear traction, or slip in the step.")
+        Arrows | None, option("--arrows", help="Arrows on zone maps: shear traction, or slip in the step.")
     ] = None,
     source: Shown = None,
     output: Annotated[
         Path | None, output_to("Picture to write (.png, .pdf, .svg); default: FILE_WHAT.png beside FILE.")
     ] = None,
     format: Annotated[
-        Format | None, typer.Option("--format", "-f", help="Format where --output names none.")
+        Format | None, option("--format", "-f", help="Format where --output names none.")
     ] = None,
 ) -> None:
     """Draw a result, or a figure without a result; `_help` makes the help from the figures."""
@@ -183,18 +172,18 @@ def _arguments(entry: Entry, files: int, chosen: Mapping[str, Any]) -> dict[str,
     if files > 1 and not entry.of_several:
         raise DeckError(f"--what {entry.name} shows one result; expected one FILE, not {files}")
     arguments: dict[str, Any] = {}
-    for option, value in chosen.items():
-        if f"{option}s" in entry.options:
-            arguments[f"{option}s"] = value
-        elif option not in entry.options:
-            raise DeckError(f"--{option}: not an option of --what {entry.name}")
-        elif option == "step":
+    for name, value in chosen.items():
+        if f"{name}s" in entry.options:
+            arguments[f"{name}s"] = value
+        elif name not in entry.options:
+            raise DeckError(f"--{name}: not an option of --what {entry.name}")
+        elif name == "step":
             if len(value) > 1:
                 count = f"expected one number, not {len(value)}"
                 raise DeckError(f"--step: {entry.name} shows one load step; {count}")
             arguments["step"] = value[0]
         else:
-            arguments[option] = value
+            arguments[name] = value
     return arguments
 
 

@@ -6,8 +6,6 @@ import os
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ..solve.interruption import signal_pipe
 from .guard import Content, command, print_error
 from .options import (
@@ -30,7 +28,6 @@ from .options import (
 
 @command("hexcontact run cases/hertz_spheres.toml --plot")
 def run(
-    context: typer.Context,
     deck: DeckFile,
     output: Annotated[
         Path | None, output_to("File to write; default: the deck's output.file, or DECK.nc here.")
@@ -56,8 +53,7 @@ def run(
         log.refuse_same(log_file, [target])
         if plot:  # refuses before the run
             picture_beside(target)
-        pipe = context.with_resource(signal_pipe())  # up to the end, so that a complete output stays
-        with Store(target, metadata_of(case), overwrite) as store:
+        with signal_pipe() as pipe, Store(target, metadata_of(case), overwrite) as store:
             histories = solved(case, store, pipe, deck.stem, messages)
         picture = overview(target) if plot else None
     return messages.conclude(case, histories, target, picture)
@@ -65,7 +61,6 @@ def run(
 
 @command("hexcontact resume fretting.nc")
 def resume(
-    context: typer.Context,
     file: Annotated[Path, argument("FILE", "The output of the run.")],
     plot: Plot = False,
     quiet: Quiet = False,
@@ -85,8 +80,11 @@ def resume(
 
     messages = Messages("resume", quiet, as_json, log_file, log_level)
     overrides = dict(map(setting, settings or ()))
-    pipe = context.with_resource(signal_pipe())
-    with messages.logging(file), restart.reopened(file, overrides=overrides) as again:
+    with (
+        signal_pipe() as pipe,
+        messages.logging(file),
+        restart.reopened(file, overrides=overrides) as again,
+    ):
         if again is not None:
             if plot:
                 picture_beside(again.store.path)

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from ..errors import DeckError
 from ..solve.interruption import Interrupted, in_background, signal_pipe
 from ..text import text_table
 from .guard import Content, Failure, command, print_error, print_output
-from .options import AsJson, Level, LogFile, Quiet, argument, flag, output_to
+from .options import AsJson, Level, LogFile, Quiet, argument, flag, option, output_to
 
 if TYPE_CHECKING:
     from ..study.plan import CheckLevel
@@ -27,27 +25,26 @@ _MOST_NAMED = 20  # failures listed at the end
 
 @command("hexcontact study cases/study_friction.toml --jobs 4")
 def study(
-    context: typer.Context,
     file: Annotated[Path, argument("STUDY", "The study, a TOML file.")],
     output: Annotated[
         Path | None, output_to("Result; default: the study's output, or STUDY.nc here. Cases go beside it.")
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
+        int | None, option("--jobs", "-j", help="Cases at a time on this machine; default: the cores.")
     ] = None,
     dask: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786.")
+        str | None, option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, as tcp://host:8786.")
     ] = None,
     slurm: Annotated[bool, flag("slurm", "Run nothing; print a job array for sbatch.")] = False,
     case: Annotated[
-        int | None, typer.Option(metavar="N", help="Run only case N, as a job array does.")
+        int | None, option("--case", metavar="N", help="Run only case N, as a job array does.")
     ] = None,
     collect: Annotated[bool, flag("collect", "Run nothing; combine the finished cases.")] = False,
     plan: Annotated[
-        bool, typer.Option("--plan", "--dry-run", help="Run nothing; print all cases and their states.")
+        bool, option("--plan", "--dry-run", help="Run nothing; print all cases and their states.")
     ] = False,
     skip_invalid: Annotated[
-        bool, typer.Option("--skip-invalid", help="Leave out invalid cases, and name each.")
+        bool, option("--skip-invalid", help="Leave out invalid cases, and name each.")
     ] = False,
     retry: Annotated[bool, flag("retry", "Repeat cases that failed.")] = False,
     quiet: Quiet = False,
@@ -78,7 +75,7 @@ def study(
         return None
     with messages.logging(file, planned.output):
         if case is not None:
-            outcome = _run_case(planned, case, retry, messages, context)
+            outcome = _run_case(planned, case, retry, messages)
             if outcome.exit_code:
                 raise Failure(outcome.message, outcome.exit_code)
             return {
@@ -90,13 +87,13 @@ def study(
             planned.collect()
         else:
             listener = study_reporter(messages.silent)
-            _run_missing(planned, context, jobs=jobs, dask=dask, retry=retry, listener=listener)
+            _run_missing(planned, jobs=jobs, dask=dask, retry=retry, listener=listener)
     state = _State.of(planned)
     state.report(quiet or as_json)
     if as_json:
         return {"exit_code": state.exit_code, **state.content()}
     if state.exit_code:
-        raise typer.Exit(state.exit_code)
+        raise SystemExit(state.exit_code)
     return None
 
 
@@ -179,25 +176,26 @@ class _State:
         }
 
 
-def _run_case(study: Study, number: int, retry: bool, messages: Messages, context: typer.Context) -> Outcome:
+def _run_case(study: Study, number: int, retry: bool, messages: Messages) -> Outcome:
     """Run one case for a job array; signals end the process unless the case is done; finished steps stay."""
     from ..solve.progress import reporter
 
     outcomes: list[Outcome] = []
     listener = reporter(messages.silent)
     try:
-        in_background(
-            lambda: outcomes.append(study.run_case(number, retry, listener)),
-            context.with_resource(signal_pipe()),
-            lambda _: not (outcomes or study.has(number)),
-        )
+        with signal_pipe() as pipe:
+            in_background(
+                lambda: outcomes.append(study.run_case(number, retry, listener)),
+                pipe,
+                lambda _: not (outcomes or study.has(number)),
+            )
     except Interrupted as signaled:
         saved = f"the finished load steps of case {number} are recorded; the same command resumes after them"
         messages.interrupted(signaled, saved)
     return outcomes[0]
 
 
-def _run_missing(study: Study, context: typer.Context, **options: Any) -> None:
+def _run_missing(study: Study, **options: Any) -> None:
     """Run the missing cases in a second thread; a signal cancels them unless the study is complete."""
     cancel, over, complete = (threading.Event() for _ in range(3))
     kind, settings = study.backend(options["jobs"], options["dask"])
@@ -216,7 +214,8 @@ def _run_missing(study: Study, context: typer.Context, **options: Any) -> None:
         return not complete.is_set()
 
     try:
-        in_background(work, context.with_resource(signal_pipe()), ends)
+        with signal_pipe() as pipe:
+            in_background(work, pipe, ends)
     except Interrupted as signaled:
         saved = f"{_State.of(study).done} of {len(study)} cases are finished and recorded"
         message = f"interrupted; {saved} in {study.folder.folder}/; the same command runs the rest"

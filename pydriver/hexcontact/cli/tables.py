@@ -29,12 +29,11 @@ from ..result.history import (
     stick_share,
     worth_showing,
 )
-from ..text import percent, quantity, rich_table
+from ..text import TextTable, percent, quantity
 from ..variables import VARIABLES, label_of, spelled
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from ..problem.problem import Problem
     from ..result.result import Result
@@ -43,15 +42,35 @@ History = Mapping[str, Any]
 Row = tuple[str, ...]
 
 _MOST_ROWS = 24  # steps shown of a long history
+_PIPE = 130  # characters of a line where there is no terminal
 
 
-def console() -> Console:
-    """Return the console on standard output: with colors on a terminal, plain wide text elsewhere."""
+def console() -> Console | Pipe:
+    """Return what prints tables on standard output: with colors on a terminal, plain wide text elsewhere."""
+    return rich_console() if sys.stdout.isatty() else Pipe()
+
+
+def rich_console() -> Console:
+    """Return the console of `rich` on standard output."""
     from rich.console import Console
 
     piped = not sys.stdout.isatty()
-    width, file = (130, cast(IO[str], _Unpadded())) if piped else (None, None)
+    width, file = (_PIPE, cast(IO[str], _Unpadded())) if piped else (None, None)
     return Console(file=file, highlight=False, markup=False, emoji=False, width=width)
+
+
+class Pipe:
+    """Prints as `rich` does where there is no terminal, without `rich` if tables are not too wide for it."""
+
+    width = _PIPE
+
+    def print(self, shown: TextTable | str, *, soft_wrap: bool = False) -> None:
+        """Print a table, or a line of text."""
+        text = shown.plain(self.width) if isinstance(shown, TextTable) else shown
+        if text is None:
+            rich_console().print(shown, soft_wrap=soft_wrap)
+        else:
+            print(text)
 
 
 class _Unpadded(io.TextIOBase):
@@ -62,9 +81,9 @@ class _Unpadded(io.TextIOBase):
         return sys.stdout.write(re.sub(r" +(?=\n)", "", text))
 
 
-def pairs(title: str, rows: Iterable[Row]) -> Table:
+def pairs(title: str, rows: Iterable[Row]) -> TextTable:
     """Return a table of names and values."""
-    return rich_table(title, ("", ""), rows)
+    return TextTable(title, ("", ""), list(rows))
 
 
 # --- the load steps of a run or a file ------------------------------------------------------------
@@ -135,12 +154,12 @@ class Summary:
             shown.print(history_table(self.histories, shown))
         headers, energies = energy_table(self.histories, _MOST_ROWS)
         if energies:
-            shown.print(rich_table("Dissipated energy", headers, energies))
+            shown.print(TextTable("Dissipated energy", headers, energies))
         shown.print(pairs(f"Last load step{named}", step_rows(last)))
         if rows := hertz_rows(self.hertz, last):
-            shown.print(rich_table("Against Hertz", HERTZ_HEADERS, rows))
+            shown.print(TextTable("Against Hertz", HERTZ_HEADERS, rows))
         if self.result is not None and (rows := trial_rows(self.result)):
-            shown.print(rich_table("Accuracy", TRIAL_HEADERS, rows))
+            shown.print(TextTable("Accuracy", TRIAL_HEADERS, rows))
         printed = (
             [] if whole_file else str(self.parameters.get("warnings", "")).splitlines()
         )  # before the run
@@ -211,7 +230,7 @@ def _recorded_case(deck: str) -> Problem | None:
 # --- the history ----------------------------------------------------------------------------------
 
 
-def history_table(histories: Sequence[History], console: Console) -> Table:
+def history_table(histories: Sequence[History], console: Console | Pipe) -> TextTable:
     """Return a table of the load steps; of a long history only ends of segments, peaks and the last step.
 
     The residual is the largest of a step. On a narrow console columns are left out, estimated errors last.
@@ -224,10 +243,19 @@ def history_table(histories: Sequence[History], console: Console) -> Table:
         for spare in ("", "time", "label", "residual"):
             columns.pop(spare, None)
             rows = [(f"{k + 1}", *(entry(histories[k]) for entry in columns.values())) for k in chosen]
-            shown = rich_table(title, ("step", *columns), rows, tight=True)
-            if console.measure(shown, options=console.options.update_width(1000)).maximum <= console.width:
+            shown = TextTable(title, ("step", *columns), rows, tight=True)
+            if _fits(shown, console):
                 return shown
     return shown
+
+
+def _fits(table: TextTable, console: Console | Pipe) -> bool:
+    """Return whether a table needs no more width than a console has."""
+    if isinstance(console, Pipe):
+        if table.plain(console.width) is not None:
+            return True
+        console = rich_console()
+    return console.measure(table, options=console.options.update_width(1000)).maximum <= console.width
 
 
 def _columns(histories: Sequence[History], with_errors: bool) -> dict[str, Callable[[History], str]]:

@@ -15,8 +15,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-import typer
-
 from ..errors import DeckError
 from .guard import Content, command
 from .options import AsJson, argument, flag
@@ -33,7 +31,7 @@ def verify(
     Exit code 1 if a comparison fails.
     """
     if not as_json:
-        raise typer.Exit(main(names or [], listing=listing))
+        raise SystemExit(main(names or [], listing=listing))
     chosen = _chosen(names or [], self_test())
     if listing:
         return {"checks": [{"name": check.name, "title": check.title} for check in chosen]}
@@ -158,9 +156,9 @@ def show(check: Check, comparison: Comparison) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from .tables import console
+    from .tables import rich_console
 
-    screen = console()
+    screen = rich_console()
     screen.width = max(screen.width, 150)  # a narrow terminal wraps lines, it does not lose digits
     shown = Table(
         title=Text(check.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False

@@ -44,7 +44,7 @@ _UNITS = {"": 1, "B": 1} | {
     for power, prefix in enumerate(("k", "M", "G", "T"), start=1)
     for unit, base in (("B", 1000), ("iB", 1024))
 }
-_FILE = re.compile(r"[a-z-]+-\d+x\d+-[0-9A-F]{16}\.kernels(\.[0-9a-f]+-\d+\.part)?")
+_FILE = r"[a-z-]+-\d+x\d+-[0-9A-F]{16}\.kernels(\.[0-9a-f]+-\d+\.part)?"
 _DAY = 86400.0
 _LOGGER = logging.getLogger("hexcontact")
 _NOT_OURS = f"other users may write to it (chmod go-w, or {SHARED}=yes if all of them are trusted)"
@@ -235,7 +235,7 @@ def _open_folder() -> None:
 def _pruned(folder: Path, bound: int) -> int:
     """Delete the oldest spectra of a folder down to three quarters of its bound; return the bytes."""
     files = []
-    for path in filter(lambda path: _FILE.fullmatch(path.name), folder.iterdir()):
+    for path in filter(lambda path: re.fullmatch(_FILE, path.name), folder.iterdir()):
         with contextlib.suppress(OSError):  # another process has renamed or removed it
             state = path.stat()
             if path.suffix == ".part" and time.time() - state.st_mtime > _DAY:

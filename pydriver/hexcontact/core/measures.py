@@ -98,3 +98,26 @@ def _vectors(solution: NormalSolution, *names: str) -> Array:
     if not isinstance(solution, ContactState):
         return np.zeros((4, *solution.pressure.shape)).T
     return np.stack([getattr(solution, f"{name}_{axis}") for name in names for axis in "xy"]).T
+
+
+def line_of(load: Array, least: float, aside: float) -> tuple[float, float] | None:
+    """Return the direction of the line on which tangential loads lie.
+
+    Parameters
+    ----------
+    load : ndarray, shape (2, n)
+        The loads, N.
+    least, aside : float
+        Largest size of no load, and largest distance from the line (N).
+
+    Returns
+    -------
+    tuple of float or None
+        A unit vector whose larger component is positive; None if there is no load, or no such line.
+    """
+    size = np.hypot(*load)
+    largest = load[:, int(np.argmax(size))]
+    if not size.max() > least:
+        return None
+    x, y = largest / size.max() * np.sign(largest[int(np.argmax(np.abs(largest)))])
+    return (float(x), float(y)) if np.abs(x * load[1] - y * load[0]).max() <= aside else None

@@ -135,14 +135,12 @@ def place_of(found: dict[KeyPath, Place], path: KeyPath) -> tuple[int, Place | N
     return 0, None
 
 
-_BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
-_SPACE = re.compile(r"[ \t]*")
-_BARE = re.compile(r"[^\s\[\]{}=,.#\"']+")
-_PLAIN = re.compile(r"[^\[\]{},#\n\"']+")
-_STRINGS = tuple(
-    re.compile(pattern, re.DOTALL)
-    for pattern in (r'"""(?:[^\\]|\\.)*?"{3,5}', r"'''.*?'{3,5}", r'"(?:[^"\\\n]|\\.)*"', r"'[^'\n]*'")
-)
+# compiled when a fault is located
+_BLANK = r"(?:[ \t\r\n]|#[^\n]*)*"
+_SPACE = r"[ \t]*"
+_BARE = r"[^\s\[\]{}=,.#\"']+"
+_PLAIN = r"[^\[\]{},#\n\"']+"
+_STRINGS = (r'"""(?:[^\\]|\\.)*?"{3,5}', r"'''.*?'{3,5}", r'"(?:[^"\\\n]|\\.)*"', r"'[^'\n]*'")
 
 
 class _Scanner:
@@ -166,9 +164,9 @@ class _Scanner:
             if self.at == before:  # not TOML after all
                 return
 
-    def skip(self, pattern: re.Pattern[str]) -> bool:
+    def skip(self, pattern: str) -> bool:
         """Move behind a match at the current place; return whether there is one."""
-        match = pattern.match(self.text, self.at)
+        match = re.compile(pattern, re.DOTALL).match(self.text, self.at)
         self.at = match.end() if match else self.at
         return match is not None
 
@@ -196,7 +194,7 @@ class _Scanner:
             if path in self.entries:
                 path += (str(self.entries[path]),)
             self.note(path, start)
-        self.skip(re.compile(r"[ \t]*\]{1,2}"))
+        self.skip(r"[ \t]*\]{1,2}")
         return path
 
     def key(self) -> Iterator[tuple[str, int]]:

@@ -36,7 +36,7 @@ _OVER_ARRAYS: dict[Callable[..., float], Callable[..., Any]] = {
     max: lambda *values: functools.reduce(np.maximum, values),
     math.pow: np.power,
 }
-_NAME = re.compile(r"(?<![\w.])[^\W\d]\w*(?:\.\w+)*(?!\w*\s*\()")
+_NAME = r"(?<![\w.])[^\W\d]\w*(?:\.\w+)*(?!\w*\s*\()"
 _LONGEST = 300  # characters; the parser and the evaluation need stack for each level of parentheses
 
 
@@ -65,7 +65,7 @@ class Formula:
         def symbol(match: re.Match[str]) -> str:
             return found.setdefault(match[0], f"_{len(found)}")
 
-        symbols = _NAME.sub(symbol, text.strip())
+        symbols = re.sub(_NAME, symbol, text.strip())
         try:
             if len(text) > _LONGEST:
                 raise ValueError

@@ -28,7 +28,7 @@ def refuse(sentence: str) -> NoReturn:
 
 SMALLEST = 1.0 / LARGEST
 _DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_SHARE = re.compile(rf"\s*([+-]?{_DIGITS})\s*\*?\s*(?:mu|[\u00b5\u03bc])\s*\*?\s*P\s*")  # both letters mu
+_SHARE = rf"\s*([+-]?{_DIGITS})\s*\*?\s*(?:mu|[\u00b5\u03bc])\s*\*?\s*P\s*"  # both letters mu
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class OrShare(Kind):
     def _parse(self, value: object) -> float | Share:
         if isinstance(value, Share):
             return value
-        match = _SHARE.fullmatch(value) if isinstance(value, str) else None
+        match = re.fullmatch(_SHARE, value) if isinstance(value, str) else None
         if match and abs(share := float(match[1])) <= LARGEST:
             return Share(share)
         try:

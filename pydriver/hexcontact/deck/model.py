@@ -79,7 +79,7 @@ class Table(BaseModel):
         below = [
             f"{name}.{word}"
             for name, info in known.items()
-            for part in _parts(info.annotation)
+            for part in parts_of(info.annotation)
             if issubclass(part, Table) and word in part.known_keys()
         ]
         if below:
@@ -222,7 +222,7 @@ def refuse_key(key: str, value: object, sentence: str) -> NoReturn:
     raise ValidationError.from_exception_data("", [_details(Mistake((key,), value, sentence))])
 
 
-def _parts(annotation: Any) -> list[type]:
+def parts_of(annotation: Any) -> list[type]:
     """Return the classes in an annotation such as ``Table | None``."""
     return [part for part in (annotation, *get_args(annotation)) if isinstance(part, type)]
 

@@ -220,7 +220,7 @@ class _Column:
     cells: list[Any]
 
 
-_UNIT_IN_HEADER = re.compile(r"\s*(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))?\s*")
+_UNIT_IN_HEADER = r"\s*(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))?\s*"
 
 
 def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
@@ -347,7 +347,7 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
 
 def _split(header: str) -> tuple[str, str]:
     """Return a header without its unit, and the unit."""
-    match = _UNIT_IN_HEADER.fullmatch(header)
+    match = re.fullmatch(_UNIT_IN_HEADER, header)
     return (match["name"], (match["square"] or match["round"] or "").strip()) if match else (header, "")
 
 

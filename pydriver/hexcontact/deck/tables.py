@@ -11,9 +11,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, cast
+from typing import Annotated, Any, ClassVar, cast, get_origin
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
+from pydantic_core import PydanticCustomError
 
 from ..variables import BULK_STRESS, FIELDS, LOADS
 from .below import Fatigue, Stress
@@ -33,7 +34,7 @@ from .kinds import (
     WordOr,
     refuse,
 )
-from .model import Table, extended, meaning, problems_of
+from .model import Table, extended, kind_of, meaning, parts_of, problems_of
 from .series import DRIVEN, MOST_STEPS, Series
 from .surfaces import Flat, Point, PositiveLength, Separation, Surface, SurfaceKind
 from .units import LENGTH, NUMBER, PRESSURE
@@ -376,6 +377,10 @@ class Deck(Table):
         problems : list of Mistake
             Mistakes in single tables.
         """
+        if data.keys() <= cls.model_fields.keys():
+            # Each table alone: pydantic need not build the models of tables that the deck does not have.
+            with suppress(ValidationError, PydanticCustomError, LookupError):
+                return {name: _table(data, name, info) for name, info in cls.model_fields.items()}, []
         try:
             return dict(cls.model_validate(data)), []
         except ValidationError as error:
@@ -389,6 +394,21 @@ class Deck(Table):
             elif name not in faulty:
                 tables[name] = info.get_default(call_default_factory=True)
         return tables, problems
+
+
+def _table(data: Mapping[str, Any], name: str, info: Any) -> Any:
+    """Return one table of a deck; an error if anything is wrong, which the check of all tables reports."""
+    if name not in data and not info.is_required():
+        return info.get_default(call_default_factory=True)
+    value = data[name]
+    if kind := kind_of(info):
+        return kind.parse(value)
+    (table,) = (part for part in parts_of(info.annotation) if issubclass(part, Table))
+    if get_origin(info.annotation) is not list:
+        return table.model_validate(value)
+    if not isinstance(value, list) or not value:
+        raise LookupError(name)
+    return [table.model_validate(entry) for entry in value]
 
 
 @functools.cache

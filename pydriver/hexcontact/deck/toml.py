@@ -15,12 +15,12 @@ from ..files import text_of
 DEEPEST = 50  # levels of tables and arrays; no key needs more than six
 
 # Text in quotes or a comment; a number with a comma; brackets; a number with a unit without quotes.
-_QUOTED = re.compile(r"""\"[^\"]*\"|'[^']*'|\#.*""")
-_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)\s*$")
-_BRACKET = re.compile(r"(\w+)\[\d*\]")
+_QUOTED = r"""\"[^\"]*\"|'[^']*'|\#.*"""
+_COMMA = r"=\s*([+-]?\d+),(\d+)\s*$"
+_BRACKET = r"(\w+)\[\d*\]"
 _ARRAYS = ("load", "stress", "fatigue", "parameter")  # tables of which a file may have several
-_TWICE = re.compile(r"Cannot declare \('(\w+)',\) twice")
-_WITH_UNIT = re.compile(r"(?<![\w.])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*(?:[^\W\d_]+[\w/^*·]*|[%°])")
+_TWICE = r"Cannot declare \('(\w+)',\) twice"
+_WITH_UNIT = r"(?<![\w.])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*(?:[^\W\d_]+[\w/^*·]*|[%°])"
 
 
 def read_toml(path: str | Path, kind: str = "a deck") -> tuple[dict[str, Any], str]:
@@ -65,13 +65,13 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         if place is None:
             raise DeckError(f"{name}: is not TOML: {message}") from None
         line = text.split("\n")[int(place[1]) - 1]
-        unquoted = _QUOTED.sub("", line)
+        unquoted = re.sub(_QUOTED, "", line)
         hint = ""
-        if bare := _WITH_UNIT.search(unquoted):
+        if bare := re.search(_WITH_UNIT, unquoted):
             hint = f'; a value with a unit stands in quotes: "{bare[0].strip()}"'
-        elif comma := _COMMA.search(unquoted):
+        elif comma := re.search(_COMMA, unquoted):
             hint = f"; a number has a decimal point: {comma[1]}.{comma[2]}"
-        elif (twice := _TWICE.match(message)) and twice[1] in _ARRAYS:
+        elif (twice := re.match(_TWICE, message)) and twice[1] in _ARRAYS:
             hint = f"; of several tables each begins with two brackets: [[{twice[1]}]]"
         sentence = f"{name}:{place[1]}:{place[2]}: is not TOML: {message[: place.start()]}{hint}"
         raise DeckError(sentence, [Fault(sentence, "", "", name, int(place[1]), int(place[2]))]) from None
@@ -120,7 +120,7 @@ def with_overrides(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dic
     """
     result = copy.deepcopy(dict(data))
     for dotted_key, value in overrides.items():
-        if bracket := _BRACKET.search(dotted_key):
+        if bracket := re.search(_BRACKET, dotted_key):
             given = f"{bracket[1]}.1{dotted_key[bracket.end() :]}"
             raise DeckError(f"{dotted_key}: expected the number of an entry between points, from 1: {given}")
         *parents, last = dotted_key.split(".")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,8 @@ STARTERS = (
 
 def starter(name: str) -> str:
     """Return the text of a starter deck, see ``hexcontact new NAME``."""
+    from importlib import resources
+
     return (resources.files(__package__) / "templates" / f"{name}.toml").read_text(encoding="utf-8")
 
 

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..analytic.shear import ClosedForms, line_of
+from ..analytic.shear import ClosedForms
 from ..arrays import Array
 from ..core.measures import cycles as cycles_of
+from ..core.measures import line_of
 from ..result.history import LOADS_AND_MOTIONS, worth_showing
 from ..result.result import Result
 from ..result.view import dataset_of, title_of

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _CLOSE = 1e-6  # spacings by which a node may be off its place; relative difference of sums
 _ROUNDED = 1 + 1e-5  # for tolerances in the story of a run
-_CHANGED = re.compile(r"(?<!step_)tolerance = (\S+) instead of ([^\s,]+)")
+_CHANGED = r"(?<!step_)tolerance = (\S+) instead of ([^\s,]+)"
 
 _ALWAYS = names_where(lambda v: v.required == "always")
 _WITH_FRICTION = names_where(lambda v: bool(v.required))
@@ -169,7 +169,7 @@ def _fault_of_numbers(
 ) -> str:
     """Return a fault of values by step; a resumed run may have several tolerances."""
     given = [parameters.get("tolerance", 1.0), parameters.get("cycle_tolerance", 0.0)]
-    tolerances = [*given, *map(float, chain(*_CHANGED.findall(story)))]
+    tolerances = [*given, *map(float, chain(*re.findall(_CHANGED, story)))]
     cut = np.greater(history.get("cuts", 0), 0) | np.isfinite(history.get("segment_fraction", math.nan))
     for name, values in history.items():
         low, high = _bounds(name, history, window)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.measures import cycles as cycles_of
-from ..core.measures import turning_points
+from ..core.measures import line_of, turning_points
 from ..deck.below import Stage
 from ..text import Row, listed, percent, quantity
 from ..variables import (
@@ -241,8 +241,6 @@ def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], 
     """
     names, found = worth_showing(histories), {}
     if "tangential_load_x" in histories[0]:
-        from ..analytic.shear import line_of
-
         load, shift = (
             np.stack([_column(histories, f"{name}_{axis}") for axis in "xy"])
             for name in ("tangential_load", "shift")

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 VERSION = 2  # 1 had no checksum
-_JOURNAL = re.compile(r"\d+_\d+\.nc\.d")
+_JOURNAL = r"\d+_\d+\.nc\.d"
 FOLDER = "lattices"  # in the journal
 
 
@@ -180,7 +180,7 @@ class TrialFolder:
     def _journals(self) -> list[Journal]:
         """Return the load steps of all lattices."""
         names = sorted(os.listdir(self.folder)) if self.folder.is_dir() else []
-        return [Journal(self.folder / name) for name in names if _JOURNAL.fullmatch(name)]
+        return [Journal(self.folder / name) for name in names if re.fullmatch(_JOURNAL, name)]
 
     def remove(self) -> None:
         """Delete the files of runs, and no others."""

@@ -29,7 +29,6 @@ from ..core.steps import (
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
 from ..result.step import Step
-from . import nonconvergence
 from .frictional import FrictionWindow
 
 
@@ -108,6 +107,8 @@ class GivenPath:
             state = self.window.carried(state, smaller)
             how.pop("guess", None)  # of the smaller window
         if not reached.converged:
+            from . import nonconvergence
+
             raise nonconvergence.error(self.case, self.window.lattice, reached, target, values)
         return state, reached
 
@@ -264,6 +265,8 @@ class AdaptivePath(GivenPath):
             solved = self._tried(target, begun, attempt.end)
             verdict = self._size.judge(attempt, None if solved is None else solved.change, tolerance)
             if verdict == FAILED:
+                from . import nonconvergence
+
                 raise nonconvergence.error(self.case, self.window.lattice, *self._failed)
             if solved is not None and verdict != REJECTED:
                 return attempt, solved, verdict

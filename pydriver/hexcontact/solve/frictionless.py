@@ -44,7 +44,7 @@ _ITEM = 8  # bytes of a float
 _STEPPED = names_where(lambda v: v.dims == ("step",))
 # Measured by tests/bench/memory.py.
 _WRITING = 18 * 2**20  # bytes of netCDF and HDF5, which are loaded to write the output
-_LOADED = 3 * 2**20  # bytes of modules that a run imports
+_LOADED = 5 * 2**20  # bytes of modules that a run imports
 _LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
 _LEFT = {False: 0.5, True: 0.75}  # share of operators and states, which remain for the output, by friction
 _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction

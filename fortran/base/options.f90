@@ -79,6 +79,8 @@ module hc_options
     !> The same once residuals are small; where shear does not act on the pressure, Newton's method converges the faster for
     !> it; and of the pressure, whose iterations are the cheaper ones
     real(wp) :: late_accuracy = 0.03_wp, uncoupled_accuracy = 1.0e-3_wp, pressure_accuracy = 0.05_wp
+    !> The least of a coupled sweep, whose accuracy is that of the residuals before it, too
+    real(wp) :: coupled_accuracy = 1.0e-4_wp
     !> Accuracy of the last linear solution, relative to the tolerance
     real(wp) :: final_accuracy = 0.2_wp
     !> Iterations of a linear solver, and directions that GMRES stores: far more than the preconditioner needs
@@ -111,6 +113,9 @@ module hc_options
     !> the solution worse than two blocks do
     real(wp) :: coupled_residual = 0.6_wp
     integer :: coupled_delay = 4
+    !> Tolerance from which on the residuals of a solution are those of the displacements that its linear solvers carried along:
+    !> their rounding errors are far below. Share of it that what is cut off to record admissible tractions may displace
+    real(wp) :: carried_tolerance = 1.0e-7_wp, cut_share = 0.05_wp
   end type newton_options_t
 
   !> Coarser lattices and parts of the window (docs/theory/multilevel.md).

@@ -104,8 +104,8 @@ contains
       missing = 0.0_wp
       carried = now%pressure%space%sum(now%p)
       if (n_constraint == 1) missing = now%target%value(normal)/cell_area - carried
-      if (now%residual_normal <= options%final_accuracy*now%tolerance .and. &
-          abs(missing(1)) <= options%final_accuracy*now%tolerance*carried) then
+      if (now%residual_normal <= options%final_pressure*now%tolerance .and. &
+          abs(missing(1)) <= options%final_pressure*now%tolerance*carried) then
         if (.not. estimated) return
         ! a pressure that may stay as it is, if that is so without errors of interpolation
         estimated = .false.
@@ -114,7 +114,7 @@ contains
         call now%pressure%stretch(-1.0_wp, now%p, now%w)
         call now%find_gap(gap)
         now%residual_normal = now%gap_residual(gap)
-        if (now%residual_normal <= options%final_accuracy*now%tolerance) return
+        if (now%residual_normal <= options%final_pressure*now%tolerance) return
       end if
       estimated = .false.
       changed = now%first .and. area == 1
@@ -153,7 +153,7 @@ contains
         call now%pressure%stretch(1.0_wp, now%p, now%w)
       end if
       if (compliant) rhs = rhs - now%pressure%offset
-      goal = options%final_accuracy*now%tolerance
+      goal = options%final_pressure*now%tolerance
       if (changed .or. compliant .or. now%pressure_feels_shear) then
         goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
       end if

@@ -79,8 +79,10 @@ module hc_options
     !> The same once residuals are small; where shear does not act on the pressure, Newton's method converges the faster for
     !> it; and of the pressure, whose iterations are the cheaper ones
     real(wp) :: late_accuracy = 0.03_wp, uncoupled_accuracy = 1.0e-3_wp, pressure_accuracy = 0.05_wp
-    !> Accuracy of the last linear solution, relative to the tolerance
-    real(wp) :: final_accuracy = 0.2_wp
+    !> The least of a coupled sweep, whose accuracy is that of the residuals before it, too
+    real(wp) :: coupled_accuracy = 1.0e-4_wp
+    !> Accuracy of the last linear solution, relative to the tolerance; of the last pressure, which the shear traction still moves
+    real(wp) :: final_accuracy = 0.5_wp, final_pressure = 0.2_wp
     !> Iterations of a linear solver, and directions that GMRES stores: far more than the preconditioner needs
     integer :: max_iterations = 400, max_directions = 40
     !> Contact areas per staggered sweep: one where the shear traction moves the pressure, else until the area stands
@@ -111,6 +113,9 @@ module hc_options
     !> the solution worse than two blocks do
     real(wp) :: coupled_residual = 0.6_wp
     integer :: coupled_delay = 4
+    !> Tolerance from which on the residuals of a solution are those of the displacements that its linear solvers carried along:
+    !> their rounding errors are far below. Share of it that what is cut off to record admissible tractions may displace
+    real(wp) :: carried_tolerance = 1.0e-7_wp, cut_share = 0.05_wp
   end type newton_options_t
 
   !> Coarser lattices and parts of the window (docs/theory/multilevel.md).
@@ -118,9 +123,9 @@ module hc_options
     !> Windows with fewer nodes a side are not coarsened any further
     integer :: smallest_side = 20
     !> Tolerance on coarser lattices of a first step: they only give a start
-    real(wp) :: nested_tolerance = 1.0e-3_wp
+    real(wp) :: nested_tolerance = 3.0e-3_wp
     !> The same of a later step, whose start is the change that they find, and sweeps there
-    real(wp) :: change_tolerance = 1.0e-2_wp
+    real(wp) :: change_tolerance = 3.0e-2_wp
     integer :: change_sweeps = 20
     !> Nodes that a coarse contact has at least: fewer do not resolve zones
     integer :: least_contact = 100
@@ -162,6 +167,8 @@ module hc_options
     logical :: as_written = .false.
     !> Exchanges of whole sets that may fail to lower the number of wrong nodes, before Murty's rule exchanges one by one
     integer :: stalled_exchanges = 10
+    !> Tolerance on coarser lattices, of a first step and of a later one
+    real(wp) :: nested_tolerance = 1.0e-3_wp, change_tolerance = 1.0e-2_wp
     !> Accuracy at which a compliant interface is not linearised any more, relative to the tolerance
     real(wp) :: final_accuracy = 0.2_wp
     !> Contact areas that are tried before there is any shear traction

@@ -19,7 +19,7 @@ module hc_coarse_change
   implicit none
   private
 
-  public :: restrict_state, balance, add_change, prolong_state
+  public :: restrict_state, balance, add_change, find_displacements, prolong_state, prolong_displacement
 
 contains
 
@@ -68,13 +68,16 @@ contains
   end subroutine balance
 
   !> Add the change of a coarse state to a fine one.
-  subroutine add_change(coarse_problem, before, after, problem, state)
+  subroutine add_change(coarse_problem, before, after, problem, state, moved, displacement)
     type(friction_problem_t), intent(in) :: coarse_problem
     !> Coarse states
     type(contact_state_t), intent(in) :: before, after
     type(friction_problem_t), intent(in) :: problem
     !> Fine state: tractions and motions change
     type(contact_state_t), intent(inout) :: state
+    !> Change of w, u_x, u_y at the coarse nodes; the fine ones, to which it is added by interpolation (n_col, n_row, 3) [m]
+    real(wp), intent(in), optional :: moved(:, :, :)
+    real(wp), intent(inout), optional :: displacement(:, :, :)
     real(wp), allocatable :: change(:, :), change_of_traction(:, :, :), slipping(:, :)
     real(wp), dimension(size(state%pressure, 1)) :: bound, length
     integer :: col, row
@@ -111,8 +114,48 @@ contains
       end do
     end do
     !$omp end parallel do
+    deallocate (slipping)
     state%motion = state%motion + (after%motion - before%motion)
+    if (.not. present(displacement)) return
+    deallocate (change, change_of_traction)
+    allocate (change_of_traction, mold=displacement)
+    call prolong_displacement(coarse_problem, moved, problem, change_of_traction)
+    displacement = displacement + change_of_traction
   end subroutine add_change
+
+  !> Prolong displacements: smooth ones, that do not end with the window.
+  subroutine prolong_displacement(coarse_problem, coarse, problem, fine)
+    type(friction_problem_t), intent(in) :: coarse_problem, problem
+    !> w, u_x, u_y (n_col, n_row, 3) [m]
+    real(wp), intent(in) :: coarse(:, :, :)
+    real(wp), intent(out) :: fine(:, :, :)
+    integer :: m
+
+    do m = 1, size(fine, 3)
+      call prolong(coarse_problem%lattice, coarse(:, :, m), problem%lattice, fine(:, :, m), problem%space, beyond=.true.)
+    end do
+  end subroutine prolong_displacement
+
+  !> Find the displacements of a state that was solved for, from its gap and relative displacement.
+  subroutine find_displacements(problem, state, displacement)
+    type(friction_problem_t), intent(in) :: problem
+    type(contact_state_t), intent(in) :: state
+    !> w, u_x, u_y (n_col, n_row, 3) [m]
+    real(wp), allocatable, intent(out) :: displacement(:, :, :)
+    real(wp) :: remote(problem%lattice%extent(1), 2)
+    integer :: row
+
+    allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+    !$omp parallel do schedule(static) num_threads(problem%space%threads) private(remote)
+    do row = 1, size(displacement, 2)
+      call problem%rigid_displacement_row(state%motion, row, remote(:, 1), remote(:, 2))
+      displacement(:, row, 1) = 0.0_wp
+      where (problem%candidate(:, row)) displacement(:, row, 1) = state%gap(:, row) + state%motion(normal) &
+                                                                  - problem%initial_gap(:, row)
+      displacement(:, row, 2:) = state%relative_displacement(:, row, :) + remote
+    end do
+    !$omp end parallel do
+  end subroutine find_displacements
 
   !> Prolong tractions and motions of a coarse state, to start on the finer lattice.
   subroutine prolong_state(coarse_problem, coarse, problem, state)

@@ -166,7 +166,8 @@ contains
         if (allocated(error)) return
         gap = model%initial_gap
         call balance(self%problem, start, reference, target, before, displacement, model, origin, coarse_target)
-        call self%coarser%solve_step(before, origin, coarse_target, options%change_tolerance, options%change_sweeps, after, error)
+        call self%coarser%solve_step(before, origin, coarse_target, self%problem%options%direct%change_tolerance, &
+                                     options%change_sweeps, after, error)
         model%initial_gap = gap
         if (allocated(error)) return
         guessed = after%converged
@@ -175,7 +176,7 @@ contains
         call new_friction_state(before, model%lattice, model%space)
         before%motion = start%motion
         call self%coarser%solve_step(before, restrict_vector(self%problem%lattice, reference, model%lattice), target, &
-                                     options%nested_tolerance, max_sweeps, after, error)
+                                     self%problem%options%direct%nested_tolerance, max_sweeps, after, error)
         if (allocated(error)) return
         guessed = after%converged
         if (guessed) call prolong_state(model, after, self%problem, guess)

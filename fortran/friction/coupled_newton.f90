@@ -149,8 +149,8 @@ contains
         weight(1) = now%problem%normal_compliance/now%problem%sprung_compliance(system%space%max(now%p))*weight(1)
       end if
       weight(2) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
-      goal = max(options%inner_accuracy*min(max(now%residual_normal, now%residual_tangential), 1.0_wp), &
-                 options%final_accuracy*now%tolerance)
+      goal = min(max(now%residual_normal, now%residual_tangential), 1.0_wp)
+      goal = max(goal*min(options%inner_accuracy, max(goal, options%coupled_accuracy)), options%final_accuracy*now%tolerance)
       goal = goal*real(system%space%count(active), wp)**0.25_wp
       call projected_gmres(system, active, columns, mb, rows, weight([1, 2, 2]), rhs, x, ax, goal, options%max_directions, &
                            multiplier(:m), independent, residual, iterations, now%outcome, error, drift)

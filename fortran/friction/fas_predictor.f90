@@ -12,7 +12,7 @@ module hc_fas_predictor
   use hc_contact_problem, only: friction_problem_t
   use hc_elastic_operators, only: operators_t
   use hc_lattice_solver, only: solve_on_lattice
-  use hc_coarse_change, only: restrict_state, balance, add_change
+  use hc_coarse_change, only: restrict_state, balance, add_change, find_displacements
   implicit none
   private
 
@@ -22,7 +22,7 @@ contains
 
   !> Find tractions and motions to start a step from.
   recursive subroutine predict(problem, coarse, operators, start, reference, target, guess, &
-                               predicted, work, error)
+                               predicted, work, error, estimate)
     !> The problem
     type(friction_problem_t), intent(in) :: problem
     !> The problem on the coarser lattices, and their operators
@@ -42,11 +42,14 @@ contains
     real(wp), intent(out) :: work
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> w, u_x, u_y of the state at the beginning of the step, on return of that to start from, but for an error of interpolation;
+    !> found here where it is not given (n_col, n_row, 3) [m]
+    real(wp), allocatable, intent(inout) :: estimate(:, :, :)
 
     type(friction_problem_t) :: model
     type(contact_state_t) :: before, first, after
     type(load_target_t) :: coarse_target
-    real(wp), allocatable :: origin(:, :, :), displacement(:, :, :)
+    real(wp), allocatable :: origin(:, :, :), displacement(:, :, :), moved(:, :, :)
     real(wp) :: coarser_work
     logical :: helped
 
@@ -65,15 +68,20 @@ contains
     work = operators(1)%flexibility%applications
     call balance(problem, start, reference, target, before, displacement, model, origin, coarse_target)
     if (model%is_pressed(coarse_target)) then
-      call predict(model, coarse(2:), operators(2:), before, origin, coarse_target, first, helped, coarser_work, error)
+      moved = displacement
+      call predict(model, coarse(2:), operators(2:), before, origin, coarse_target, first, helped, coarser_work, error, &
+                   moved)
       if (allocated(error)) return
       work = work + coarser_work
       call solve_on_lattice(model, operators(1), first, origin, coarse_target, model%options%multilevel%change_tolerance, &
-                            model%options%multilevel%change_sweeps, after, error)
+                            model%options%multilevel%change_sweeps, after, error, moved, as_start=.true.)
       if (allocated(error)) return
       work = work + after%operator_applications
       predicted = after%converged
-      if (predicted) call add_change(model, before, after, problem, guess)
+      if (predicted) then
+        if (.not. allocated(estimate)) call find_displacements(problem, start, estimate)
+        call add_change(model, before, after, problem, guess, moved - displacement, estimate)
+      end if
     end if
     work = work*model%lattice%size()/problem%lattice%size()
   end subroutine predict

@@ -67,6 +67,8 @@ module hc_friction_iterate
     logical :: without_start = .false.
     !> Nothing has been solved yet
     logical :: first = .true.
+    !> `w` and `u` have errors of interpolation, until the first sweep
+    logical :: estimated = .false.
   contains
     !> Set the tractions and motions of a start
     procedure :: set_start
@@ -91,7 +93,7 @@ module hc_friction_iterate
 contains
 
   !> Set tractions and motions from those of a state, and find what they displace.
-  subroutine set_start(self, problem, operators, start, reference, target, tolerance, error)
+  subroutine set_start(self, problem, operators, start, reference, target, tolerance, error, estimate)
     class(friction_iterate_t), intent(inout) :: self
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
@@ -107,6 +109,8 @@ contains
     real(wp), intent(in) :: tolerance
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> w, u_x, u_y of the start but for an error of interpolation (n_col, n_row, 3), if known; freed [m]
+    real(wp), allocatable, intent(inout), optional :: estimate(:, :, :)
     type(driven_motions_t) :: driven
     real(wp) :: highest
     integer :: n, row, from, to
@@ -157,8 +161,43 @@ contains
       self%p = merge(1.0_wp, 0.0_wp, self%contact)
       self%q = 0.0_wp
     end if
-    call self%refresh(error)
+    if (present(estimate)) self%estimated = allocated(estimate) .and. .not. self%without_start
+    if (self%estimated) then
+      call take_estimate(self, estimate, error)
+    else
+      call self%refresh(error)
+    end if
+    if (present(estimate)) then
+      if (allocated(estimate)) deallocate (estimate)
+    end if
   end subroutine set_start
+
+  !> Take displacements that were estimated; the closing by the shear traction is found: the pressure needs it by itself.
+  subroutine take_estimate(self, estimate, error)
+    class(friction_iterate_t), intent(inout) :: self
+    !> w, u_x, u_y (n_col, n_row, 3) [m]
+    real(wp), intent(in), contiguous :: estimate(:, :, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    integer :: n, row, from, to
+
+    n = size(self%p)
+    if (self%pressure_feels_shear) then
+      call self%operators%apply([along_x, along_y], self%q, [normal], self%closing, error)
+      if (allocated(error)) return
+    else
+      call self%operators%space%fill(self%closing, 0.0_wp)
+    end if
+    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(from, to)
+    do row = 1, size(estimate, 2)
+      to = row*size(estimate, 1)
+      from = to - size(estimate, 1) + 1
+      self%w(from:to) = estimate(:, row, 1) - self%closing(from:to)
+      self%u(from:to) = estimate(:, row, 2)
+      self%u(n + from:n + to) = estimate(:, row, 3)
+    end do
+    !$omp end parallel do
+  end subroutine take_estimate
 
   !> Compute the displacements of the present tractions anew.
   subroutine refresh(self, error)

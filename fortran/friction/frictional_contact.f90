@@ -18,7 +18,7 @@ module hc_frictional_contact
   use hc_contact_solver, only: friction_solver_t
   use hc_elastic_operators, only: operators_t, new_operators, operators_memory
   use hc_lattice_solver, only: solve_on_lattice
-  use hc_coarse_change, only: prolong_state
+  use hc_coarse_change, only: prolong_state, prolong_displacement
   use hc_fas_predictor, only: predict
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_transfer, only: restrict_vector
@@ -166,6 +166,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: guess
+    real(wp), allocatable :: estimate(:, :, :)
     real(wp) :: work, coarse_work
     integer :: sweeps
     logical :: guessed, touching
@@ -188,9 +189,10 @@ contains
     guessed = .false.
     if (size(self%operators) > 1) then
       if (touching) then
-        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, guessed, coarse_work, error)
+        call predict(self%problem, self%coarse, self%operators(2:), start, reference, target, guess, guessed, coarse_work, error, &
+                     estimate)
       else
-        call coarse_guess(self, reference, target, max_sweeps, guess, coarse_work, error)
+        call coarse_guess(self, reference, target, max_sweeps, guess, coarse_work, estimate, error)
         guessed = .not. allocated(error)
         if (guessed) guessed = self%problem%space%max(guess%pressure) > 0.0_wp
       end if
@@ -221,7 +223,8 @@ contains
       !> State to start from, whose tractions are freed
       type(contact_state_t), intent(inout) :: from
 
-      call solve_on_lattice(self%problem, self%operators(1), from, reference, target, tolerance, max_sweeps, state, error)
+      call solve_on_lattice(self%problem, self%operators(1), from, reference, target, tolerance, max_sweeps, state, error, &
+                            estimate)
       sweeps = sweeps + state%sweeps
       work = work + state%operator_applications
     end subroutine attempt
@@ -229,7 +232,7 @@ contains
   end subroutine solve_step
 
   !> Find a first guess on the coarser lattices.
-  subroutine coarse_guess(self, reference, target, max_sweeps, guess, work, error)
+  subroutine coarse_guess(self, reference, target, max_sweeps, guess, work, estimate, error)
     class(frictional_contact_t), intent(inout), target :: self
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
     real(wp), intent(in), contiguous :: reference(:, :, :)
@@ -241,6 +244,8 @@ contains
     type(contact_state_t), intent(inout) :: guess
     !> Work, in applications of the full operator on the finest lattice
     real(wp), intent(out) :: work
+    !> w, u_x, u_y of that state, but for an error of interpolation, if it has any tractions (n_col, n_row, 3) [m]
+    real(wp), allocatable, intent(out) :: estimate(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
@@ -249,6 +254,7 @@ contains
     end type field_t
     type(contact_state_t) :: state, coarser
     type(field_t) :: origin(size(self%operators))
+    real(wp), allocatable :: known(:, :, :)
     integer :: l
 
     work = 0.0_wp
@@ -262,16 +268,37 @@ contains
         if (.not. problem%is_pressed(target)) cycle
         call new_friction_state(state, problem%lattice, problem%space)
         state%motion = guess%motion
-        if (allocated(coarser%pressure)) call prolong_state(self%coarse(l + 1), coarser, problem, state)
+        if (allocated(coarser%pressure)) call continue_from(self%coarse(l + 1), coarser, problem, state)
         call solve_on_lattice(problem, self%operators(l), state, origin(l)%value, target, &
-                              problem%options%multilevel%nested_tolerance, max_sweeps, coarser, error)
+                              problem%options%multilevel%nested_tolerance, max_sweeps, coarser, error, known, as_start=.true.)
         if (allocated(error)) return
         work = work + coarser%operator_applications*problem%lattice%size()/self%problem%lattice%size()
         ! what is no solution is no start
-        if (.not. coarser%converged) deallocate (coarser%pressure)
+        if (coarser%converged) cycle
+        deallocate (coarser%pressure)
+        if (allocated(known)) deallocate (known)
       end associate
     end do
-    if (allocated(coarser%pressure)) call prolong_state(self%coarse(2), coarser, self%problem, guess)
+    if (allocated(coarser%pressure)) call continue_from(self%coarse(2), coarser, self%problem, guess)
+    call move_alloc(known, estimate)
+
+  contains
+
+    !> Prolong a state, and the displacements that are known of it.
+    subroutine continue_from(coarse_problem, coarse, problem, state)
+      type(friction_problem_t), intent(in) :: coarse_problem, problem
+      type(contact_state_t), intent(in) :: coarse
+      type(contact_state_t), intent(inout) :: state
+      real(wp), allocatable :: moved(:, :, :)
+
+      call prolong_state(coarse_problem, coarse, problem, state)
+      call move_alloc(known, moved)
+      if (.not. allocated(moved)) return
+      if (any(shape(moved(:, :, 1)) /= coarse_problem%lattice%extent)) return
+      allocate (known(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+      call prolong_displacement(coarse_problem, moved, problem, known)
+    end subroutine continue_from
+
   end subroutine coarse_guess
 
 end module hc_frictional_contact

@@ -6,7 +6,7 @@
 !>
 !> Equations: docs/theory/friction.md, (F2) to (F4).
 module hc_lattice_solver
-  use hc_precision, only: wp
+  use hc_precision, only: wp, pi
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
   use hc_options, only: newton_options_t
@@ -27,7 +27,7 @@ module hc_lattice_solver
 contains
 
   !> Sweep on one lattice until the residuals are small.
-  subroutine solve_on_lattice(problem, operators, start, reference, target, tolerance, max_sweeps, state, error)
+  subroutine solve_on_lattice(problem, operators, start, reference, target, tolerance, max_sweeps, state, error, estimate, as_start)
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners
@@ -46,17 +46,24 @@ contains
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
+    !> w, u_x, u_y of the start but for an error of interpolation (n_col, n_row, 3), if known: saves their product; those of
+    !> the solution, if that is a start itself, else freed [m]
+    real(wp), allocatable, intent(inout), optional :: estimate(:, :, :)
+    !> The solution is only a start of another one: judged by the displacements that the solvers carry along
+    logical, intent(in), optional :: as_start
 
     type(friction_iterate_t), target :: now
     real(wp), allocatable :: displacement(:, :, :)
     type(newton_options_t) :: options
     integer :: sweep, fixed, staggered
-    logical :: failed
+    logical :: failed, judged, known
 
     options = problem%options%newton
     fixed = 0
+    judged = .true.
+    if (present(as_start)) judged = .not. as_start
     call operators%reset()
-    call now%set_start(problem, operators, start, reference, target, tolerance, error)
+    call now%set_start(problem, operators, start, reference, target, tolerance, error, estimate)
     if (allocated(error)) return
     deallocate (start%pressure, start%traction)
     ! sweeps that find pressure and shear traction one after the other
@@ -93,9 +100,19 @@ contains
       call record(now, state)
       state%motion = now%motion
       allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
-      call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
-      if (allocated(error)) return
-      call problem%complete_state(target, tolerance, reference, displacement, state)
+      known = .not. judged
+      if (judged .and. tolerance >= options%carried_tolerance) known = cut_off(now, state) <= options%cut_share*tolerance
+      if (known) then
+        call collect(now, displacement)
+        call problem%complete_state(target, merge(1.0_wp - options%cut_share, 1.0_wp, judged)*tolerance, reference, &
+                                    displacement, state)
+      end if
+      if (.not. known .or. (judged .and. .not. state%converged)) then
+        call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
+        if (allocated(error)) return
+        call problem%complete_state(target, tolerance, reference, displacement, state)
+      end if
+      if (present(estimate) .and. .not. judged) estimate = displacement
       deallocate (displacement)
       if (state%converged .or. now%unsupported .or. fixed >= options%max_fixed_sweeps) exit
       call now%refresh(error)
@@ -134,5 +151,59 @@ contains
     end do
     !$omp end parallel do
   end subroutine record
+
+  !> Collect the displacements that the solvers carry along.
+  subroutine collect(now, displacement)
+    type(friction_iterate_t), intent(in) :: now
+    !> w, u_x, u_y (n_col, n_row, 3) [m]
+    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    integer :: n, row, from, to
+
+    n = size(now%p)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
+    do row = 1, size(displacement, 2)
+      to = row*size(displacement, 1)
+      from = to - size(displacement, 1) + 1
+      displacement(:, row, 1) = now%w(from:to) + now%closing(from:to)
+      displacement(:, row, 2) = now%u(from:to)
+      displacement(:, row, 3) = now%u(n + from:n + to)
+    end do
+    !$omp end parallel do
+  end subroutine collect
+
+  !> Bound the displacement by what the recorded tractions lack of those of the iterate, as a residual.
+  !>
+  !> No distribution of a traction that is nowhere larger than t, and in the sum T, displaces more than the disc of radius
+  !> (T/(pi t))^1/2 on which it is t.
+  real(wp) function cut_off(now, state)
+    type(friction_iterate_t), intent(in) :: now
+    type(contact_state_t), intent(in) :: state
+    real(wp) :: largest, total, less, compliance
+    integer :: n, row, col, i
+
+    n = size(now%p)
+    largest = 0.0_wp
+    total = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(col, i, less) &
+    !$omp& reduction(max: largest) reduction(+: total)
+    do row = 1, size(state%pressure, 2)
+      do col = 1, size(state%pressure, 1)
+        i = (row - 1)*size(state%pressure, 1) + col
+        less = abs(state%pressure(col, row) - now%p(i)) + abs(state%traction(col, row, 1) - now%q(i)) &
+               + abs(state%traction(col, row, 2) - now%q(n + i))
+        largest = max(largest, less)
+        total = total + less
+      end do
+    end do
+    !$omp end parallel do
+    associate (pair => now%problem%pair)
+      compliance = 2.0_wp*(abs(pair%lambda_1)*(1.0_wp + max(pair%gamma(), 0.0_wp)) + abs(pair%lambda_2))
+    end associate
+    cut_off = compliance*sqrt(pi*now%problem%lattice%cell_area()*total*largest)
+    cut_off = cut_off/(now%problem%normal_compliance*max(now%operators%space%max(state%pressure), tiny(1.0_wp)))
+    if (.not. now%problem%friction%resists()) return
+    cut_off = max(cut_off, cut_off*now%problem%normal_compliance*now%operators%space%max(state%pressure) &
+                  /(now%problem%tangential_compliance*now%traction_scale()))
+  end function cut_off
 
 end module hc_lattice_solver

@@ -86,7 +86,7 @@ contains
     type(newton_options_t) :: options
     real(wp) :: goal, scale, residual, drift, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations, outcome
-    logical :: changed, independent, searching, compliant, unknown_gap
+    logical :: changed, independent, searching, compliant, unknown_gap, estimated
 
     n = size(now%p)
     options = now%problem%options%newton
@@ -96,14 +96,27 @@ contains
     cell_area = now%problem%lattice%cell_area()
     n_constraint = merge(1, 0, now%target%control(normal) == force_control)
     level = merge(0.0_wp, now%motion(normal), n_constraint == 1)
+    estimated = now%estimated
+    now%estimated = .false.
     do area = 1, merge(options%max_areas, options%max_areas_uncoupled, now%pressure_feels_shear .and. .not. searching)
       call now%find_gap(gap)
       now%residual_normal = now%gap_residual(gap)
       missing = 0.0_wp
       carried = now%pressure%space%sum(now%p)
       if (n_constraint == 1) missing = now%target%value(normal)/cell_area - carried
-      if (now%residual_normal <= options%final_accuracy*now%tolerance .and. &
-          abs(missing(1)) <= options%final_accuracy*now%tolerance*carried) return
+      if (now%residual_normal <= options%final_pressure*now%tolerance .and. &
+          abs(missing(1)) <= options%final_pressure*now%tolerance*carried) then
+        if (.not. estimated) return
+        ! a pressure that may stay as it is, if that is so without errors of interpolation
+        estimated = .false.
+        call now%pressure%product(now%p, now%w, error)
+        if (allocated(error)) return
+        call now%pressure%stretch(-1.0_wp, now%p, now%w)
+        call now%find_gap(gap)
+        now%residual_normal = now%gap_residual(gap)
+        if (now%residual_normal <= options%final_pressure*now%tolerance) return
+      end if
+      estimated = .false.
       changed = now%first .and. area == 1
       if (.not. (changed .and. now%without_start)) then
         call find_contact(now, gap, contact)
@@ -140,7 +153,7 @@ contains
         call now%pressure%stretch(1.0_wp, now%p, now%w)
       end if
       if (compliant) rhs = rhs - now%pressure%offset
-      goal = options%final_accuracy*now%tolerance
+      goal = options%final_pressure*now%tolerance
       if (changed .or. compliant .or. now%pressure_feels_shear) then
         goal = max(options%pressure_accuracy*min(now%residual_normal, 1.0_wp), goal)
       end if

@@ -17,7 +17,7 @@ module hc_transfer
 contains
 
   !> Interpolate a field from the coarse to the fine lattice; zero outside the coarse window.
-  subroutine prolong(coarse_lattice, coarse, fine_lattice, fine, space)
+  subroutine prolong(coarse_lattice, coarse, fine_lattice, fine, space, beyond)
     !> Coarse lattice and window
     type(lattice_t), intent(in) :: coarse_lattice
     !> Coarse field (n_col, n_row)
@@ -28,8 +28,13 @@ contains
     real(wp), intent(out) :: fine(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
+    !> Beyond the coarse window there are the values at its rim; default: zero
+    logical, intent(in), optional :: beyond
     integer :: col, row, i, j
+    logical :: held
 
+    held = .false.
+    if (present(beyond)) held = beyond
     !$omp parallel do schedule(static) private(col, i, j) num_threads(space%threads_for(size(fine)))
     do row = 1, size(fine, 2)
       j = fine_lattice%first(2) + row - 1
@@ -57,6 +62,7 @@ contains
       integer :: c(2)
 
       c = [fine_col, fine_row]/2 - coarse_lattice%first + 1
+      if (held) c = min(max(c, 1), coarse_lattice%extent)
       at = 0.0_wp
       if (all(c >= 1) .and. all(c <= coarse_lattice%extent)) at = coarse(c(1), c(2))
     end function at

@@ -8,11 +8,14 @@ import pstats
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from bench import counts, problems
 
 from hexcontact import Case
 from hexcontact.core import memory
+from hexcontact.core.calls import called
+from hexcontact.core.friction import MOTION, _api
 from hexcontact.surfaces import Sphere
 
 BOUNDS = counts.bounds()
@@ -29,6 +32,24 @@ def test_every_problem_has_bounds_on_its_meshes() -> None:
 )
 def test_work_stays_below_its_bound(name: str, mesh: int, bound: float) -> None:
     assert problems.count(name, mesh) <= bound
+
+
+@pytest.mark.parametrize("name", ["HC", "DS", "N30"])
+def test_loose_tolerance_records_the_displacements_of_its_tractions(name: str) -> None:
+    """Compare with a product: 0.05 of the tolerance (`cut_share`) may be cut off; a node moves 1.5 l_e p/E*."""
+    problem, lattice, tolerance = problems.FRICTIONAL[name], problems.window(20), 1e-4
+    contact = problems.frictional_contact(problem.material, lattice)
+    state = contact.virgin()
+    for press, shear in problem.steps:
+        load = press * problems.LOAD
+        target = (load, shear * problem.material.friction * load, 0.0, 0.0)
+        state = contact.advance(state, problems.FORCE, target, tolerance=tolerance)
+    columns = contact._columns(state)  # pressure and traction, gap, relative displacement
+    motion = [getattr(state, name) for name in MOTION]
+    moved = called(_api.relative_displacement, contact._handle, columns[:, :3], motion)
+    moved[:, 0] += problems.parabola(lattice).ravel()
+    node = 1.5 * lattice.spacing * state.pressure.max()
+    assert np.abs(moved - columns[:, 3:6]).max() < 0.05 * tolerance * node
 
 
 def small(steps: int = 1) -> Case:

@@ -11,7 +11,6 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..solve import interruption
@@ -38,12 +37,8 @@ def main() -> None:
     # OpenBLAS for 2^26 cycles after it was loaded, though a run with transforms gives them nothing to do.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "20")
-    # Plugins of pydantic watch the models of other programs; looking for them reads every installed package,
-    # and what looks takes 10 ms to import.
-    if os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1") == "1":
-        none = ModuleType("pydantic.plugin._loader")
-        none.get_plugins = tuple  # type: ignore[attr-defined]
-        sys.modules.setdefault(none.__name__, none)
+    # Plugins of pydantic watch the models of other programs; looking for them reads every installed package.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     # Most objects of a short process are functions and classes of modules, which stay: with Python's own
     # threshold of 700 a sixth of the time of `check` goes into looking for garbage among them.
     gc.set_threshold(50_000)

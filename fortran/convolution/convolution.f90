@@ -53,10 +53,8 @@ module hc_convolution
     type(c_ptr), private :: row_plan = c_null_ptr, column_plan = c_null_ptr
     !> Address of the object that frees them: its copies, which use the same plans and spectra, do not
     integer(c_intptr_t), private :: owner = 0
-    !> Row transforms (leading, n_row or one more, component), in memory that convolutions may share
-    complex(wp), pointer, contiguous, private :: work(:, :, :) => null()
-    !> The same, the rows of a component one after the other
-    complex(wp), pointer, contiguous, private :: lines(:, :) => null()
+    !> Row transforms (leading, n_row or one more, component), in memory that convolutions may share; the same as vectors
+    complex(wp), pointer, contiguous, private :: work(:, :, :) => null(), lines(:, :) => null()
     type(scratch_t), pointer, private :: scratch => null()
     !> Two padded rows before and after their transform, for each thread
     complex(wp), allocatable, private :: row_buffer(:, :, :)
@@ -110,7 +108,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     !> The first odd kernel; absent: all are even
     integer, intent(in), optional :: first_odd
-
     integer :: stat
 
     self%owner = address(self)
@@ -124,16 +121,12 @@ contains
     self%width = block_width(padded(2))
     self%n_block = (self%n_frequency + self%width - 1)/self%width
     self%leading = self%n_block*self%width
-    if (associated(space%scratch)) then
-      self%scratch => space%scratch
-    else
-      allocate (self%scratch)
-    end if
+    self%scratch => space%scratch
+    if (.not. associated(self%scratch)) allocate (self%scratch)
     call self%scratch%reserve(int(self%leading, int64)*even(extent(2))*n_component*(storage_size((1.0_wp, 0.0_wp))/8), stat)
-    associate (column => self%width*padded(2))
-      if (stat == 0) allocate (self%row_buffer(padded(1), 2, space%threads), &
-                               self%block_buffer(column, n_component, 2, space%threads), source=(0.0_wp, 0.0_wp), stat=stat)
-    end associate
+    if (stat == 0) allocate (self%row_buffer(padded(1), 2, space%threads), source=(0.0_wp, 0.0_wp), stat=stat)
+    if (stat == 0) allocate (self%block_buffer(self%width*padded(2), n_component, 2, space%threads), source=(0.0_wp, 0.0_wp), &
+                             stat=stat)
     if (stat /= 0) then
       call raise(error, status%resources, 'not enough memory for the transforms: use a smaller window')
       return
@@ -220,7 +213,6 @@ contains
     class(kernel_source_t), intent(in) :: source
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-
     complex(wp), allocatable :: rows(:, :, :)
     real(wp), allocatable :: kernel(:, :, :)
     real(wp) :: scale, sign
@@ -311,7 +303,6 @@ contains
     real(wp), intent(in), contiguous :: field(:, :, :)
     !> Sums of the convolutions (n_col, n_row, onto)
     real(wp), intent(out), contiguous :: result(:, :, :)
-
     integer :: n(2), i, o, row, b, thread
 
     n = self%extent
@@ -389,7 +380,6 @@ contains
     integer, intent(in) :: kernel(:, :)
     !> Index of the thread, whose buffer is used
     integer, intent(in) :: thread
-
     integer :: i, o, first, last
 
     first = (b - 1)*self%width + 1
@@ -399,13 +389,11 @@ contains
         call gather_columns(self%width, self%extent(2), self%leading, self%padded(2), self%lines(first:last, i), given(:, i))
         call fftw_execute_dft(self%column_plan, given(:, i), transformed(:, i))
       end do
-
       if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
         call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
       else
         call multiply(self%spectrum(:, b, :), self%first_odd, kernel, transformed, given)
       end if
-
       do o = 1, size(kernel, 1)
         call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))
         call scatter_columns(self%width, self%extent(2), self%padded(2), self%leading, transformed(:, o), &
@@ -456,8 +444,6 @@ contains
     self%column_plan = c_null_ptr
     self%spectrum => null()
     call release(self%shared)
-    self%work => null()
-    self%lines => null()
     call release_scratch(self%scratch)
   end subroutine free
 

@@ -5,8 +5,8 @@ module hc_f2py_wear
   use hc_f2py_handles, only: report, pair_of, normal_law_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_step_error, only: step_change_t
-  use hc_wear_jumps, only: wear_by, jump_change, expect_end, remember_end
-  use hc_wear_ahead, only: worn_cycle_t, energy_ahead, energy_of_second_jump
+  use hc_wear_jumps, only: wear_by, jump_change, energy_of_second_jump, expect_end, remember_end
+  use hc_wear_ahead, only: worn_cycle_t, energy_ahead
   implicit none
   private
 

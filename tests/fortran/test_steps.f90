@@ -19,8 +19,7 @@ module test_steps
   use hc_contact_residuals, only: normal_self_compliance
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
-  use hc_wear_ahead, only: energy_of_second_jump
-  use hc_wear_jumps, only: jump_change, wear_by
+  use hc_wear_jumps, only: energy_of_second_jump, jump_change, wear_by
   use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
     oblique_error, oblique_steps, slip_ring
   use test_friction, only: new_sphere

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hexcontact
-from hexcontact import Case, DeckError
+from hexcontact import Case, DeckError, ElasticPair, NormalContact
 from hexcontact.deck.write import starter
 
 MODULUS, RADIUS, CONTACT, MU, WEAR = 1e11, 1e-2, 1e-4, 0.5, 1e-14
@@ -54,7 +54,8 @@ def test_worn_volume_is_that_of_the_dissipated_work(mu: float | str) -> None:
 
 def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     # V. L. Popov, Sci. Rep. 4 (2014) 3749: P = 2 E* (d c - c^3/(3 R)) on the disc that sticks
-    found = worn(fretting(nodes_in_radius=10, wear={"cycles": 10**7, "tolerance": 0.3}).run())
+    result = fretting(nodes_in_radius=10, wear={"cycles": 10**7, "tolerance": 0.3}).run()
+    found = worn(result)
     last = found.isel(step=-1)
     limit = 2 * EFFECTIVE * (APPROACH * STICK - STICK**3 / (3 * RADIUS))
     # the edge of the disc is known to 0.3 spacings, 5 % of its radius; validation/wear.py has finer lattices
@@ -64,6 +65,17 @@ def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     assert not last["pressure"].values[r > STICK + spacing].any()
     assert not last["worn_depth"].values[r < STICK - spacing].any()
     assert float(found["normal_load"][0]) > 1.2 * limit
+    # beyond the nodes that stuck it just touches: 0.13 % from there; 3 % if jumps wear by the pressure before them
+    stuck = last["worn_depth"].values == 0.0
+    disc = NormalContact(
+        result.lattice,
+        ElasticPair.from_materials(MODULUS, 0.0, MODULUS, 0.0),
+        last["initial_gap"].values,
+        stuck & (r < STICK + spacing),
+        rim_warning=False,
+    )
+    depth = np.where(stuck, 0.0, np.maximum(-disc.solve(approach=APPROACH).gap, 0.0))
+    assert np.abs(last["worn_depth"] - depth).max() < 0.01 * depth.max()
 
 
 def test_halved_jumps_change_the_depth_as_stated() -> None:
@@ -134,14 +146,13 @@ def test_cycle_without_slip_is_refused_when_it_is_known() -> None:
 
 def test_cycle_that_is_computed_afterwards_is_the_one_that_wears() -> None:
     press, cycle = {"approach": APPROACH, "shift_x": 0.0}, {"label": "fretting", "path": CYCLE}
-    twice = fretting(wear={"cycles": 1000, "jump": 1000}).deck_text
+    twice = fretting(wear={"cycles": 1, "jump": 1}).deck_text
     twice = twice[: twice.index("[wear]")] + "[output]" + twice.partition("[output]")[2]
     found = Case.from_text(twice, overrides={"load": [press, cycle, cycle]}).run().wear(WEAR, "fretting")
-    last = worn(fretting(wear={"cycles": 1000, "jump": 1000}).run()).isel(step=-1)
+    last = worn(fretting(wear={"cycles": 1, "jump": 1}).run()).isel(step=-1)
     # that cycle is solved to 3e-4 only: what this leaves in the depth
-    for name, times in (("worn_depth", 1000), ("wear_volume", 1000)):
-        off = np.abs(times * found[name] - last[name]).max() / np.abs(last[name]).max()
-        assert off < 1e-4
+    for name in ("worn_depth", "wear_volume"):
+        assert np.abs(found[name] - last[name]).max() < 1e-4 * np.abs(last[name]).max()
     # |q| = mu p, opposed to the slip
     assert np.abs(WEAR / MU * found["cycle_dissipation_density"] - found["worn_depth"]).max() < 1e-6 * float(
         found["worn_depth"].max()

@@ -230,10 +230,11 @@ class WearPath(GivenPath):
 
     def _halfway(self, cycle: _Cycle, until: float) -> tuple[Change, _Cycle]:
         """Return the cycle between two jumps, which knows the second one, and what their size changes."""
-        jump = 0.5 * (until - cycle.cycles)
-        after = self._solved(cycle, cycle.cycles + jump, self._ahead(cycle, jump))
-        cycle, window = cycle.on(self.window), self.window
-        energies = (*(self._ahead(each, jump) for each in (cycle, after)), self._ahead(cycle, 2.0 * jump))
+        jump, cycle = 0.5 * (until - cycle.cycles), cycle.on(self.window)
+        first, both = (self._ahead(cycle, times * jump) for times in (1.0, 2.0))
+        after = self._solved(cycle, cycle.cycles + jump, first)
+        first, both = (cycle.lattice.embed(values, after.lattice, 0.0) for values in (first, both))
+        energies = first, self._ahead(after, jump), both
         change, slower, second = self._change(cycle, energies, after.path, jump)
         return change, dataclasses.replace(after, change=after.change + slower, until=until, ahead=second)
 

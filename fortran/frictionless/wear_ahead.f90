@@ -5,21 +5,16 @@
 !> never takes more than there is pressure left to take away, however long the jump. The change from the
 !> pressure of the cycle is all that is solved for, so that shear tractions and bulk strains, which stay, need not be known.
 !>
-!> The second of two equal jumps is corrected by what the two and one of both differ by, (V8), and so of the second order.
-!>
-!> Equations: docs/theory/wear.md, (V3), (V7), (V8).
+!> Equations: docs/theory/wear.md, (V3), (V7).
 module hc_wear_ahead
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
-  use hc_flexibility, only: normal
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control
-  use hc_contact_residuals, only: normal_self_compliance
   use hc_normal_law, only: normal_law_t
   use hc_nodal_springs, only: nodal_springs_t
   use hc_normal_lattice, only: normal_lattice_t
@@ -28,7 +23,7 @@ module hc_wear_ahead
   implicit none
   private
 
-  public :: worn_cycle_t, energy_ahead, energy_of_second_jump
+  public :: worn_cycle_t, energy_ahead
 
   !> What is known at the end of a cycle; fields over the window (n_col, n_row).
   type :: worn_cycle_t
@@ -174,38 +169,5 @@ contains
     end if
     after = state%pressure
   end subroutine settle
-
-  !> Correct the energy by which the second of two equal jumps wears, (V5).
-  !>
-  !> Never more than what the pressure that is left indents a node, and never less than nothing.
-  pure subroutine energy_of_second_jump(lattice, pair, path, coefficient, cycles, first, second, both, corrected)
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Elastic constants
-    type(elastic_pair_t), intent(in) :: pair
-    !> Path of slip of the cycle between the two (n_col, n_row) [m]
-    real(wp), intent(in) :: path(:, :)
-    !> Coefficient of wear [m^2/N]
-    real(wp), intent(in) :: coefficient
-    !> Cycles of each jump
-    real(wp), intent(in) :: cycles
-    !> Energy by area of each cycle in the first and the second jump, and in one that is as long as both (n_col, n_row) [J/m^2]
-    real(wp), intent(in) :: first(:, :), second(:, :), both(:, :)
-    !> That of the second jump, corrected (n_col, n_row) [J/m^2]
-    real(wp), intent(out) :: corrected(:, :)
-    real(wp) :: node, most
-    integer :: col, row
-
-    node = normal_self_compliance(lattice, pair)
-    do row = 1, size(corrected, 2)
-      do col = 1, size(corrected, 1)
-        corrected(col, row) = second(col, row)
-        if (.not. (second(col, row) > 0.0_wp .and. path(col, row) > 0.0_wp .and. cycles > 0.0_wp)) cycle
-        ! d_n p mu/(n k) with p = e/(mu S)
-        most = node*second(col, row)/(path(col, row)*cycles*coefficient)
-        corrected(col, row) = max(second(col, row) + min(first(col, row) + second(col, row) - 2.0_wp*both(col, row), most), 0.0_wp)
-      end do
-    end do
-  end subroutine energy_of_second_jump
 
 end module hc_wear_ahead

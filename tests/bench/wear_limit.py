@@ -19,10 +19,10 @@ MODULUS, RADIUS, CONTACT, MU = 1e11, 1e-2, 1e-4, 0.5
 APPROACH, STICK = CONTACT**2 / RADIUS, 0.6 * CONTACT
 
 
-def limiting_depth(r: Any) -> Any:
+def limiting_depth(r: Any, stick: float = STICK) -> Any:
     """Return the depth beyond the disc that sticks at which nothing is carried any more."""
-    angle, root = np.arcsin(STICK / r), np.sqrt(r**2 - STICK**2)
-    gap = (r**2 * angle - STICK * root) / np.pi / RADIUS + APPROACH * (1.0 - 2.0 * angle / np.pi)
+    angle, root = np.arcsin(stick / r), np.sqrt(r**2 - stick**2)
+    gap = (r**2 * angle - stick * root) / np.pi / RADIUS + APPROACH * (1.0 - 2.0 * angle / np.pi)
     return np.maximum(gap - r**2 / (2.0 * RADIUS), 0.0)
 
 
@@ -69,13 +69,13 @@ def main() -> None:
         ring = (r > STICK + away * spacing) & (r < 1.2 * CONTACT)
         if not ring.any():
             continue
-        exact = limiting_depth(r[ring])
-        pairs = ((depth[ring], exact), (on_lattice[ring], exact), (depth[ring], on_lattice[ring]))
-        whole, lattice, jumps = (abs(one - other).max() / largest for one, other in pairs)
+        exact, same = limiting_depth(r[ring]), limiting_depth(r[ring], radius)
+        pairs = ((depth[ring], exact), (depth[ring], same), (depth[ring], on_lattice[ring]))
+        whole, by_capacity, jumps = (abs(one - other).max() / largest for one, other in pairs)
         carried = pressure[ring].max() / pressure.max()
         print(
-            f"beyond c + {away:g} spacings: depth {whole:.2%}, lattice {lattice:.2%}, jumps {jumps:.3%}, "
-            f"pressure {carried:.2%}"
+            f"beyond c + {away:g} spacings: depth {whole:.2%}, by the radius of that disc {by_capacity:.2%}, "
+            f"by the lattice {jumps:.3%}, pressure {carried:.2%}"
         )
 
 

@@ -62,7 +62,8 @@ def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     assert float(last["normal_load"]) == pytest.approx(limit, rel=0.04)
     r = np.hypot(last["x"], last["y"]).values
     spacing = float(found.attrs["lattice_spacing"])
-    assert not last["pressure"].values[r > STICK + spacing].any()
+    # there it just touches, to the residuals of a cycle
+    assert last["pressure"].values[r > STICK + spacing].max() < 3e-3 * last["pressure"].max()
     assert not last["worn_depth"].values[r < STICK - spacing].any()
     assert float(found["normal_load"][0]) > 1.2 * limit
     # beyond the nodes that stuck it just touches: 0.13 % from there; 3 % if jumps wear by the pressure before them

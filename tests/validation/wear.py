@@ -78,7 +78,9 @@ def wear() -> Comparison:
     rigid = NormalContact(cycles.attrs["lattice"], pair, last["initial_gap"].values, disc, rim_warning=False)
     touching = np.where(disc, 0.0, np.maximum(-rigid.solve(approach=APPROACH).gap, 0.0))
     by_jumps = abs(depth - touching).max() / depth.max()
-    found.add(f"{case}, all nodes", "depth less the lattice's limit", "-", by_jumps, analytic=0.0, absolute=0.01)
+    found.add(
+        f"{case}, all nodes", "depth less the lattice's limit", "-", by_jumps, analytic=0.0, absolute=0.01
+    )
     away = r > c + 2.0 * spacing
     off = abs(depth[away] - _depth(r[away], c)).max() / depth.max()
     found.add(f"{case}, 2 spacings beyond c", "depth less (V5)", "-", off, analytic=0.0, absolute=0.01)

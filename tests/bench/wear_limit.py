@@ -1,7 +1,7 @@
 """Limiting shape of a sphere that wears in partial slip, against its closed form (docs/theory/wear.md, V5).
 
-The limit on the lattice is the gap beyond a rigid disc of the nodes that were not worn: what separates it from the
-closed form is the lattice, what separates the run from it is the jumps.
+The limit on the lattice is the gap beyond a rigid disc of the nodes that were not worn: what separates it
+from the closed form is the lattice, what separates the run from it is the jumps.
 
 OMP_NUM_THREADS=1 python tests/bench/wear_limit.py [NODES] [TOLERANCE] [CYCLES]
 """
@@ -27,7 +27,7 @@ def limiting_depth(r: Any, stick: float = STICK) -> Any:
 
 
 def limit_on_lattice(lattice: Any, gap: Any, disc: Any) -> tuple[Any, float]:
-    """Return the depth beyond a disc of nodes at which nothing is carried any more, and the radius of its capacity."""
+    """Return the depth beyond a disc of nodes that carries all, and the radius of a punch as stiff as it."""
     pair = ElasticPair.from_materials(MODULUS, 0.0, MODULUS, 0.0)
     worn = NormalContact(lattice, pair, gap, disc, rim_warning=False).solve(approach=APPROACH)
     punch = NormalContact(lattice, pair, 0.0 * gap, disc, rim_warning=False).solve(approach=APPROACH)

@@ -66,7 +66,7 @@ def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     assert last["pressure"].values[r > STICK + spacing].max() < 3e-3 * last["pressure"].max()
     assert not last["worn_depth"].values[r < STICK - spacing].any()
     assert float(found["normal_load"][0]) > 1.2 * limit
-    # beyond the nodes that stuck it just touches: to 0.13 % here, to 3 % after jumps by the pressure before them
+    # beyond the nodes that stuck it just touches: to 0.13 %, 3 % after jumps by the pressure before them
     stuck = last["worn_depth"].values == 0.0
     disc = NormalContact(
         result.lattice,

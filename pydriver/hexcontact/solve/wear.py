@@ -233,8 +233,8 @@ class WearPath(GivenPath):
         jump, cycle = 0.5 * (until - cycle.cycles), cycle.on(self.window)
         first, both = (self._ahead(cycle, times * jump) for times in (1.0, 2.0))
         after = self._solved(cycle, cycle.cycles + jump, first)
-        first, both = (cycle.lattice.embed(values, after.lattice, 0.0) for values in (first, both))
-        energies = first, self._ahead(after, jump), both
+        one, two = (np.asarray(cycle.lattice.embed(each, after.lattice, 0.0)) for each in (first, both))
+        energies = one, self._ahead(after, jump), two
         change, slower, second = self._change(cycle, energies, after.path, jump)
         return change, dataclasses.replace(after, change=after.change + slower, until=until, ahead=second)
 
@@ -262,7 +262,7 @@ class WearPath(GivenPath):
     # --- cycles -------------------------------------------------------------------------------------------
 
     def _solved(self, cycle: _Cycle, until: float, worn_by: Array) -> _Cycle:
-        """Wear the surfaces by an energy a cycle until a number of cycles is done, and solve the cycle then."""
+        """Wear the surfaces by an energy a cycle until some cycles are done, and solve the cycle then."""
         cycle, jump = cycle.on(self.window), until - cycle.cycles
         depth, *_ = self._worn(cycle, worn_by, jump)
         window = self.window

@@ -1,14 +1,15 @@
 !> Wear of the surfaces by fretting cycles, of which one stands for many.
 !>
-!> A cycle of the loads is solved with the gap as it is worn, and wears the surfaces as often as the jump says, (V3). Two
-!> jumps of n cycles are compared with one of 2 n, (V4); what they change decides, through hc_step_control, how large the
-!> next jump is:
+!> A cycle of the loads is solved with the gap as it is worn, and wears the surfaces as often as the jump says, (V3), with
+!> its pressure as it will be then (hc_wear_ahead). Two jumps of n cycles are compared with one of 2 n, (V4); what they change
+!> decides, through hc_step_control, how large the next jump is, and corrects the second one, (V8), which makes the two of the
+!> second order:
 !>
-!>     energy = dissipation density of one cycle at the depth at hand
+!>     call energy_ahead(cycle, ..., cycles, ..., energy)
 !>     call wear_by(energy, coefficient, friction, cycles, area, depth, volume)
-!>     change = jump_change(energy, energy of the cycle after half the jump, ...)
+!>     call jump_change(..., energy, that of the second jump, that of one jump of both, ..., slower, change)
 !>
-!> Equations: docs/theory/wear.md, (V1) to (V4).
+!> Equations: docs/theory/wear.md, (V1) to (V4), (V8).
 module hc_wear_jumps
   use hc_precision, only: wp, sp
   use hc_options, only: step_options_t
@@ -19,7 +20,7 @@ module hc_wear_jumps
   implicit none
   private
 
-  public :: archard_depth, wear_by, jump_change, expect_end, remember_end
+  public :: archard_depth, wear_by, jump_change, energy_of_second_jump, expect_end, remember_end
 
 contains
 
@@ -57,15 +58,15 @@ contains
     volume = area*sum(depth)
   end subroutine wear_by
 
-  !> What two jumps change in comparison with one of both, (V4): the root mean square of the depth, over what the largest
-  !> pressure indents one node, as tractions that the step adds.
-  pure subroutine jump_change(lattice, pair, energy, energy_after, coefficient, friction, cycles, p_max, change)
+  !> Compute what two jumps change in comparison with one of both, (V4): the depth, and its root mean square over what the
+  !> largest pressure indents one node, as tractions that the step adds.
+  pure subroutine jump_change(lattice, pair, first, second, both, coefficient, friction, cycles, p_max, slower, change)
     !> Lattice
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants
     type(elastic_pair_t), intent(in) :: pair
-    !> Dissipated energy by area of the cycles before the first and the second jump (n_col, n_row) [J/m^2]
-    real(wp), intent(in) :: energy(:, :), energy_after(:, :)
+    !> Energy by area of each cycle in the first and the second jump, and in one that is as long as both (n_col, n_row) [J/m^2]
+    real(wp), intent(in) :: first(:, :), second(:, :), both(:, :)
     !> Coefficient of wear [m^2/N]
     real(wp), intent(in) :: coefficient
     !> Coefficient of friction (n_col, n_row)
@@ -74,16 +75,51 @@ contains
     real(wp), intent(in) :: cycles
     !> Largest pressure [Pa]
     real(wp), intent(in) :: p_max
+    !> By how much the two wear more (n_col, n_row) [m]
+    real(wp), intent(out) :: slower(:, :)
     !> What it changes, for hc_step_control
     type(step_change_t), intent(out) :: change
     type(step_options_t) :: options
 
-    associate (error => cycles*archard_depth(energy_after - energy, coefficient, friction), &
-               n_wearing => count(energy > 0.0_wp .or. energy_after > 0.0_wp))
-      if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(sum(error**2)/n_wearing) &
+    slower = cycles*archard_depth((first - both) + (second - both), coefficient, friction)
+    associate (n_wearing => count(first > 0.0_wp .or. second > 0.0_wp .or. both > 0.0_wp))
+      if (p_max > 0.0_wp .and. n_wearing > 0) change%added = options%added_share*sqrt(sum(slower**2)/n_wearing) &
                                                               /(normal_self_compliance(lattice, pair)*p_max)
     end associate
   end subroutine jump_change
+
+  !> Correct the energy by which the second of two equal jumps wears, (V5).
+  !>
+  !> Never more than what the pressure that is left indents a node, and never less than nothing.
+  pure subroutine energy_of_second_jump(lattice, pair, path, coefficient, cycles, first, second, both, corrected)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants
+    type(elastic_pair_t), intent(in) :: pair
+    !> Path of slip of the cycle between the two (n_col, n_row) [m]
+    real(wp), intent(in) :: path(:, :)
+    !> Coefficient of wear [m^2/N]
+    real(wp), intent(in) :: coefficient
+    !> Cycles of each jump
+    real(wp), intent(in) :: cycles
+    !> Energy by area of each cycle in the first and the second jump, and in one that is as long as both (n_col, n_row) [J/m^2]
+    real(wp), intent(in) :: first(:, :), second(:, :), both(:, :)
+    !> That of the second jump, corrected (n_col, n_row) [J/m^2]
+    real(wp), intent(out) :: corrected(:, :)
+    real(wp) :: node, most
+    integer :: col, row
+
+    node = normal_self_compliance(lattice, pair)
+    do row = 1, size(corrected, 2)
+      do col = 1, size(corrected, 1)
+        corrected(col, row) = second(col, row)
+        if (.not. (second(col, row) > 0.0_wp .and. path(col, row) > 0.0_wp .and. cycles > 0.0_wp)) cycle
+        ! d_n p mu/(n k) with p = e/(mu S)
+        most = node*second(col, row)/(path(col, row)*cycles*coefficient)
+        corrected(col, row) = max(second(col, row) + min(first(col, row) + second(col, row) - 2.0_wp*both(col, row), most), 0.0_wp)
+      end do
+    end do
+  end subroutine energy_of_second_jump
 
   !> Expect the end of a load step of the next cycle, to start it from: the end in the cycle before, extrapolated linearly in the
   !> cycles. Given the load step before it, whose end is known by now, the pressure is the one there and what should

@@ -2,33 +2,17 @@
 module hc_f2py_wear
   use iso_c_binding, only: c_double, c_float, c_int
   use hc_error, only: error_t
-  use hc_f2py_handles, only: report, pair_of
+  use hc_f2py_handles, only: report, pair_of, normal_law_of, kernel_cache
   use hc_lattice, only: lattice_t, new_lattice
   use hc_step_error, only: step_change_t
-  use hc_wear_jumps, only: archard_depth, wear_by, jump_change, expect_end, remember_end
+  use hc_wear_jumps, only: wear_by, jump_change, energy_of_second_jump, expect_end, remember_end
+  use hc_wear_ahead, only: worn_cycle_t, energy_ahead
   implicit none
   private
 
-  public :: depth_of_energy, wear_of_cycles, change_by_jump, expected_end, remembered_end
+  public :: wear_of_cycles, energy_of_jump, change_by_jump, expected_end, remembered_end
 
 contains
-
-  !> Compute the depth that is worn off where friction dissipates an energy.
-  subroutine depth_of_energy(n_node, energy, coefficient, friction, depth)
-    !f2py threadsafe
-    !> Number of nodes
-    integer(c_int), intent(in) :: n_node
-    !> Dissipated energy by area [J/m^2]
-    real(c_double), intent(in) :: energy(n_node)
-    !> Coefficient of wear [m^2/N]
-    real(c_double), intent(in) :: coefficient
-    !> Coefficient of friction
-    real(c_double), intent(in) :: friction(n_node)
-    !> Depth [m]
-    real(c_double), intent(out) :: depth(n_node)
-
-    depth = archard_depth(energy, coefficient, friction)
-  end subroutine depth_of_energy
 
   !> Compute depth and volume after cycles that are all alike.
   subroutine wear_of_cycles(n_col, n_row, energy, coefficient, friction, cycles, area, depth, worn, volume, deepest)
@@ -54,9 +38,9 @@ contains
     deepest = maxval(worn)
   end subroutine wear_of_cycles
 
-  !> Compare two jumps with one of both.
-  subroutine change_by_jump(n_col, n_row, basis, lambda, energy, energy_after, coefficient, friction, cycles, p_max, &
-                            change, code, message)
+  !> Find the energy of a cycle by which a jump wears.
+  subroutine energy_of_jump(n_col, n_row, basis, lambda, interface, energy, path, pressure, gap, candidate, friction, by_load, &
+                            coefficient, cycles, tolerance, n_threads, ahead, code, message)
     !f2py threadsafe
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -64,8 +48,54 @@ contains
     real(c_double), intent(in) :: basis(2, 2)
     !> lambda_1, lambda_2, lambda_5 [1/Pa]
     real(c_double), intent(in) :: lambda(3)
-    !> Dissipated energy by area of the cycles before both jumps [J/m^2]
-    real(c_double), intent(in) :: energy(n_col, n_row), energy_after(n_col, n_row)
+    !> Coefficient [Pa/m^m] and exponent m of the normal compliance, both 0: bodies do not penetrate; tangential stiffness [Pa/m]
+    real(c_double), intent(in) :: interface(3)
+    !> Dissipated energy by area [J/m^2] and path of slip [m] of a cycle
+    real(c_double), intent(in) :: energy(n_col, n_row), path(n_col, n_row)
+    !> Pressure [Pa] and gap [m] at its end
+    real(c_double), intent(in) :: pressure(n_col, n_row), gap(n_col, n_row)
+    !> Not zero where a node may come into contact
+    integer(c_int), intent(in) :: candidate(n_col, n_row)
+    !> Coefficient of friction
+    real(c_double), intent(in) :: friction(n_col, n_row)
+    !> Not zero: the normal load is prescribed, not the approach
+    integer(c_int), intent(in) :: by_load
+    !> Coefficient of wear [m^2/N], cycles of the jump, bound of the residual of the pressure
+    real(c_double), intent(in) :: coefficient, cycles, tolerance
+    !> Threads to use; 0: as many as OpenMP would take
+    integer(c_int), intent(in) :: n_threads
+    !> Energy by area of each cycle [J/m^2]
+    real(c_double), intent(out) :: ahead(n_col, n_row)
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+
+    ahead = 0.0_c_double
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
+    if (.not. allocated(error)) then
+      call energy_ahead(worn_cycle_t(energy, path, pressure, gap, candidate /= 0, friction, by_load /= 0), lattice, &
+                        pair_of(lambda), normal_law_of(interface), coefficient, cycles, tolerance, ahead, error, n_threads, &
+                        kernel_cache)
+    end if
+    call report(error, code, message)
+  end subroutine energy_of_jump
+
+  !> Compare two jumps with one of both, and correct the second one.
+  subroutine change_by_jump(n_col, n_row, basis, lambda, energies, path, coefficient, friction, cycles, p_max, &
+                            change, slower, corrected, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows
+    integer(c_int), intent(in) :: n_col, n_row
+    !> Basis vectors as columns [m]
+    real(c_double), intent(in) :: basis(2, 2)
+    !> lambda_1, lambda_2, lambda_5 [1/Pa]
+    real(c_double), intent(in) :: lambda(3)
+    !> Energy by area of each cycle in the first and the second jump, and in one that is as long as both [J/m^2]
+    real(c_double), intent(in) :: energies(n_col, n_row, 3)
+    !> Path of slip of the cycle between the two jumps [m]
+    real(c_double), intent(in) :: path(n_col, n_row)
     !> Coefficient of wear [m^2/N]
     real(c_double), intent(in) :: coefficient
     !> Coefficient of friction
@@ -74,6 +104,10 @@ contains
     real(c_double), intent(in) :: cycles, p_max
     !> What it changes
     real(c_double), intent(out) :: change(5)
+    !> By how much the two wear more [m]
+    real(c_double), intent(out) :: slower(n_col, n_row)
+    !> Energy by area of each cycle in the second jump, corrected [J/m^2]
+    real(c_double), intent(out) :: corrected(n_col, n_row)
     !> Status and its message
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
@@ -82,9 +116,14 @@ contains
     type(step_change_t) :: found
 
     change = 0.0_c_double
+    slower = 0.0_c_double
+    corrected = 0.0_c_double
     call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
     if (.not. allocated(error)) then
-      call jump_change(lattice, pair_of(lambda), energy, energy_after, coefficient, friction, cycles, p_max, found)
+      associate (pair => pair_of(lambda), first => energies(:, :, 1), second => energies(:, :, 2), both => energies(:, :, 3))
+        call jump_change(lattice, pair, first, second, both, coefficient, friction, cycles, p_max, slower, found)
+        call energy_of_second_jump(lattice, pair, path, coefficient, cycles, first, second, both, corrected)
+      end associate
       change = [found%stick, found%traction, found%added, found%lattice, found%gain]
     end if
     call report(error, code, message)

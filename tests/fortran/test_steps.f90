@@ -19,7 +19,7 @@ module test_steps
   use hc_contact_residuals, only: normal_self_compliance
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
-  use hc_wear_jumps, only: jump_change, wear_by
+  use hc_wear_jumps, only: energy_of_second_jump, jump_change, wear_by
   use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
     oblique_error, oblique_steps, slip_ring
   use test_friction, only: new_sphere
@@ -62,7 +62,7 @@ contains
     type(lattice_t) :: lattice
     type(step_change_t) :: change
     type(step_options_t) :: options
-    real(wp) :: depth(2, 2), volume
+    real(wp) :: depth(2, 2), volume, slower(2, 2), second(2, 2)
 
     depth = 1.0_wp
     call wear_by(energy, 2.0_wp, friction, 10.0_wp, 0.5_wp, depth, volume)
@@ -72,12 +72,20 @@ contains
     if (allocated(error)) return
     associate (pair => elastic_pair_t(0.2_wp, 0.0_wp, 0.0_wp), after => energy + reshape([-1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp], [2, 2]))
       ! 40 and 40 more or less at two of the three nodes where friction dissipates
-      call jump_change(lattice, pair, energy, after, 2.0_wp, friction, 10.0_wp, 5.0_wp, change)
+      call jump_change(lattice, pair, energy, after, energy, 2.0_wp, friction, 10.0_wp, 5.0_wp, slower, change)
+      call check(error, reshape(slower, [4]), [-40.0_wp, 0.0_wp, 40.0_wp, 0.0_wp], thr, 'depth')
+      if (allocated(error)) return
       call check(error, change%added/options%added_share*5.0_wp*normal_self_compliance(lattice, pair), &
                  40.0_wp*sqrt(2.0_wp/3.0_wp), thr, 'root mean square')
       if (allocated(error)) return
-      call jump_change(lattice, pair, energy, after, 2.0_wp, friction, 10.0_wp, 0.0_wp, change)
+      call jump_change(lattice, pair, energy, after, energy, 2.0_wp, friction, 10.0_wp, 0.0_wp, slower, change)
       call check(error, change%added, 0.0_wp, 0.0_wp, 'without pressure')
+      if (allocated(error)) return
+      ! 1 less, to 1; 0.5 more, of which what is left of the pressure allows 0.01 times 1.5; a node that does not slip as it is
+      associate (path => reshape([1.0_wp, 1.0_wp, normal_self_compliance(lattice, pair)/0.01_wp, 0.0_wp], [2, 2]))
+        call energy_of_second_jump(lattice, pair, path, 1.0_wp, 1.0_wp, energy, after, energy, second)
+      end associate
+      call check(error, reshape(second, [4]), [1.0_wp, 0.0_wp, 1.515_wp, 4.0_wp], thr, 'second jump')
     end associate
   end subroutine test_wear_jumps
 

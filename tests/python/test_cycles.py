@@ -180,6 +180,16 @@ def test_a_history_with_many_peaks_keeps_the_ends_of_its_segments() -> None:
     assert len(places) == 24 and set(range(2, 60, 3)) <= set(places)
 
 
+def test_rounding_errors_of_a_constant_pressure_are_no_peaks() -> None:
+    histories = [
+        {"segment": 1 + k // 30, "normal_load": 9.0, "torque": 1e-5 * (k % 15)}
+        | {"approach": 1e-6, "contact_radius": 1e-4, "max_pressure": 1e9}
+        for k in range(60)
+    ]
+    noisy = [history | {"max_pressure": 1e9 * (1 + 3e-9 * (-1) ** k)} for k, history in enumerate(histories)]
+    assert some_steps(noisy, 12) == some_steps(histories, 12)
+
+
 @pytest.mark.parametrize(
     ("radius_x", "radius_y"), [("38 mm", "12 mm"), ("12 mm", "38 mm"), ("10 mm", "10 mm")]
 )

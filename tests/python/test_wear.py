@@ -8,7 +8,7 @@ import pytest
 from matplotlib.collections import TriMesh
 
 import hexcontact
-from hexcontact import Case, DeckError, plotting
+from hexcontact import Case, DeckError, ElasticPair, NormalContact, plotting
 from hexcontact.deck.write import starter
 from hexcontact.result.history import step_rows
 
@@ -64,7 +64,8 @@ def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     assert float(last["normal_load"]) == pytest.approx(limit, rel=0.04)
     r = np.hypot(last["x"], last["y"]).values
     spacing = float(found.attrs["lattice_spacing"])
-    assert not last["pressure"].values[r > STICK + spacing].any()
+    # there it just touches, to the residuals of a cycle
+    assert last["pressure"].values[r > STICK + spacing].max() < 3e-3 * last["pressure"].max()
     assert not last["worn_depth"].values[r < STICK - spacing].any()
     assert float(found["normal_load"][0]) > 1.2 * limit
     # nothing of Hertz, Cattaneo and Mindlin holds for worn surfaces
@@ -78,6 +79,17 @@ def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     unworn = last["worn_depth"].values[last["pressure"].values > 0.0].max()
     assert shades.get_array().max() == pytest.approx(1e9 * float(last["max_worn_depth"]))
     assert float(last["max_worn_depth"]) > 2 * unworn
+    # beyond the nodes that stuck it just touches: to 0.13 %, 3 % after jumps by the pressure before them
+    stuck = last["worn_depth"].values == 0.0
+    disc = NormalContact(
+        result.lattice,
+        ElasticPair.from_materials(MODULUS, 0.0, MODULUS, 0.0),
+        last["initial_gap"].values,
+        stuck & (r < STICK + spacing),
+        rim_warning=False,
+    )
+    depth = np.where(stuck, 0.0, np.maximum(-disc.solve(approach=APPROACH).gap, 0.0))
+    assert np.abs(last["worn_depth"] - depth).max() < 0.01 * depth.max()
 
 
 def test_halved_jumps_change_the_depth_as_stated() -> None:
@@ -148,14 +160,13 @@ def test_cycle_without_slip_is_refused_when_it_is_known() -> None:
 
 def test_cycle_that_is_computed_afterwards_is_the_one_that_wears() -> None:
     press, cycle = {"approach": APPROACH, "shift_x": 0.0}, {"label": "fretting", "path": CYCLE}
-    twice = fretting(wear={"cycles": 1000, "jump": 1000}).deck_text
+    twice = fretting(wear={"cycles": 1, "jump": 1}).deck_text
     twice = twice[: twice.index("[wear]")] + "[output]" + twice.partition("[output]")[2]
     found = Case.from_text(twice, overrides={"load": [press, cycle, cycle]}).run().wear(WEAR, "fretting")
-    last = worn(fretting(wear={"cycles": 1000, "jump": 1000}).run()).isel(step=-1)
+    last = worn(fretting(wear={"cycles": 1, "jump": 1}).run()).isel(step=-1)
     # that cycle is solved to 3e-4 only: what this leaves in the depth
-    for name, times in (("worn_depth", 1000), ("wear_volume", 1000)):
-        off = np.abs(times * found[name] - last[name]).max() / np.abs(last[name]).max()
-        assert off < 1e-4
+    for name in ("worn_depth", "wear_volume"):
+        assert np.abs(found[name] - last[name]).max() < 1e-4 * np.abs(last[name]).max()
     # |q| = mu p, opposed to the slip
     assert np.abs(WEAR / MU * found["cycle_dissipation_density"] - found["worn_depth"]).max() < 1e-6 * float(
         found["worn_depth"].max()

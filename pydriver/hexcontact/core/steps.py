@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from . import _core
 from .calls import called
-from .contact import ElasticPair
+from .contact import ElasticPair, Interface, checked_interface
 from .friction import ContactState, FrictionLaw
 from .lattice import Lattice
 
@@ -101,13 +101,6 @@ def is_shear_free(state: ContactState | None) -> bool:
     return bool(_api.is_shear_free(state.pressure.T, state.traction_x.T, state.traction_y.T))
 
 
-def archard_depth(energy: Array, coefficient: float, friction: FrictionLaw) -> Array:
-    """Return the depth (m) that is worn off where friction dissipates an energy by area (J/m2)."""
-    mu = np.broadcast_to(friction.coefficient, energy.shape)
-    depth = _wear.depth_of_energy(energy.ravel(), coefficient, mu.ravel())
-    return np.asarray(depth).reshape(energy.shape)
-
-
 def worn(
     lattice: Lattice, friction: FrictionLaw, coefficient: float, energy: Array, cycles: float, depth: Array
 ) -> tuple[Array, float, float]:
@@ -181,16 +174,60 @@ def _columns(fields: Array) -> Array:
     return fields.reshape(*fields.shape[:-2], -1).T
 
 
+def energy_of_jump(
+    lattice: Lattice,
+    pair: ElasticPair,
+    interface: Interface,
+    candidate: Mask,
+    friction: FrictionLaw,
+    coefficient: float,
+    cycle: tuple[Array, Array],
+    state: ContactState,
+    by_load: bool,
+    cycles: float,
+    tolerance: float,
+) -> Array:
+    """Return the energy of a cycle (J/m2) by which a jump wears: docs/theory/wear.md, (V7).
+
+    Parameters
+    ----------
+    lattice, friction, coefficient
+        As of `worn`.
+    pair, interface, candidate
+        Elastic constants, compliance of the interface, nodes that can touch.
+    cycle : tuple of ndarray, (n_row, n_col)
+        Energy that friction dissipates in the cycle before the jump, by area (J/m2), and path of slip (m).
+    state : ContactState
+        End of that cycle.
+    by_load : bool
+        The normal load is prescribed, not the approach.
+    cycles : float
+        Cycles of the jump.
+    tolerance : float
+        Bound of the residual of the pressure.
+    """
+    mu = np.broadcast_to(friction.coefficient, lattice.shape)
+    fields = *cycle, state.pressure, np.where(candidate, state.gap, 0.0)
+    ahead = called(
+        _wear.energy_of_jump,
+        *(lattice.basis.T, pair.as_array(), checked_interface(interface)),
+        *(field.T for field in fields),
+        *(candidate.T, mu.T, by_load, coefficient, cycles, tolerance, 0),
+    )
+    return np.ascontiguousarray(ahead.T)
+
+
 def change_by_jump(
     lattice: Lattice,
     pair: ElasticPair,
     friction: FrictionLaw,
     coefficient: float,
-    energies: tuple[Array, Array],
+    energies: tuple[Array, Array, Array],
+    path: Array,
     cycles: float,
     max_pressure: float,
-) -> Change:
-    """Compare two jumps with one of both: docs/theory/wear.md, (V4).
+) -> tuple[Change, Array, Array]:
+    """Compare two jumps with one of both: docs/theory/wear.md, (V4), (V8).
 
     Parameters
     ----------
@@ -199,7 +236,9 @@ def change_by_jump(
     pair : ElasticPair
         Elastic constants.
     energies : tuple of ndarray, (n_row, n_col)
-        Energy that friction dissipates in the cycles before the first and the second jump, by area (J/m2).
+        Energies by which the first jump wears, the second one, and one that is as long as both (J/m2).
+    path : ndarray, (n_row, n_col)
+        Path of slip of the cycle between the two (m).
     cycles : float
         Cycles of each jump.
     max_pressure : float
@@ -207,16 +246,20 @@ def change_by_jump(
 
     Returns
     -------
-    Change
+    change : Change
         For `StepControl`; its tolerance is that of the worn depth over the indentation of a node.
+    slower : ndarray, (n_row, n_col)
+        By how much the two wear more (m).
+    second : ndarray, (n_row, n_col)
+        Energy by which the second jump wears, corrected (J/m2).
     """
     mu = np.broadcast_to(friction.coefficient, lattice.shape)
-    change = called(
+    change, slower, second = called(
         _wear.change_by_jump,
-        *(lattice.basis.T, pair.as_array(), energies[0].T, energies[1].T, coefficient, mu.T),
+        *(lattice.basis.T, pair.as_array(), np.array(energies).T, path.T, coefficient, mu.T),
         *(cycles, max_pressure),
     )
-    return Change(*change.tolist())
+    return Change(*change.tolist()), np.ascontiguousarray(slower.T), np.ascontiguousarray(second.T)
 
 
 class Attempt:

@@ -41,6 +41,7 @@ WEARING = ("pressure", "traction_x", "traction_y", "slip_increment_x", "slip_inc
 
 _SLIP = 2  # among the zones
 _NOTICED = 1e-6  # share of the normal load or approach from which tangential ones are shown
+_LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
 _MOST_NAMED = 8  # load steps named in a sentence
@@ -224,7 +225,7 @@ def some_steps(histories: Sequence[History], most: int) -> list[int]:
     Of each kind that exceeds the places left, evenly chosen ones.
     """
     names = [*worth_showing(histories), "max_pressure"]
-    turns = {place for name in names for place in turning_points(_column(histories, name))}
+    turns = {place for name in names for place in turning_points(_rounded(_column(histories, name)))}
     last = len(histories) - 1
     kept = {last}
     for places in (ends_of_segments(histories), sorted(turns), range(last)):
@@ -314,6 +315,12 @@ def _span(histories: Sequence[History], before: int, end: int) -> dict[str, Any]
 
 def _column(histories: Sequence[History], name: str) -> NDArray[np.float64]:
     return np.array([float(history[name]) for history in histories])
+
+
+def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return values without what the solver leaves open: to a millionth of the largest."""
+    unit = _LEFT_OPEN * float(np.abs(values).max())
+    return np.round(values / unit) if unit else values
 
 
 # --- remarks ------------------------------------------------------------------------------------------------

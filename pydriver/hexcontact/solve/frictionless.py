@@ -51,7 +51,7 @@ _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the 
 _COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
 _LAW_ARRAYS = 6  # coefficients by node, here, in the core, on its lattices and parts
 _INTERFACE_ARRAYS = {False: 4, True: 6}  # springs of a compliant interface, and the symbol of bodies on them
-_WEAR_ARRAYS = 108  # fields of the cycles before and after a jump, and of their record
+_WEAR_ARRAYS = 168  # fields of the cycles before and after a jump, of their record, of the pressure ahead
 _END_ARRAYS = 3  # fields that remember the end of a load step of the cycle
 _ENTRY_ARRAYS = 45  # fields of the core for the places of nodes when their gap closed
 
@@ -133,6 +133,8 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     if case.deck.interface:
         arrays += _INTERFACE_ARRAYS[case.frictional]
     needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size + kept
+    if case.deck.wear:
+        needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)

@@ -24,8 +24,8 @@ from ..core.steps import (
     REJECTED,
     Change,
     StepControl,
-    archard_depth,
     change_by_jump,
+    energy_of_jump,
     expected_end,
     remember_end,
     worn,
@@ -48,6 +48,7 @@ class _Cycle:
 
     `state` is its end, with all that was slipped and dissipated before it; `energy` (J/m2), `path` (m) and
     `spent` (J) are of the cycle alone. `change` is by how much jumps of half the size differ so far (m).
+    A cycle between two jumps knows until when the second one lasts, and the energy by which that wears.
     """
 
     lattice: Lattice
@@ -58,7 +59,8 @@ class _Cycle:
     spent: float
     change: Array
     cycles: float = 0.0
-    until: float = 0.0  # cycles at the end of the second of two jumps, if the first one led here
+    until: float = 0.0
+    ahead: Array | None = None
     about: dict[str, float] = dataclasses.field(default_factory=dict)
 
     def on(self, window: FrictionWindow) -> _Cycle:
@@ -67,7 +69,8 @@ class _Cycle:
             return self
         fields: dict[str, Any] = {
             name: self.lattice.embed(getattr(self, name), window.lattice, 0.0)
-            for name in ("worn", "energy", "path", "change")
+            for name in ("worn", "energy", "path", "change", "ahead")
+            if getattr(self, name) is not None
         }
         fields["state"] = window.carried(self.state, self.lattice)
         return dataclasses.replace(self, lattice=window.lattice, **fields)
@@ -165,7 +168,7 @@ class WearPath(GivenPath):
         """Solve a load step before the first cycle that wears."""
         for step, reached in super().steps(state, target, begun):
             self._number += 1
-            yield self._placed(step, 0.0, 0.0), reached
+            yield self._placed(step, 0.0), reached
 
     def after(self, state: Any) -> Iterator[Step]:
         """Solve the cycles that wear the surfaces.
@@ -184,7 +187,7 @@ class WearPath(GivenPath):
         if self._last is None:
             zero = np.zeros(self.window.lattice.shape)
             unworn = _Cycle(self.window.lattice, state, zero, zero, zero, 0.0, zero)
-            cycle = self._solved(unworn, 0.0)
+            cycle = self._solved(unworn, 0.0, zero)
             if not cycle.energy.any():
                 label = self._wear.cycle
                 raise DeckError(f'wear.cycle = "{label}": no node slips in this cycle, so that nothing wears')
@@ -201,58 +204,72 @@ class WearPath(GivenPath):
 
     def _next(self, cycle: _Cycle) -> _Cycle:
         """Return the next cycle that is solved: after a jump that is given, or one that is small enough."""
-        if cycle.until:
-            return self._solved(cycle, cycle.until)
+        if cycle.ahead is not None:
+            return self._solved(cycle, cycle.until, cycle.ahead)
         total = float(self._wear.cycles)
         if not isinstance(self._wear.jump, str):
-            after = self._solved(cycle, min(cycle.cycles + self._wear.jump, total))
-            return self._judged(cycle, after)[1]
+            left = total - cycle.cycles
+            if left <= self._wear.jump:
+                return self._solved(cycle, total, self._ahead(cycle, left))
+            until = cycle.cycles + min(2.0 * self._wear.jump, left)
+            return self._halfway(cycle, until)[1]
         attempt = self._size.first_attempt(cycle.cycles / total, 1.0)
         while True:
-            until = attempt.end * total
             try:
-                after = self._solved(cycle, 0.5 * (cycle.cycles + until))
+                change, after = self._halfway(cycle, attempt.end * total)
             except ConvergenceError:
                 if self._size.judge(attempt, None, self._wear.tolerance) == FAILED:
                     raise
                 continue
-            change, after = self._judged(cycle, after)
             verdict = self._size.judge(attempt, change, self._wear.tolerance)
             if verdict != REJECTED:
                 break
         self._size.accept(attempt, change, self._wear.tolerance, verdict)
         about = {"rejected_steps": attempt.rejected, "step_limited": int(verdict == LIMITED)}
-        return dataclasses.replace(after, until=until, about=after.about | about)
+        return dataclasses.replace(after, about=after.about | about)
 
-    def _judged(self, cycle: _Cycle, after: _Cycle) -> tuple[Change, _Cycle]:
-        """Return what the size of the jump between two cycles changes; the second one knows the error."""
-        cycle = cycle.on(self.window)
-        jump, window = after.cycles - cycle.cycles, self.window
-        slower = archard_depth(after.energy - cycle.energy, jump * self._wear.coefficient, window.friction)
-        change = self._change((cycle.energy, after.energy), jump, cycle.state)
-        return change, dataclasses.replace(after, change=after.change + slower)
+    def _halfway(self, cycle: _Cycle, until: float) -> tuple[Change, _Cycle]:
+        """Return the cycle between two jumps, which knows the second one, and what their size changes."""
+        jump, cycle = 0.5 * (until - cycle.cycles), cycle.on(self.window)
+        first, both = (self._ahead(cycle, times * jump) for times in (1.0, 2.0))
+        after = self._solved(cycle, cycle.cycles + jump, first)
+        one, two = (np.asarray(cycle.lattice.embed(each, after.lattice, 0.0)) for each in (first, both))
+        energies = one, self._ahead(after, jump), two
+        change, slower, second = self._change(cycle, energies, after.path, jump)
+        return change, dataclasses.replace(after, change=after.change + slower, until=until, ahead=second)
 
-    def _change(self, energies: tuple[Array, Array], jump: float, state: ContactState) -> Change:
-        window = self.window
-        given = window.lattice, self.case.pair, window.friction, self._wear.coefficient
-        return change_by_jump(*given, energies, jump, float(state.pressure.max()))
+    def _ahead(self, cycle: _Cycle, jump: float) -> Array:
+        """Return the energy by which a jump wears, with the pressure after it."""
+        cycle, window = cycle.on(self.window), self.window
+        given = window.lattice, self.case.solved_pair, self.case.interface, window.candidate
+        by_load = self.case.load_steps[-1].z.control == "force"
+        worn_by = window.friction, self._wear.coefficient, (cycle.energy, cycle.path), cycle.state
+        return energy_of_jump(*given, *worn_by, by_load, jump, self._tolerance)
+
+    def _change(
+        self, cycle: _Cycle, energies: tuple[Array, Array, Array], path: Array, jump: float
+    ) -> tuple[Change, Array, Array]:
+        """Compare two jumps with one of both."""
+        given = self.window.lattice, self.case.pair, self.window.friction, self._wear.coefficient
+        return change_by_jump(*given, energies, path, jump, float(cycle.state.pressure.max()))
 
     def _begin_size(self, cycle: _Cycle) -> None:
         """Choose the first jump: both halves wear as much as the largest pressure indents a node."""
-        change = self._change((0.0 * cycle.energy, cycle.energy), 1.0, cycle.state)
+        none = 0.0 * cycle.energy
+        change, *_ = self._change(cycle, (none, cycle.energy, none), cycle.path, 1.0)
         self._size.begin_with(min(1.0, 1.0 / max(change.added * self._wear.cycles, 1e-300)))
 
     # --- cycles -------------------------------------------------------------------------------------------
 
-    def _solved(self, cycle: _Cycle, until: float) -> _Cycle:
-        """Wear the surfaces until a number of cycles is done, and solve the cycle then."""
+    def _solved(self, cycle: _Cycle, until: float, worn_by: Array) -> _Cycle:
+        """Wear the surfaces by an energy a cycle until some cycles are done, and solve the cycle then."""
         cycle, jump = cycle.on(self.window), until - cycle.cycles
-        depth, *_ = self._worn(cycle, jump)
+        depth, *_ = self._worn(cycle, worn_by, jump)
         window = self.window
         window.wear(depth)
         slipped = cycle.state.accumulated_slip + jump * cycle.path
-        density = cycle.state.dissipation_density + jump * cycle.energy
-        spent = cycle.state.dissipated_energy + jump * cycle.spent
+        density = cycle.state.dissipation_density + jump * worn_by
+        spent = cycle.state.dissipated_energy + jump * window.lattice.cell_area * float(worn_by.sum())
         state = self._unspent(cycle.state)
         *_, last = self.case.load_steps
         # the loads at the end of the cycle on the new gap; what slips is no part of the cycle
@@ -273,10 +290,10 @@ class WearPath(GivenPath):
             about=about,
         )
 
-    def _worn(self, cycle: _Cycle, jump: float) -> tuple[Array, float, float]:
-        """Return depth, volume and largest depth after a jump."""
+    def _worn(self, cycle: _Cycle, energy: Array, jump: float) -> tuple[Array, float, float]:
+        """Return depth, volume and largest depth after a jump that wears by an energy a cycle."""
         window = self.window
-        return worn(window.lattice, window.friction, self._wear.coefficient, cycle.energy, jump, cycle.worn)
+        return worn(window.lattice, window.friction, self._wear.coefficient, energy, jump, cycle.worn)
 
     def _through(
         self, state: ContactState, targets: Sequence[LoadStep], cycles: float, first: int = 0
@@ -313,7 +330,7 @@ class WearPath(GivenPath):
         *_, last = self.case.load_steps
         target = dataclasses.replace(last, index=self._number, segment=last.segment + 1, label=LABEL)
         step = self.window.step(target, cycle.state, before, time.perf_counter())
-        _, volume, deepest = self._worn(cycle, 0.0)
+        _, volume, deepest = self._worn(cycle, cycle.energy, 0.0)
         history = {
             **step.history,
             **cycle.about,
@@ -332,13 +349,15 @@ class WearPath(GivenPath):
         }
         self._number, self._started = self._number + 1, time.perf_counter()
         step = dataclasses.replace(step, history=history, fields=fields)
-        return self._placed(step, cycle.cycles / self._wear.cycles, cycle.until)
+        return self._placed(step, cycle.cycles / self._wear.cycles, cycle)
 
-    def _placed(self, step: Step, done: float, until: float) -> Step:
+    def _placed(self, step: Step, done: float, cycle: _Cycle | None = None) -> Step:
         """Return a load step with all that the next cycle needs to be chosen and solved."""
         count = len(self.case.load_steps)
         known = np.flatnonzero(self._ends.cycles >= 0.0)
         beside = {f"end_{place}": self._ends.fields[place] for place in known}
+        if cycle is not None and cycle.ahead is not None:
+            beside["ahead"] = cycle.ahead
         control = {
             "end_cycles": self._ends.cycles.tolist(),
             "end_numbers": self._ends.numbers.tolist(),
@@ -347,7 +366,7 @@ class WearPath(GivenPath):
             "load_steps": count,
             "done": done,
             "chooser": self._size.record,
-            "until": until,
+            "until": 0.0 if cycle is None else cycle.until,
         }
         return dataclasses.replace(step, control=control, companion=beside, load_fraction=done)
 
@@ -366,6 +385,7 @@ class WearPath(GivenPath):
             fields["worn_depth_step_change"],
             float(step.history["wear_cycles"]),
             float(step.control["until"]),
+            np.array(step.companion["ahead"]) if "ahead" in step.companion else None,
         )
 
 

@@ -1,0 +1,91 @@
+!> Unilateral contact on springs that differ from node to node.
+!>
+!> Where the surface gives way by C p under a pressure p, C >= 0 and different at each node,
+!>
+!>     p >= 0,     g + C p >= 0,     p (g + C p) = 0.
+!>
+!> The layer is linear, so that its linearisation is the layer itself; a node with C = 0 is in unilateral contact.
+!>
+!> Equations: docs/theory/conditions.md, (C5); docs/theory/normal_contact.md, (N6).
+module hc_nodal_springs
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_normal_law, only: normal_law_t
+  implicit none
+  private
+
+  public :: nodal_springs_t
+
+  !> A spring at each node.
+  type, extends(normal_law_t) :: nodal_springs_t
+    !> Compliance of the spring of each node of the window, row by row [m/Pa]
+    real(wp), allocatable :: spring(:)
+  contains
+    procedure :: is_compliant, check, compliance_under, linearize, violation
+  end type nodal_springs_t
+
+contains
+
+  !> Return true: there are springs.
+  pure logical function is_compliant(self)
+    class(nodal_springs_t), intent(in) :: self
+
+    is_compliant = allocated(self%spring)
+  end function is_compliant
+
+  !> Refuse springs that are not finite or push.
+  pure subroutine check(self, error)
+    class(nodal_springs_t), intent(in) :: self
+    type(error_t), allocatable, intent(out) :: error
+    logical :: sound
+
+    sound = all(ieee_is_finite(self%spring))
+    if (sound) sound = all(self%spring >= 0.0_wp)
+    if (.not. sound) call raise(error, status%invalid_input, 'springs of nodes: finite compliances of at least 0 expected')
+  end subroutine check
+
+  !> Return 0, the compliance where there is no spring.
+  pure real(wp) function compliance_under(self, pressure) result(compliance)
+    class(nodal_springs_t), intent(in) :: self
+    real(wp), intent(in) :: pressure
+
+    associate (law => self, under_any => pressure)
+      compliance = 0.0_wp
+    end associate
+  end function compliance_under
+
+  !> Return the springs themselves.
+  pure subroutine linearize(self, first, r, softest, p, gap, contact, compliance, offset)
+    class(nodal_springs_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: r, softest
+    real(wp), intent(in), contiguous :: p(:), gap(:)
+    logical, intent(in), contiguous :: contact(:)
+    real(wp), intent(out), contiguous :: compliance(:), offset(:)
+
+    associate (scale => r, pressure => p, opening => gap, springs => self%spring(first:first + size(p) - 1))
+      compliance = merge(min(springs, softest), 0.0_wp, contact)
+      offset = 0.0_wp
+    end associate
+  end subroutine linearize
+
+  !> Measure |min((d_n + C) p, g + C p)|/d_n: what is wrong is a part of the displacement, of the spring, too.
+  pure subroutine violation(self, first, compliance, p, gap, candidate, worst)
+    class(nodal_springs_t), intent(in) :: self
+    integer, intent(in) :: first
+    real(wp), intent(in) :: compliance
+    real(wp), intent(in), contiguous :: p(:), gap(:)
+    logical, intent(in), contiguous :: candidate(:)
+    real(wp), intent(inout) :: worst
+    integer :: i
+
+    associate (springs => self%spring(first:first + size(p) - 1))
+      do i = 1, size(p)
+        if (.not. candidate(i)) cycle
+        worst = max(worst, abs(springs(i)*p(i) + min(compliance*p(i), gap(i)))/compliance)
+      end do
+    end associate
+  end subroutine violation
+
+end module hc_nodal_springs

@@ -1,0 +1,173 @@
+!> What a jump of many cycles wears off, with the pressure after the jump.
+!>
+!> A node that slips by S in a cycle wears by n k S p in n cycles. With the pressure p at the end of the jump this is a spring of
+!> compliance C = n k S at each node, and that pressure is the one of a frictionless contact on these springs, (V7): wear
+!> never takes more than there is pressure left to take away, however long the jump. The change from the
+!> pressure of the cycle is all that is solved for, so that shear tractions and bulk strains, which stay, need not be known.
+!>
+!> Equations: docs/theory/wear.md, (V3), (V7).
+module hc_wear_ahead
+  use hc_precision, only: wp
+  use hc_error, only: error_t, status, raise
+  use hc_lattice, only: lattice_t
+  use hc_field_space, only: field_space_t, space_over
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_pressure_kernel, only: normal_kernel_t
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_contact_state, only: contact_state_t, force_control, displacement_control
+  use hc_normal_law, only: normal_law_t
+  use hc_nodal_springs, only: nodal_springs_t
+  use hc_normal_lattice, only: normal_lattice_t
+  use hc_normal_iterate, only: normal_iterate_t
+  use hc_normal_lattice_solver, only: solve_on_normal_lattice
+  implicit none
+  private
+
+  public :: worn_cycle_t, energy_ahead
+
+  !> What is known at the end of a cycle; fields over the window (n_col, n_row).
+  type :: worn_cycle_t
+    !> Dissipated energy by area [J/m^2] and path of slip [m] of the cycle
+    real(wp), allocatable :: energy(:, :), path(:, :)
+    !> Pressure [Pa] and gap [m] at its end
+    real(wp), allocatable :: pressure(:, :), gap(:, :)
+    !> Nodes that may come into contact
+    logical, allocatable :: candidate(:, :)
+    !> Coefficient of friction
+    real(wp), allocatable :: friction(:, :)
+    !> The normal load is prescribed, not the approach
+    logical :: by_load = .false.
+  end type worn_cycle_t
+
+  !> Iterations that may be made
+  integer, parameter :: max_sweeps = 200
+
+contains
+
+  !> Compute the pressure by which nodes slip, on average over a cycle: where nothing slips, that at the end of the cycle [Pa].
+  elemental real(wp) function slipping_pressure(energy, path, friction, pressure)
+    !> Dissipated energy by area [J/m^2], path of slip [m], coefficient of friction, pressure at the end of the cycle [Pa]
+    real(wp), intent(in) :: energy, path, friction, pressure
+
+    slipping_pressure = max(pressure, 0.0_wp)
+    if (energy > 0.0_wp .and. path > 0.0_wp .and. friction > 0.0_wp) slipping_pressure = energy/(friction*path)
+  end function slipping_pressure
+
+  !> Find the energy of a cycle by which a jump wears, (V7): that of the cycle before it, times the pressure after over before.
+  subroutine energy_ahead(now, lattice, pair, law, coefficient, cycles, tolerance, ahead, error, n_threads, cache)
+    !> The cycle before the jump
+    type(worn_cycle_t), intent(in) :: now
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Law of contact
+    class(normal_law_t), intent(in) :: law
+    !> Coefficient of wear [m^2/N]
+    real(wp), intent(in) :: coefficient
+    !> Cycles of the jump
+    real(wp), intent(in) :: cycles
+    !> Bound of the residual of the pressure
+    real(wp), intent(in) :: tolerance
+    !> Energy by area of each cycle (n_col, n_row) [J/m^2]
+    real(wp), intent(out) :: ahead(:, :)
+    !> Allocated on failure: no convergence, not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads to use; absent or 0: as many as OpenMP would take
+    integer, intent(in), optional :: n_threads
+    !> Cache of spectra
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+    real(wp), dimension(size(ahead, 1), size(ahead, 2)) :: before, after, spring
+    logical :: wears
+    integer :: col, row
+
+    ahead = now%energy
+    before = slipping_pressure(now%energy, now%path, now%friction, now%pressure)
+    if (.not. any(now%candidate .and. before > 0.0_wp)) return
+    spring = merge(cycles*coefficient*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
+    call settle(now, lattice, pair, law, before, spring, tolerance, after, error, n_threads, cache)
+    if (allocated(error)) return
+    do row = 1, size(ahead, 2)
+      do col = 1, size(ahead, 1)
+        wears = now%energy(col, row) > 0.0_wp .and. before(col, row) > 0.0_wp
+        if (wears) ahead(col, row) = now%energy(col, row)*(after(col, row)/before(col, row))
+      end do
+    end do
+  end subroutine energy_ahead
+
+  !> Solve for the pressure on springs that are new, given one that is in balance without them.
+  subroutine settle(now, lattice, pair, law, before, spring, tolerance, after, error, n_threads, cache)
+    !> The cycle
+    type(worn_cycle_t), intent(in) :: now
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Law of contact
+    class(normal_law_t), intent(in) :: law
+    !> Pressure without the springs (n_col, n_row) [Pa]
+    real(wp), intent(in), contiguous :: before(:, :)
+    !> Compliance of the springs (n_col, n_row) [m/Pa]
+    real(wp), intent(in), contiguous :: spring(:, :)
+    !> Bound of the residual
+    real(wp), intent(in) :: tolerance
+    !> Pressure on them (n_col, n_row) [Pa]
+    real(wp), intent(out) :: after(:, :)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    !> Threads to use
+    integer, intent(in), optional :: n_threads
+    !> Cache of spectra
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+    type(normal_lattice_t) :: level
+    type(normal_iterate_t) :: iterate
+    type(normal_kernel_t), target :: kernel
+    type(contact_state_t) :: state
+    type(field_space_t) :: space
+    real(wp), allocatable :: closing(:, :), layer(:, :)
+    real(wp) :: lift
+    integer :: col, row
+
+    space = space_over(lattice%extent, n_threads)
+    level%lattice = lattice
+    level%pair = pair
+    level%candidate = now%candidate
+    allocate (layer, mold=before)
+    do row = 1, size(layer, 2)
+      do col = 1, size(layer, 1)
+        layer(col, row) = law%compliance_under(before(col, row))
+      end do
+    end do
+    allocate (level%law, source=nodal_springs_t(reshape(spring + layer, [size(spring)])))
+    call level%prepare(kernel, .true., .true., space, error, cache)
+    if (allocated(error)) return
+    allocate (closing, mold=before)
+    call level%multiply_exactly(before, closing, error)
+    if (allocated(error)) return
+    closing = closing + layer*before
+    ! the gap under `before` is that of the cycle, 0 where nodes carry
+    lift = maxval(closing, mask=now%candidate)
+    allocate (level%initial_gap, source=lift - closing)
+    do row = 1, size(before, 2)
+      do col = 1, size(before, 1)
+        if (.not. now%candidate(col, row)) then
+          level%initial_gap(col, row) = 0.0_wp
+        else if (.not. before(col, row) > 0.0_wp) then
+          level%initial_gap(col, row) = level%initial_gap(col, row) + max(now%gap(col, row), 0.0_wp)
+        end if
+      end do
+    end do
+    allocate (state%pressure, source=merge(before, 0.0_wp, now%candidate))
+    associate (control => merge(force_control, displacement_control, now%by_load), &
+               target => merge(lattice%cell_area()*sum(state%pressure), lift, now%by_load))
+      call solve_on_normal_lattice(level, iterate, control, target, tolerance, max_sweeps, state, error)
+    end associate
+    if (allocated(error)) return
+    if (.not. state%converged) then
+      call raise(error, status%no_convergence, 'the pressure after a jump of wear was not found')
+      return
+    end if
+    after = state%pressure
+  end subroutine settle
+
+end module hc_wear_ahead

@@ -423,6 +423,8 @@ def check_volume(folder: Path) -> None:
         (["points = [[0, 0, 0]]", "depths = [0]"], "expected one of points, line, plane, depths"),
         (['name = "x"'], "expected one of points, line, plane, depths"),
         (["line = [[0, 0, 0], [0, 0, 1]]", "count = [3, 4]"], "expected one number with line"),
+        (["line = [[0, 0, 1], [0, 0, 1]]"], "expected two different points"),
+        (["plane = [[0, 0, 0], [0, 0, 1], [0, 0, 3]]"], "expected three points that are not on one line"),
         (["points = [[0, 0, 0]]", "box = [[0, 1], [0, 1]]"], "needs depths beside it"),
         (["depths = [0]", 'source = "node"'], "did you mean nodes"),
         (["depths = [0]", 'name = "a/b"'], "a name of a few letters"),

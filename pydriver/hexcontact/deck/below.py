@@ -32,13 +32,28 @@ class _Side(Several):
         return low, high
 
 
+class _Corners(Several):
+    """The ends of a line, or three corners of a parallelogram."""
+
+    def _parse(self, value: object) -> tuple[Any, ...]:
+        points = super()._parse(value)
+        sides = [[b - a for a, b in zip(points[0], point, strict=True)] for point in points[1:]]
+        if len(points) == 2 and not any(sides[0]):
+            refuse("expected two different points")
+        if len(points) == 3 and all(
+            sides[0][i - 1] * sides[1][i] == sides[0][i] * sides[1][i - 1] for i in range(3)
+        ):
+            refuse("expected three points that are not on one line")
+        return points
+
+
 _POINT = _Point(Quantity(LENGTH), "lengths x, y and depth", '["0 mm", "0 mm", "20 um"]', count=3)
 _SIDE = _Side(Quantity(LENGTH), "lengths", "[-1e-3, 1e-3]", 2)
 _ENDS = '[["0 mm", "0 mm", "0 um"], ["0 mm", "0 mm", "2 mm"]]'
 _CORNERS = "[[-1e-3, 0, 0], [1e-3, 0, 0], [-1e-3, 0, 1e-3]]"
 _Points = Annotated[tuple[Any, ...], Several(_POINT, "points", '[["0 mm", "0 mm", "20 um"]]')]
-_Line = Annotated[tuple[Any, ...], Several(_POINT, "points", _ENDS, 2)]
-_Plane = Annotated[tuple[Any, ...], Several(_POINT, "points", _CORNERS, 3)]
+_Line = Annotated[tuple[Any, ...], _Corners(_POINT, "points", _ENDS, 2)]
+_Plane = Annotated[tuple[Any, ...], _Corners(_POINT, "points", _CORNERS, 3)]
 _DEPTHS = Several(Quantity(LENGTH, at_least=0), "depths", '["10 um", "20 um", "50 um"]')
 _BOX = Several(_SIDE, "pairs of lengths", '[["-1 mm", "1 mm"], ["-1 mm", "1 mm"]]', 2)
 _Count = Annotated[tuple[int, ...], Several(Whole(2, 100_000), "whole numbers", "[81, 41]")]

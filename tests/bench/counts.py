@@ -19,8 +19,8 @@ SLOW_FROM = {"PATH": 320, "PATH19": 320, "HIST": 320}
 """Meshes that take minutes, measured with --long."""
 
 BOUNDED = (
-    dict.fromkeys(problems.BOUNDED, (20,))
-    | {name: (20, 40, 80) for name in ("HERTZ", *problems.FRICTIONAL)}
+    {name: (20, 40, 80) for name in ("HERTZ", *problems.FRICTIONAL)}
+    | {name: (20,) for name in problems.BOUNDED if name not in problems.FRICTIONAL}
     | {"PATH": (20, 40), "PATH19": (20,), "HIST": (20,)}
 )
 """Meshes of the regression test, which must be quick."""

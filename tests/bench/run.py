@@ -24,9 +24,9 @@ from datetime import date
 from functools import partial
 from pathlib import Path
 
-# one thread, also for libraries that look only once
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+if __name__ == "__main__":  # one thread, also for libraries that look only once
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench import (

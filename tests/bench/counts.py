@@ -15,7 +15,7 @@ BOUNDS = Path(__file__).parent / "bounds.json"
 MARGIN = 1.1
 
 MESHES = (20, 40, 80, 160, 320)
-SLOW_FROM = {"PATH": 320, "PATH19": 320, "HIST": 320}
+SLOW_FROM = {"PATH": 320, "PATH19": 320, "HIST": 160}
 """Meshes that take minutes, measured with --long."""
 
 BOUNDED = (

@@ -1,6 +1,7 @@
 """Measures counts, times and memory, compares with other codes, and writes the tables of docs.
 
-    python tests/bench/run.py                      everything (a quarter of an hour)
+    python tests/bench/run.py                      all that depends on the machine (a quarter of an hour)
+    python tests/bench/run.py --long               everything
     python tests/bench/run.py --quick              small windows only (minutes); pages stay
     python tests/bench/run.py --only counts,peers
     python tests/bench/run.py --only solves --sizes 256,512         these windows; pages stay
@@ -48,6 +49,9 @@ from bench import (
 )
 
 ROOT = Path(__file__).parents[2]
+UNTIMED = ("stick_edge", "wear_limit", "layers", "lapack_iterations")
+"""Counts and errors of problems that no goal is about: by name or with --long only."""
+
 Section = Callable[[], list[report.Table]]
 
 
@@ -73,7 +77,7 @@ def sections(options: argparse.Namespace) -> dict[str, Section]:
         "wear_limit": partial(wear_limit.measure, **quick, **long),
         "layers": partial(layers.measure, **quick, **long),
         "peers": partial(peers.measure, options.peers, **quick, **sizes, names=options.codes),
-        "lapack_methods": partial(lapack.methods_table, **quick),
+        "lapack_methods": partial(lapack.methods_table, **quick, **long),
         "lapack_steps": partial(lapack.steps_table, **quick),
         "lapack_threads": partial(lapack.threads_table, **quick),
         "lapack_iterations": partial(lapack.iterations_table, **quick),
@@ -104,7 +108,7 @@ def main() -> int:
     print(header.text(), "\n")
     if not (hurried or options.only):
         report.write("machine", [header], "")
-    for section in options.only or measures:
+    for section in options.only or [name for name in measures if options.long or name not in UNTIMED]:
         start, before = time.perf_counter(), processor_time()
         print(f"{section} ...", flush=True)
         tables = measures[section]()
@@ -142,7 +146,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--long",
         action="store_true",
-        help="also what takes minutes: load paths on the finest mesh, larger windows",
+        help="everything: also counts and errors of other pages, the finest meshes, larger windows",
     )
     parser.add_argument(
         "--write-bounds", action="store_true", help="measure the bounds of the test of the counts"

@@ -16,9 +16,9 @@ from .report import Table, seconds
 SIZES = (256, 512, 1024, 2048)
 LARGEST_WITH_FRICTION = 1024
 PROBLEMS = {"HERTZ": "Hertz", "HC": "HC (press, shear)", "N19": "N19"}
-TURNS = 4
-LONG_ENOUGH = 10.0
-"""Seconds of a solve that is not run again."""
+TURNS = 3
+LONG_ENOUGH = 8.0
+"""Seconds of solves after which one is not run again."""
 
 
 def bare_transforms(program: Path, side: int) -> dict[str, float]:
@@ -221,7 +221,7 @@ def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, An
     two: list[dict[str, Any]] = []
     pairs: list[float] = []
     for turn in range(turns):
-        if turn and one[0].get("solve", 0.0) > LONG_ENOUGH:
+        if turn and turn * one[0].get("solve", 0.0) > LONG_ENOUGH:
             break
         one.append(worker.run(task_of(name, side, 1, repeats)))
         if both:

@@ -21,7 +21,7 @@ def limiting_depth(r: Any) -> Any:
     return np.maximum(gap - r**2 / (2.0 * RADIUS), 0.0)
 
 
-AWAY = (1.0, 2.0, 4.0)
+AWAY = (0.5, 1.0, 2.0, 4.0)
 
 
 def measure(*, quick: bool, long: bool) -> list[Table]:
@@ -31,6 +31,7 @@ def measure(*, quick: bool, long: bool) -> list[Table]:
         [
             *("spacings in a, `tolerance`", "cycles solved", "load", "pressure, mean over the disc"),
             *(f"depth beyond c + {away:g}" for away in AWAY),
+            "pressure beyond c + 1",
         ],
     )
     tasks = [(12, 0.1), (12, 0.03), (12, 0.01), (24, 0.1), (24, 0.03), (24, 0.01)] + [(48, 0.03)] * long
@@ -71,4 +72,4 @@ def errors(nodes: int, tolerance: float) -> list[str]:
         shown.append(
             f"{abs(depth[ring] - limiting_depth(r[ring])).max() / largest:.1%}" if ring.any() else ""
         )
-    return shown
+    return [*shown, f"{pressure[r > STICK + spacing].max() / pressure.max():.1%}"]

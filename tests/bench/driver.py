@@ -184,7 +184,8 @@ def sessions(*, quick: bool) -> list[Table]:
         remarks=["Means of 60 load steps by `Session.advance`: a small tangential load goes back and forth."],
     )
     for title, file in (("in memory", False), ("in a file", True)):
-        found = worker.run({"problem": "sessions", "marks": marks, "file": file}, script=Path(__file__))
+        task = {"problem": "sessions", "marks": marks, "file": file}
+        found = worker.run(task, script=Path(__file__), timeout=1800)
         if "failed" in found:
             table.add(title, found["failed"])
             continue

@@ -24,7 +24,7 @@ Array = Any
 
 
 def clock() -> float:
-    """Return seconds; processor time, which is less disturbed on a busy machine, means something on one thread."""
+    """Return seconds: processor time is less disturbed on a busy machine, and holds for one thread only."""
     return time.process_time() if os.environ.get("BENCH_CLOCK") == "cpu" else time.perf_counter()
 
 

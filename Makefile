@@ -101,7 +101,7 @@ demo: install  ## press a sphere on aluminum, then shear it: history, result and
 verify: install  ## compare with published, discrete and analytic solutions (minutes)
 	$(py) tests/validation/run.py $(CHECKS)
 
-bench: install  ## work, times, memory, other codes side by side: docs/performance.md (BENCH_ARGS=--quick: two minutes)
+bench: install  ## work, times, memory, other codes side by side: tables of docs/performance.md and others (BENCH_ARGS=--quick: minutes)
 	$(py) tests/bench/run.py --build $(BUILD) $(BENCH_ARGS)
 
 # --- tests -------------------------------------------------------------------

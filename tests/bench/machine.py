@@ -46,11 +46,14 @@ def memory() -> str:
 
 
 def hexcontact_version() -> str:
-    """Return the version, with the commit where there is one."""
+    """Return the version, with the commit where there is one; pages that were written do not change it."""
     import hexcontact
 
-    commit = first_line(["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"])
-    return hexcontact.__version__ + (f" ({commit})" if commit != "unknown" else "")
+    git = ["git", "-C", str(Path(__file__).parents[2])]
+    commit = first_line([*git, "describe", "--always"])
+    changed = first_line([*git, "status", "--porcelain", "--", "fortran", "pydriver", "tests/bench"])
+    with_changes = "" if changed == "unknown" else " with changes"
+    return hexcontact.__version__ + (f" ({commit}{with_changes})" if commit != "unknown" else "")
 
 
 def blas() -> str:

@@ -15,13 +15,19 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bench import worker
+from bench.report import Table
 
+HALF = 0.857
+"""Width of the contact over that of a window of which it is the half."""
+IDLE = 16
+"""Nodes along a side of a window that takes no memory beside the program's."""
 RADIUS = 10e-3  # of the sphere, m
 MODULUS = 1.82e9  # Pa; of two alike bodies E* = 1 GPa
 COMMAND = """
@@ -105,6 +111,53 @@ def measured(text: str, threads: int = 1) -> Memory:
     if told.returncode or done.returncode:
         raise RuntimeError(told.stderr + done.stderr)
     return Memory(int(done.stderr.split()[-1]), int(json.loads(told.stdout)["memory"]))
+
+
+def measure(*, quick: bool, long: bool, sizes: Sequence[int] | None = None) -> list[Table]:
+    """Return the table of peaks, estimates and bytes a node."""
+    table = Table(
+        "Peak memory of a whole run, one thread, against what `hexcontact check` says before",
+        [
+            *("run", "peak [MB]", "`check` [MB]", "off", "goal"),
+            *("without program [MB]", "bytes a window node", "goal"),
+        ],
+        remarks=[
+            "Pressed in one load step, with friction sheared in another; half of the window is in contact. "
+            f"*Without program*: less the peak of the same run on {IDLE}² nodes. "
+            + ("" if long else "`--long` measures larger windows, too.")
+        ],
+    )
+    tasks = [
+        (problem, side, "fft") for side in sizes or ((256,) if quick else (256, 1024)) for problem in PROBLEMS
+    ]
+    tasks = [task for task in tasks if task[0] != "wear" or task[1] <= 256]
+    tasks += [("friction, alike", 121, "direct")]
+    if not (sizes or quick):
+        tasks.append(("frictionless", 2048, "fft"))
+    if long:
+        tasks += [
+            ("friction, alike", 2048, "fft"),
+            ("friction, unlike", 2048, "fft"),
+            ("frictionless", 4096, "fft"),
+        ]
+    for problem, side, method in tasks:
+        found, idle = (
+            measured(deck(problem, n, share=HALF, steps=1, more=f'[solver]\nmethod = "{method}"\n'))
+            for n in (side, IDLE)
+        )
+        own = found.peak - idle.peak
+        goal = 150 if problem == "frictionless" else 350 if side <= 1024 else 300
+        table.add(
+            f"{problem}, {side}²{', LAPACK' if method == 'direct' else ''}",
+            *(f"{found.peak / 1e6:.0f}", f"{found.estimate / 1e6:.0f}", f"{found.error:+.1%}", "±10 %"),
+            *(
+                f"{own / 1e6:.0f}",
+                f"{own / side**2:.0f}" if method == "fft" else "",
+                "≤ 230 MB" if method == "direct" else "" if problem == "wear" else f"≤ {goal}",
+            ),
+        )
+        print(f"  {table.rows[-1]}", flush=True)
+    return [table]
 
 
 def main() -> None:

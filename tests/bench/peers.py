@@ -19,7 +19,7 @@ TOLERANCE = 1e-8
 FRACTION = 0.5
 """Share of the window in contact: the window is 2.7 contact radii wide."""
 SHEARED_FRACTION = 0.2
-LONGEST = 90.0
+LONGEST = 30.0
 """Seconds; what would take longer is left out, and said."""
 
 ENOUGH = 10.0
@@ -27,7 +27,7 @@ ENOUGH = 10.0
 
 SIZES = (256, 512, 1024, 2048)
 SHEARED_SIZES = (64, 128, 256, 512)
-TURNS = 4
+TURNS = 3
 GROWTH = 6.0
 """What a window of twice as many nodes a side costs at least."""
 
@@ -65,6 +65,11 @@ PEERS = (
     ),
     Peer("tamaas", "peer_tamaas.py", (("tamaas==2.9.0",),)),
     Peer("ContactMechanics", "peer_contactmechanics.py", (("ContactMechanics==1.8.3",),)),
+)
+
+
+ELSEWHERE = (
+    "CONTACT is not there: it is in no package index, and its makefiles ask for Intel's compiler and MKL."
 )
 
 
@@ -124,7 +129,7 @@ class Entry:
     def answer(self, task: dict[str, Any]) -> dict[str, Any]:
         """Return the answer of the code to a task."""
         return worker.run(
-            task | {"tolerance": self.tolerance}, script=self.script, python=self.python, timeout=4 * LONGEST
+            task | {"tolerance": self.tolerance}, script=self.script, python=self.python, timeout=8 * LONGEST
         )
 
 
@@ -154,7 +159,7 @@ def measure(
         sheared = (64,) if quick else SHEARED_SIZES
         pair = [code for code in codes if code.label in ("hexcontact", "aspher")]
         tables.append(cattaneo_mindlin(pair, sheared))
-    tables[0].remarks += absent
+    tables[0].remarks += [*absent, ELSEWHERE]
     return tables
 
 
@@ -207,7 +212,7 @@ def hertz(codes: list[Entry], sizes: Sequence[int]) -> list[Table]:
                 fastest,
                 f"{(best['setup'] + best['solve']) / (ours['setup'] + ours['solve']):.2f}",
                 f"{best['solve'] / ours['solve']:.2f}",
-                "≥ 2, better 4",
+                "≥ 4",
                 *at_its_error(side, best),
             )
     return [summary, table]

@@ -9,7 +9,7 @@ lattices, checks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -54,6 +54,8 @@ class Problem:
         The last so many steps are counted, the earlier ones lead there.
     goal
         Operator applications a step that are aimed at, on any mesh.
+    tolerance
+        Of all residuals.
     """
 
     title: str
@@ -61,6 +63,7 @@ class Problem:
     steps: tuple[tuple[float, float], ...]
     counted: int
     goal: float
+    tolerance: float = TOLERANCE
 
 
 def _path() -> tuple[tuple[float, float], ...]:
@@ -89,6 +92,35 @@ FRICTIONAL = {
     "N30": Problem("normal load at once, β = 0.3, µ = 0.6", Material(0.3, 0.4, 0.6), ((1, 0),), 1, 75),
     "N50": Problem("normal load at once, β = 0.5, µ = 0.6", Material(0.5, 0.0, 0.6), ((1, 0),), 1, 75),
 }
+
+
+def _loop() -> tuple[tuple[float, float], ...]:
+    """One step of normal load, and 24 of shear to 0.6 mu P, to -0.6 mu P, and back to none."""
+    return ((1.0, 0.0), *((1.0, k / 10) for k in (*range(1, 7), *range(5, -7, -1), *range(-5, 1))))
+
+
+LOADED = {
+    "HC": FRICTIONAL["HC"],
+    "CM875": Problem("Hertz, then Q = 0.875 µP at once", ALIKE, ((1, 0), (1, 0.875)), 1, 35),
+    "LOOP": Problem("fretting loop of 25 steps, µ = 0.5", ALIKE, _loop(), 25, 35),
+    "PRESS10": Problem(
+        "normal load in 10 steps, β = −0.19, µ = 0.1",
+        DISSIMILAR,
+        tuple((k / 10, 0.0) for k in range(1, 11)),
+        10,
+        60,
+    ),
+    "HIST": FRICTIONAL["HIST"],
+}
+"""Histories that are timed at two tolerances."""
+
+LOOSE = 1e-5
+BOUNDED = (
+    FRICTIONAL
+    | LOADED
+    | {f"{name}, 1e-5": replace(problem, tolerance=LOOSE) for name, problem in LOADED.items()}
+)
+"""All whose counts are bounded."""
 
 HERTZ_TITLE = "Hertz, without friction, cold (scalar products)"
 HERTZ_GOAL = 12
@@ -143,7 +175,7 @@ def run_steps(
     for number, (press, shear) in enumerate(problem.steps):
         load = press * LOAD
         target = (load, shear * problem.material.friction * load, 0.0, 0.0)
-        state = contact.advance(state, FORCE, target, tolerance=TOLERANCE)
+        state = contact.advance(state, FORCE, target, tolerance=problem.tolerance)
         if not state.converged:
             raise RuntimeError(f"{problem.title}: step {number + 1} has not converged")
         if number >= first:
@@ -156,7 +188,7 @@ def run_steps(
 
 def count_frictional(name: str, spacings_in_radius: int) -> Count:
     """Return the work of a problem with friction."""
-    problem = FRICTIONAL[name]
+    problem = BOUNDED[name]
     return run_steps(frictional_contact(problem.material, window(spacings_in_radius)), problem)
 
 

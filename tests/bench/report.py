@@ -1,15 +1,13 @@
-"""Tables: printed on the terminal, kept as JSON between runs, written into docs/performance.md."""
+"""Tables: printed on the terminal, and put in the place of older ones into the pages of docs."""
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
-HERE = Path(__file__).parent
-PAGE = HERE.parents[1] / "docs" / "performance.md"
-TEMPLATE = HERE / "performance.md.in"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @dataclass
@@ -49,37 +47,23 @@ class Table:
         return "\n".join([*lines, *self.remarks])
 
 
-def keep(store: Path, section: str, tables: Sequence[Table], date: str) -> None:
-    """Add the tables of a section to the file of results."""
-    results = json.loads(store.read_text()) if store.exists() else {}
-    results[section] = {"date": date, "tables": [asdict(table) for table in tables]}
-    store.parent.mkdir(parents=True, exist_ok=True)
-    store.write_text(json.dumps(results, indent=1, ensure_ascii=False))
+def place(section: str, docs: Path = DOCS) -> tuple[Path, re.Match[str]]:
+    """Return the page with the place of a section, which its comments mark, and the place."""
+    place = re.compile(f"(?<=<!-- begin {section} -->).*?(?=<!-- end {section} -->)", re.DOTALL)
+    found = [(page, place.search(page.read_text())) for page in sorted(docs.rglob("*.md"))]
+    places = [(page, match) for page, match in found if match]
+    if len(places) != 1:
+        raise LookupError(f"{len(places)} places for {section} in {docs}")
+    return places[0]
 
 
-def write_page(store: Path, page: Path = PAGE) -> list[str]:
-    """Fill the template with all kept results; return the sections that have none."""
-    results = json.loads(store.read_text()) if store.exists() else {}
-    text = TEMPLATE.read_text()
-    newest = max((kept["date"] for kept in results.values()), default="")
-    missing = []
-    for section in sections():
-        if section in results:
-            kept = results[section]
-            filled = "\n\n".join(Table(**table).markdown() for table in kept["tables"])
-            if kept["date"] != newest:
-                filled += f"\n\nMeasured on {kept['date']}."
-        else:
-            filled = "Not measured yet."
-            missing.append(section)
-        text = text.replace(f"@@{section}@@", filled)
-    page.write_text(text)
-    return missing
-
-
-def sections() -> list[str]:
-    """Return the sections of the page, in order."""
-    return [word.split("@@")[0] for word in TEMPLATE.read_text().split("\n@@")[1:]]
+def write(section: str, tables: Sequence[Table], stamp: str, docs: Path = DOCS) -> Path:
+    """Put tables, and when and with what they were measured, into their page; all else stays."""
+    page, match = place(section, docs)
+    lines = [table.markdown() for table in tables] + ([f"*Measured {stamp}.*"] if stamp else [])
+    text = match.string
+    page.write_text("\n\n".join([text[: match.start()].rstrip("\n"), *lines, text[match.end() :]]))
+    return page
 
 
 def seconds(value: float) -> str:

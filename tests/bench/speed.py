@@ -1,28 +1,24 @@
-"""Seconds over the bare transforms, threads, memory, the command, the direct method."""
+"""Seconds over the bare transforms, threads, set-ups, load histories, the direct method."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
-import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from . import worker
+from . import lapack, problems, worker
 from .report import Table, seconds
 
-ROOT = Path(__file__).parents[2]
 SIZES = (256, 512, 1024, 2048)
 LARGEST_WITH_FRICTION = 1024
 PROBLEMS = {"HERTZ": "Hertz", "HC": "HC (press, shear)", "N19": "N19"}
-TURNS = 4
-LONG_ENOUGH = 10.0
-"""Seconds of a solve that is not run again."""
+TURNS = 3
+LONG_ENOUGH = 8.0
+"""Seconds of solves after which one is not run again."""
 
 
 def bare_transforms(program: Path, side: int) -> dict[str, float]:
@@ -72,7 +68,7 @@ def task_of(name: str, side: int, threads: int, repeats: int) -> dict[str, Any]:
 
 
 def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
-    """Return seconds over the bare transforms, the gain by two threads, and the memory."""
+    """Return seconds over the bare transforms, and the gain by two threads."""
     ratio = Table(
         "A solve over (operator applications × transforms of one), one thread, in the same run",
         [
@@ -85,6 +81,7 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
             "goal",
             "blocked [ms]",
             "ratio to blocked",
+            "goal",
         ],
     )
     threads = Table(
@@ -102,10 +99,6 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
             "Two processes side by side, one thread each: their speed together over that of one alone, "
             "the upper bound for two threads on this machine at that time."
         ],
-    )
-    memory = Table(
-        "Peak memory of set-up and solve, one thread",
-        ["problem and window", "MB", "bytes a node", "estimate before the run [MB]"],
     )
     # processor time says nothing about threads
     parallel = os.environ.get("BENCH_CLOCK") != "cpu"
@@ -131,14 +124,8 @@ def solves(program: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
                     f"{2.0 * single['solve'] / pair:.2f}",
                     f"{single['setup'] / double['setup']:.2f}",
                 )
-            memory.add(
-                label,
-                f"{single['memory'] / 1e6:.0f}",
-                f"{single['memory'] / side**2:.0f}",
-                f"{estimated_memory(name, side) / 1e6:.0f}",
-            )
             print(f"  {ratio.rows[-1]} {threads.rows[-1][2:4] if parallel else ''}", flush=True)
-    return [ratio, threads, memory] if parallel else [ratio, memory]
+    return [ratio, threads] if parallel else [ratio]
 
 
 def setups(*, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
@@ -189,6 +176,44 @@ def setups(*, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
     return [table]
 
 
+HISTORIES = {"HC": (64, 128, 256), "CM875": (128, 256), "LOOP": (128,), "PRESS10": (128, 256), "HIST": (64,)}
+"""Windows of the load histories."""
+
+
+def histories(*, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
+    """Return times of load histories at a tight tolerance and at a loose one, in turns."""
+    table = Table(
+        "Load histories with friction, one thread: all load steps, half of the window in contact",
+        [
+            *("history", "window", "set-up [s]", "applications", "solve [s]"),
+            *("applications at 10⁻⁵", "solve [s]", "time 10⁻⁵ ÷ 10⁻⁸", "goal"),
+        ],
+    )
+    for name, windows in HISTORIES.items():
+        for side in [n for n in sizes or windows if n in windows][: 1 if quick else None]:
+            task = task_of(name, side, 1, 3 if side < 256 else 1)
+            turns = [
+                [worker.run(task | {"loose": loose}) for loose in (False, True)]
+                for _ in range(1 if quick else 3)
+            ]
+            tight, loose = (worker.best(list(runs), "setup", "solve") for runs in zip(*turns, strict=True))
+            failed = tight.get("failed") or loose.get("failed")
+            if failed:
+                table.add(problems.LOADED[name].title, f"{side}²", failed)
+                continue
+            table.add(
+                *(problems.LOADED[name].title.removesuffix(", mean"), f"{side}²", seconds(tight["setup"])),
+                *(
+                    cell
+                    for found in (tight, loose)
+                    for cell in (f"{found['applications']:.0f}", seconds(found["solve"]))
+                ),
+                *(f"{loose['solve'] / tight['solve']:.2f}", "≤ 0.5"),
+            )
+            print(f"  {table.rows[-1]}", flush=True)
+    return [table]
+
+
 def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, Any], dict[str, Any], float]:
     """Return the best of several runs on one thread, on two, and of two processes at a time, in turns."""
     repeats = 3 if side <= 512 else 1
@@ -196,7 +221,7 @@ def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, An
     two: list[dict[str, Any]] = []
     pairs: list[float] = []
     for turn in range(turns):
-        if turn and one[0].get("solve", 0.0) > LONG_ENOUGH:
+        if turn and turn * one[0].get("solve", 0.0) > LONG_ENOUGH:
             break
         one.append(worker.run(task_of(name, side, 1, repeats)))
         if both:
@@ -204,7 +229,7 @@ def timed(name: str, side: int, *, turns: int, both: bool) -> tuple[dict[str, An
             two.append(worker.run(task_of(name, side, 0, repeats), threads=2))
             pairs.append(side_by_side(task_of(name, side, 1, repeats)))
     pair = min(pairs, default=float("nan"))
-    return worker.best(one, "setup", "solve", "memory"), worker.best(two or one, "setup", "solve"), pair
+    return worker.best(one, "setup", "solve"), worker.best(two or one, "setup", "solve"), pair
 
 
 def side_by_side(task: dict[str, Any]) -> float:
@@ -229,53 +254,7 @@ def add_ratio(
         milliseconds = times_three * min(t[f"{kind}_{way}"] for t in bare)
         ratio = answer["solve"] / (answer["applications"] * milliseconds * 1e-3)
         shown += [f"{milliseconds:.2f}", f"{ratio:.2f}"]
-    table.add(label, *times, *shown[:2], "≤ 1.3", *shown[2:])
-
-
-def estimated_memory(name: str, side: int) -> int:
-    """Bytes that the program expects a problem to take."""
-    from hexcontact.core import contact, friction
-
-    if name == "HERTZ":
-        return contact.memory_needed("fft", side, side)
-    return friction.memory_needed("fft", side, side, loads=2)
-
-
-def command(*, quick: bool) -> list[Table]:
-    """Return the times of the command from the shell."""
-    table = Table("The command, from the shell", ["command", "best [s]", "goal"])
-    program = [sys.executable, "-m", "hexcontact"]
-    installed = shutil.which("hexcontact", path=str(Path(sys.executable).parent))
-    if installed:
-        program = [installed]
-    with tempfile.TemporaryDirectory() as folder:
-        for words, shown, goal in (
-            (["--help"], "hexcontact --help", "< 0.3"),
-            (
-                ["run", str(ROOT / "cases/hertz_spheres.toml"), "--overwrite"],
-                "hexcontact run hertz_spheres.toml (Table 9.1)",
-                "< 1.5",
-            ),
-            (
-                ["run", str(ROOT / "cases/hertz_table_9_2.toml"), "--overwrite"],
-                "hexcontact run hertz_table_9_2.toml",
-                "",
-            ),
-        ):
-            best = float("inf")
-            for _ in range(2 if quick else 5):
-                start = time.perf_counter()
-                subprocess.run(
-                    [*program, *words],
-                    cwd=folder,
-                    check=True,
-                    capture_output=True,
-                    env=worker.environment(1),
-                )
-                best = min(best, time.perf_counter() - start)
-            table.add(shown, f"{best:.2f}", goal)
-            print(f"  {table.rows[-1]}", flush=True)
-    return [table]
+    table.add(label, *times, *shown[:2], "≤ 1.3", *shown[2:], "≤ 3")
 
 
 def direct(*, quick: bool) -> list[Table]:
@@ -298,4 +277,14 @@ def direct(*, quick: bool) -> list[Table]:
     ):
         table.add(title, f"{answer[name]:.2f}", goal, f"{18 * 60 / answer[name]:.0f}")
         print(f"  {table.rows[-1]}", flush=True)
+    name = "pressed in 1, sheared in 9"
+    task = {
+        "problem": "history",
+        "side": 51,
+        "spacings": 18.7,
+        "material": "unlike",
+        "steps": lapack.HISTORIES[name],
+    }
+    time = lapack.measured(task | {"method": "direct", "repeats": 1 if quick else 3})["seconds"]
+    table.add(f"β = −0.19, µ = 0.1, {name}: ten load steps", f"{time:.2f}", "≤ 1", "")
     return [table]

@@ -22,8 +22,10 @@ import numpy as np
 
 Array = Any
 
-clock = time.process_time if os.environ.get("BENCH_CLOCK") == "cpu" else time.perf_counter
-"""Processor time is less disturbed on a busy machine; it means something for one thread only."""
+
+def clock() -> float:
+    """Return seconds: processor time is less disturbed on a busy machine, and holds for one thread only."""
+    return time.process_time() if os.environ.get("BENCH_CLOCK") == "cpu" else time.perf_counter()
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,22 @@
-"""Limiting shape of a sphere that wears in partial slip, against its closed form (docs/theory/wear.md, V5).
+"""Limiting shape of a sphere that wears in partial slip: its closed form is (V5) of docs/theory/wear.md.
 
 The limit on the lattice is the gap beyond a rigid disc of the nodes that were not worn: what separates it
 from the closed form is the lattice, what separates the run from it is the jumps.
-
-OMP_NUM_THREADS=1 python tests/bench/wear_limit.py [NODES] [TOLERANCE] [CYCLES]
 """
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import numpy as np
 
 from hexcontact import Case, ElasticPair, NormalContact
 
+from .report import Table
+
 MODULUS, RADIUS, CONTACT, MU = 1e11, 1e-2, 1e-4, 0.5
 APPROACH, STICK = CONTACT**2 / RADIUS, 0.6 * CONTACT
+AWAY = (0.5, 1.0, 2.0, 4.0)
 
 
 def limiting_depth(r: Any, stick: float = STICK) -> Any:
@@ -35,10 +35,25 @@ def limit_on_lattice(lattice: Any, gap: Any, disc: Any) -> tuple[Any, float]:
     return np.where(disc, 0.0, np.maximum(-worn.gap, 0.0)), punch.normal_load / (MODULUS * APPROACH)
 
 
-def main() -> None:
-    """Print the errors of load, of the pressure on the disc and of the depth beyond it."""
-    words = (*sys.argv[1:], *("12", "0.1", "3e7")[len(sys.argv) - 1 :])
-    nodes, tolerance, cycles = (float(word) for word in words)
+def measure(*, quick: bool, long: bool) -> list[Table]:
+    """Return the errors by spacings in the contact radius and tolerance of the jumps."""
+    table = Table(
+        "Limiting shape after 3·10⁷ cycles: errors against the closed form",
+        [
+            *("spacings in a, `tolerance`", "cycles solved", "load", "pressure, mean over the disc"),
+            *(f"depth beyond c + {away:g}" for away in AWAY),
+            *("of it by jumps", "stiff as a disc of"),
+        ],
+    )
+    tasks = [(12, 0.1), (12, 0.03), (24, 0.1), (24, 0.03), (24, 0.01)] + [(48, 0.1), (48, 0.03)] * long
+    for nodes, tolerance in tasks[: 1 if quick else None]:
+        table.add(f"{nodes}, {tolerance:g}", *errors(nodes, tolerance))
+        print(f"  {table.rows[-1]}", flush=True)
+    return [table]
+
+
+def errors(nodes: int, tolerance: float) -> list[str]:
+    """Return the cycles solved, and errors of load, pressure on the disc and depth beyond it."""
     body = {"young_modulus": MODULUS, "poisson_ratio": 0.0}
     shift = MU * (APPROACH - STICK**2 / RADIUS)
     path = [{"shift_x": x, "steps": n} for x, n in ((shift, 2), (-shift, 4), (0.0, 2))]
@@ -48,7 +63,7 @@ def main() -> None:
         nodes_in_radius=nodes,
         friction_coefficient=MU,
         loads=[{"approach": APPROACH, "shift_x": 0.0}, {"label": "fretting", "path": path}],
-        wear={"coefficient_1": 1e-14, "cycle": "fretting", "cycles": int(cycles), "tolerance": tolerance},
+        wear={"coefficient_1": 1e-14, "cycle": "fretting", "cycles": 30_000_000, "tolerance": tolerance},
     ).run()  # fmt: skip
     data = result.dataset
     last, spacing = data.isel(step=-1), CONTACT / nodes
@@ -58,26 +73,18 @@ def main() -> None:
     root = np.sqrt(STICK**2 - r[inside] ** 2)
     exact = MODULUS / 2 / np.pi * ((APPROACH - STICK**2 / RADIUS) / root + 2 / RADIUS * root)
     limit = MODULUS * (APPROACH * STICK - STICK**3 / (3 * RADIUS))
-    print(f"{(data['wear_cycles'] >= 0).sum().item()} cycles solved")
-    print(f"load {float(last['normal_load']) / limit - 1:+.2%}")
-    print(f"pressure on the disc {(pressure[inside] / exact - 1).mean():+.2%} in the mean")
     disc = (depth == 0.0) & (r < STICK + 2.0 * spacing)
     on_lattice, radius = limit_on_lattice(result.lattice, last["initial_gap"].values, disc)
-    print(f"{disc.sum()} nodes are not worn, like a disc of {radius / STICK:.4f} c")
     largest = limiting_depth(np.linspace(1.001 * STICK, CONTACT)).max()
-    for away in (0.5, 1.0, 2.0, 4.0):
+    shown = [
+        f"{(data['wear_cycles'] >= 0).sum().item()}",
+        f"{float(last['normal_load']) / limit - 1:+.2%}",
+        f"{(pressure[inside] / exact - 1).mean():+.2%}",
+    ]
+    for away in AWAY:
         ring = (r > STICK + away * spacing) & (r < 1.2 * CONTACT)
-        if not ring.any():
-            continue
-        exact, same = limiting_depth(r[ring]), limiting_depth(r[ring], radius)
-        pairs = ((depth[ring], exact), (depth[ring], same), (depth[ring], on_lattice[ring]))
-        whole, by_capacity, jumps = (abs(one - other).max() / largest for one, other in pairs)
-        carried = pressure[ring].max() / pressure.max()
-        print(
-            f"beyond c + {away:g} spacings: depth {whole:.2%}, by the radius of that disc {by_capacity:.2%}, "
-            f"by the lattice {jumps:.3%}, pressure {carried:.2%}"
-        )
-
-
-if __name__ == "__main__":
-    main()
+        error = abs(depth[ring] - limiting_depth(r[ring]))
+        shown.append(f"{error.max() / largest:.1%}" if ring.any() else "")
+    beyond = r > STICK + 0.5 * spacing
+    jumps = abs(depth - on_lattice)[beyond & (r < 1.2 * CONTACT)].max()
+    return [*shown, f"{jumps / largest:.2%}", f"{radius / STICK:.4f} c"]

@@ -182,6 +182,7 @@ contains
     integer :: n, row, from, to
 
     n = size(self%p)
+    allocate (self%w(n), self%closing(n), self%u(2*n))
     if (self%pressure_feels_shear) then
       call self%operators%apply([along_x, along_y], self%q, [normal], self%closing, error)
       if (allocated(error)) return

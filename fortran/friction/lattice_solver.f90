@@ -95,13 +95,13 @@ contains
           .and. .not. now%unsupported .and. fixed < options%max_fixed_sweeps) cycle
 
       ! the recorded tractions are admissible exactly, and judged by a product of their own
-      call now%forget_displacements()
+      known = .not. judged .or. tolerance >= options%carried_tolerance
+      if (.not. known) call now%forget_displacements()
       if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
       call record(now, state)
       state%motion = now%motion
       allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
-      known = .not. judged
-      if (judged .and. tolerance >= options%carried_tolerance) known = cut_off(now, state) <= options%cut_share*tolerance
+      if (known .and. judged) known = cut_off(now, state) <= options%cut_share*tolerance
       if (known) then
         call collect(now, displacement)
         call problem%complete_state(target, merge(1.0_wp - options%cut_share, 1.0_wp, judged)*tolerance, reference, &

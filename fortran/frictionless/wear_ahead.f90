@@ -85,7 +85,7 @@ contains
     before = slipping_pressure(now%energy, now%path, now%friction, now%pressure)
     if (.not. any(now%candidate .and. before > 0.0_wp)) return
     spring = merge(cycles*coefficient*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
-    call settle(now, lattice, pair, law, before, spring, tolerance, after, error, n_threads, cache)
+    call settle(now, lattice, pair, law, before, spring, tolerance, after, error, space_over(lattice%extent, n_threads), cache)
     if (allocated(error)) return
     do row = 1, size(ahead, 2)
       do col = 1, size(ahead, 1)
@@ -96,7 +96,7 @@ contains
   end subroutine energy_ahead
 
   !> Solve for the pressure on springs that are new, given one that is in balance without them.
-  subroutine settle(now, lattice, pair, law, before, spring, tolerance, after, error, n_threads, cache)
+  subroutine settle(now, lattice, pair, law, before, spring, tolerance, after, error, space, cache)
     !> The cycle
     type(worn_cycle_t), intent(in) :: now
     !> Lattice and window
@@ -115,20 +115,18 @@ contains
     real(wp), intent(out) :: after(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use
-    integer, intent(in), optional :: n_threads
+    !> Where sums are taken
+    type(field_space_t), intent(in) :: space
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     type(normal_lattice_t) :: level
     type(normal_iterate_t) :: iterate
     type(normal_kernel_t), target :: kernel
     type(contact_state_t) :: state
-    type(field_space_t) :: space
     real(wp), allocatable :: closing(:, :), layer(:, :)
     real(wp) :: lift
     integer :: col, row
 
-    space = space_over(lattice%extent, n_threads)
     level%lattice = lattice
     level%pair = pair
     level%candidate = now%candidate

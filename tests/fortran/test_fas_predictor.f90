@@ -80,6 +80,7 @@ contains
     type(operators_t) :: operators(1)
     type(load_target_t) :: target
     real(wp) :: work, p_max
+    real(wp), allocatable :: estimate(:, :, :)
     logical :: predicted
     integer :: i
 
@@ -91,7 +92,7 @@ contains
       if (i == 2) target = load_target_t([d, d, d, d], state%motion)
       target%value(4) = 0.0_wp
       call predict(contact%problem, coarse, operators, state, state%relative_displacement, target, guess, predicted, &
-                   work, error)
+                   work, error, estimate)
       if (allocated(error)) return
       call check_true(error, predicted, 'a prediction')
       if (allocated(error)) return
@@ -101,7 +102,7 @@ contains
       if (allocated(error)) return
       call check(error, guess%motion, state%motion, 1.0e-7_wp, 'motions')
       if (allocated(error)) return
-      call check_true(error, work > 1.1_wp .and. work < 1.44_wp, 'work, in applications on the fine lattice')
+      call check_true(error, work > 0.8_wp .and. work < 1.1_wp, 'work, in applications on the fine lattice')
       if (allocated(error)) return
     end do
   end subroutine test_nothing_new
@@ -112,23 +113,31 @@ contains
     type(frictional_contact_t) :: contact
     type(contact_state_t) :: state, guess, after
     type(friction_problem_t) :: coarse(1)
-    type(operators_t) :: operators(1)
+    type(operators_t) :: operators(1), fine
     real(wp), parameter :: value(4, 3) = reshape([ &
       load, 0.6_wp*mu*load, 0.0_wp, 0.0_wp, &
       1.2_wp*load, 0.5_wp*mu*load, 0.0_wp, 0.0_wp, &
       load, 0.3_wp*mu*load, 0.1_wp*mu*load, 0.0_wp], [4, 3])
+    real(wp), allocatable :: estimate(:, :, :), exact(:, :, :), old(:, :, :)
     real(wp) :: work
     logical :: predicted
     integer :: i, inside
 
     call set_up(24, contact, state, coarse, operators, error)
     if (allocated(error)) return
+    call new_operators(fine, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    if (allocated(error)) return
+    allocate (exact(contact%problem%lattice%extent(1), contact%problem%lattice%extent(2), 3))
+    allocate (old, mold=exact)
+    call contact%problem%displacements(fine%flexibility, state%pressure, state%traction, old, error)
+    if (allocated(error)) return
     do i = 1, 3
       after = state
+      if (allocated(estimate)) deallocate (estimate)
       call go(contact, after, [f, f, f, d], value(:, i), error)
       if (allocated(error)) return
       call predict(contact%problem, coarse, operators, state, state%relative_displacement, &
-                   load_target_t([f, f, f, d], value(:, i)), guess, predicted, work, error)
+                   load_target_t([f, f, f, d], value(:, i)), guess, predicted, work, error, estimate)
       if (allocated(error)) return
       call check_true(error, predicted, 'a prediction')
       if (allocated(error)) return
@@ -137,11 +146,16 @@ contains
       if (allocated(error)) return
       call check_true(error, norm2(guess%motion - after%motion) < 0.01_wp*norm2(state%motion - after%motion), 'motions')
       if (allocated(error)) return
+      ! interpolated, not multiplied
+      call contact%problem%displacements(fine%flexibility, guess%pressure, guess%traction, exact, error)
+      if (allocated(error)) return
+      call check_true(error, norm2(estimate - exact) < 0.03_wp*norm2(old - exact), 'displacements')
+      if (allocated(error)) return
       if (i > 1) cycle
       ! where the slip zone only grows
       inside = count(after%zone == slip .and. &
                      hypot(guess%traction(:, :, 1), guess%traction(:, :, 2)) < 0.999_wp*mu*guess%pressure)
-      call check_true(error, inside < 0.039_wp*count(after%zone == slip), 'slip on the cone')
+      call check_true(error, inside < 0.042_wp*count(after%zone == slip), 'slip on the cone')
       if (allocated(error)) return
     end do
   end subroutine test_change
@@ -153,13 +167,14 @@ contains
     type(contact_state_t) :: state, guess
     type(friction_problem_t) :: coarse(1)
     type(operators_t) :: operators(1)
+    real(wp), allocatable :: estimate(:, :, :)
     real(wp) :: work
     logical :: predicted
 
     call set_up(10, contact, state, coarse, operators, error)
     if (allocated(error)) return
     call predict(contact%problem, coarse, operators, state, state%relative_displacement, &
-                 load_target_t([f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp]), guess, predicted, work, error)
+                 load_target_t([f, f, f, d], [load, 0.0_wp, 0.0_wp, 0.0_wp]), guess, predicted, work, error, estimate)
     if (allocated(error)) return
     call check_true(error, .not. (predicted .or. work > 0.0_wp), 'no prediction')
     if (allocated(error)) return

@@ -1,11 +1,11 @@
 !> What a jump of many cycles wears off, with the pressure after the jump.
 !>
 !> A node that slips by S in a cycle wears by n k S p in n cycles. With the pressure p at the end of the jump this is a spring of
-!> compliance C = n k S at each node, and that pressure is the one of a frictionless contact on these springs, (V7): wear
+!> compliance C = n k S at each node, and that pressure is the one of a frictionless contact on these springs, (V4): wear
 !> never takes more than there is pressure left to take away, however long the jump. The change from the
 !> pressure of the cycle is all that is solved for, so that shear tractions and bulk strains, which stay, need not be known.
 !>
-!> Equations: docs/theory/wear.md, (V3), (V7).
+!> Equations: docs/theory/wear.md, (V3), (V4).
 module hc_wear_ahead
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
@@ -53,7 +53,7 @@ contains
     if (energy > 0.0_wp .and. path > 0.0_wp .and. friction > 0.0_wp) slipping_pressure = energy/(friction*path)
   end function slipping_pressure
 
-  !> Find the energy of a cycle by which a jump wears, (V7): that of the cycle before it, times the pressure after over before.
+  !> Find the energy of a cycle by which a jump wears, (V4): that of the cycle before it, times the pressure after over before.
   subroutine energy_ahead(now, lattice, pair, law, coefficient, cycles, tolerance, ahead, error, n_threads, cache)
     !> The cycle before the jump
     type(worn_cycle_t), intent(in) :: now

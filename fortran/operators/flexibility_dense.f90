@@ -96,12 +96,12 @@ contains
     logical, intent(in), optional :: unlike
     integer, parameter :: long = selected_int_kind(18)
     !> What BLAS packs matrices into: 2 to 15 MB, as it was built and for what processor
-    integer(long), parameter :: buffers = 5500000
+    integer(long), parameter :: buffers = 3000000
     !> Vectors of a node in contact with friction: rows and columns of its unknowns, 2.5 as a rule, and ten directions of GMRES
     integer(long), parameter :: vectors = 1800
     !> Pages at the ends of columns of which half is touched, and fifths of the bytes for a pair of nodes: the complement of the
     !> sliding nodes is the larger one of unlike materials
-    integer(long), parameter :: pages(2) = [6500, 8700], fifths(2) = [21, 24]
+    integer(long), parameter :: pages(2) = [4500, 6000], fifths(2) = [21, 24]
     integer(long) :: n, n_window
     logical :: slides
 

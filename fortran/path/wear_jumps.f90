@@ -1,15 +1,15 @@
 !> Wear of the surfaces by fretting cycles, of which one stands for many.
 !>
 !> A cycle of the loads is solved with the gap as it is worn, and wears the surfaces as often as the jump says, (V3), with
-!> its pressure as it will be then (hc_wear_ahead). Two jumps of n cycles are compared with one of 2 n, (V4); what they change
-!> decides, through hc_step_control, how large the next jump is, and corrects the second one, (V8), which makes the two of the
+!> its pressure as it will be then (hc_wear_ahead). Two jumps of n cycles are compared with one of 2 n, (V6); what they change
+!> decides, through hc_step_control, how large the next jump is, and corrects the second one, (V5), which makes the two of the
 !> second order:
 !>
 !>     call energy_ahead(cycle, ..., cycles, ..., energy)
 !>     call wear_by(energy, coefficient, friction, cycles, area, depth, volume)
 !>     call jump_change(..., energy, that of the second jump, that of one jump of both, ..., slower, change)
 !>
-!> Equations: docs/theory/wear.md, (V1) to (V4), (V8).
+!> Equations: docs/theory/wear.md, (V1) to (V6), (V5).
 module hc_wear_jumps
   use hc_precision, only: wp, sp
   use hc_options, only: step_options_t
@@ -58,7 +58,7 @@ contains
     volume = area*sum(depth)
   end subroutine wear_by
 
-  !> Compute what two jumps change in comparison with one of both, (V4): the depth, and its root mean square over what the
+  !> Compute what two jumps change in comparison with one of both, (V6): the depth, and its root mean square over what the
   !> largest pressure indents one node, as tractions that the step adds.
   pure subroutine jump_change(lattice, pair, first, second, both, coefficient, friction, cycles, p_max, slower, change)
     !> Lattice

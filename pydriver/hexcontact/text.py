@@ -114,7 +114,8 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     power = 3 * math.floor((math.log10(abs(rounded)) + times - 1) / (3 * times))
     if not unit or power not in PREFIXES:
         return f"{rounded:.{digits}g} {unit}".rstrip()
-    number = f"{rounded / 10.0 ** (times * power):#.{digits}g}".rstrip(".")
+    counted = rounded / 10.0 ** (times * power)
+    number = f"{counted:#.{digits}g}".rstrip(".") if abs(counted) < 10**digits else f"{counted:.0f}"
     return f"{number} {PREFIXES[power]}{shown}"
 
 

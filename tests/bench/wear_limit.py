@@ -1,4 +1,4 @@
-"""Limiting shape of a sphere that wears in partial slip: its closed form is (V5) of docs/theory/wear.md.
+"""Limiting shape of a sphere that wears in partial slip: its closed form is (V7) of docs/theory/wear.md.
 
 The limit on the lattice is the gap beyond a rigid disc of the nodes that were not worn: what separates it
 from the closed form is the lattice, what separates the run from it is the jumps.

@@ -294,10 +294,10 @@ def test_a_step_that_fails_leaves_the_session_where_it_was() -> None:
 
 
 def test_a_load_is_checked_and_unrolled_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = fretting().start()
     checked: list[Any] = []
     validate = Load.model_validate
     monkeypatch.setattr(Load, "model_validate", lambda data: checked.append(data) or validate(data))
-    session = fretting().start()
     for count, load in enumerate((10.0, 11.0, 12.0, 13.0), start=1):
         session.advance(normal_load=load)
         assert len(checked) == count

@@ -161,7 +161,7 @@ _ALL = (
         "wear",
         "Wear by cycles",
         "Volume of the dissipated work (V2); a sphere in partial slip at a constant approach, worn until "
-        "only the disc that sticks carries, (V5); the flat of a sphere in gross slip, constant load, (V6), "
+        "only the disc that sticks carries, (V7); the flat of a sphere in gross slip, constant load, (V8), "
         "which holds where the surface wears by more than it deforms.",
         _of("wear", "wear"),
     ),

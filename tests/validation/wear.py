@@ -48,7 +48,7 @@ def _volume(found: Comparison, case: str, mu: float, cycles: Any) -> None:
 
 
 def wear() -> Comparison:
-    """Limiting shape (V5) and flat of a sphere (V6)."""
+    """Limiting shape (V7) and flat of a sphere (V8)."""
     found = Comparison()
     mu, c = 0.5, 0.6 * CONTACT
     case = "partial slip, c = 0.6 a, 24 spacings in a"
@@ -83,7 +83,7 @@ def wear() -> Comparison:
     )
     away = r > c + 2.0 * spacing
     off = abs(depth[away] - _depth(r[away], c)).max() / depth.max()
-    found.add(f"{case}, 2 spacings beyond c", "depth less (V5)", "-", off, analytic=0.0, absolute=0.01)
+    found.add(f"{case}, 2 spacings beyond c", "depth less (V7)", "-", off, analytic=0.0, absolute=0.01)
     _volume(found, case, mu, cycles)
 
     mu, case = 0.3, "gross slip, 10 spacings in a"
@@ -105,12 +105,12 @@ def wear() -> Comparison:
 
 
 def _pressure(r: Any, c: float) -> Any:
-    """Return the limiting pressure over E*/pi, (V5)."""
+    """Return the limiting pressure over E*/pi, (V7)."""
     return (APPROACH - c**2 / RADIUS) / np.sqrt(c**2 - r**2) + 2 / RADIUS * np.sqrt(c**2 - r**2)
 
 
 def _depth(r: Any, c: float) -> Any:
-    """Return the limiting depth beyond the disc that sticks, (V5)."""
+    """Return the limiting depth beyond the disc that sticks, (V7)."""
     angle, root = np.arcsin(c / r), np.sqrt(r**2 - c**2)
     gap = (r**2 * angle - c * root) / np.pi / RADIUS + APPROACH * (1.0 - 2.0 * angle / np.pi)
     return np.maximum(gap - r**2 / (2.0 * RADIUS), 0.0)

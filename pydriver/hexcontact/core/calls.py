@@ -81,11 +81,11 @@ class HeldState:
         raise ResourceError("not enough memory for the state of the contact: choose a smaller window")
 
     @staticmethod
-    def of(state: Any) -> HeldState | None:
-        """Return what a state is the record of, if all that a step starts from is unchanged."""
+    def of(state: Any, numbers: list[float]) -> HeldState | None:
+        """Return what a state with these numbers is the record of, if a step starts from the same."""
         view = getattr(state.pressure, "base", None)
         held = getattr(getattr(view, "base", None), "held", None)
-        return held if isinstance(held, HeldState) and held._is_record(state) else None
+        return held if isinstance(held, HeldState) and held._is_record(state, numbers) else None
 
     def view(self, name: str) -> Array:
         """Return a field, which is no copy."""
@@ -102,9 +102,9 @@ class HeldState:
         """Remember the recorded gap, which differs where nothing can touch, and numbers of the state."""
         self._recorded = weakref.ref(gap), numbers
 
-    def _is_record(self, state: Any) -> bool:
-        gap, numbers = self._recorded
-        if gap() is not state.gap or numbers != [getattr(state, name) for name in CORE["numbers"]]:
+    def _is_record(self, state: Any, numbers: list[float]) -> bool:
+        gap, recorded = self._recorded
+        if gap() is not state.gap or numbers != recorded:
             return False
         names = (name for name in self._places if name != "gap" and name not in SLIP)
         return all(self._is_view(name, getattr(state, name)) for name in names)

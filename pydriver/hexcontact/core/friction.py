@@ -354,11 +354,12 @@ class FrictionalContact(Contact):
 
     def _held(self, state: ContactState) -> HeldState:
         """Return a state in the memory of the core, which is no copy if it was found there."""
-        if (held := HeldState.of(state)) is not None and state.pressure.shape == self.lattice.shape:
+        numbers = [number(getattr(state, name), name) for name in _NUMBERS]
+        held = HeldState.of(state, numbers)
+        if held is not None and state.pressure.shape == self.lattice.shape:
             return held
         fields = [self._vector(state, name) for name in _FIELDS if name not in SLIP]
-        given = [number(getattr(state, name), name) for name in _NUMBERS]
-        return HeldState.copied(self.lattice.shape, fields, given)
+        return HeldState.copied(self.lattice.shape, fields, numbers)
 
     def _vector(self, state: ContactState, name: str) -> Array:
         """Return a field of a state as a vector, which is no copy if it can be."""

@@ -187,7 +187,7 @@ def energy_of_jump(
     cycles: float,
     tolerance: float,
 ) -> Array:
-    """Return the energy of a cycle (J/m2) by which a jump wears: docs/theory/wear.md, (V7).
+    """Return the energy of a cycle (J/m2) by which a jump wears: docs/theory/wear.md, (V4).
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def change_by_jump(
     cycles: float,
     max_pressure: float,
 ) -> tuple[Change, Array, Array]:
-    """Compare two jumps with one of both: docs/theory/wear.md, (V4), (V8).
+    """Compare two jumps with one of both: docs/theory/wear.md, (V6), (V5).
 
     Parameters
     ----------

@@ -37,7 +37,8 @@ contains
       if (size(self%values, kind=int64) >= n) return
       deallocate (self%values)
     end if
-    allocate (self%values(n), source=0.0_wp, stat=stat)
+    allocate (self%values(n), stat=stat)
+    if (stat == 0) self%values = 0.0_wp
   end subroutine reserve
 
   !> Return the address of the memory.

@@ -156,7 +156,7 @@ class TractionField:
         x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         where = self._basis, self._start, self._parts
         found = called(_api.tractions_at_points, *where, x.ravel(), y.ravel())
-        return np.asarray(found).reshape(3, *x.shape)
+        return np.asarray(found).reshape(3, *x.shape) + 0.0  # no sign on zero
 
     def at_nodes(self) -> Array:
         """Return p, q_x and q_y (Pa) at the nodes, shape (3, n_row, n_col)."""

@@ -42,7 +42,7 @@ module hc_frictional_contact
 contains
 
   !> Set up the operators of a problem on all its lattices.
-  subroutine new_frictional_contact(self, problem, error, n_threads, cache)
+  subroutine new_frictional_contact(self, problem, error, n_threads, cache, shared)
     !> Solver to be set up
     type(frictional_contact_t), intent(out) :: self
     !> The problem
@@ -53,6 +53,8 @@ contains
     integer, intent(in), optional :: n_threads
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
+    !> Memory of the transforms of a solver that is never used at the same time, and freed later
+    type(scratch_t), pointer, intent(in), optional :: shared
     type(scratch_t), pointer :: scratch
     integer :: l, n_level
 
@@ -63,7 +65,8 @@ contains
     allocate (self%operators(n_level), self%coarse(2:n_level))
     call build_levels(self%problem, self%coarse)
     ! transforms of all lattices take turns
-    scratch => problem%space%scratch
+    scratch => null()
+    if (present(shared)) scratch => shared
     if (.not. associated(scratch)) allocate (scratch)
     call prepare(self%problem, self%operators(1))
     do l = 2, n_level
@@ -179,7 +182,8 @@ contains
     sweeps = 0
     touching = self%problem%space%max(start%pressure) > 0.0_wp
     if (allocated(self%guess)) then
-      call attempt(self%guess)
+      call copy_tractions(self%guess, guess, self%problem%space)
+      call attempt(guess)
       if (allocated(error)) return
       state%sweeps = sweeps
       state%operator_applications = work

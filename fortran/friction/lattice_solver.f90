@@ -96,6 +96,8 @@ contains
 
       ! the recorded tractions are admissible exactly, and judged by a product of their own
       known = .not. judged .or. tolerance >= options%carried_tolerance
+      ! without friction no sweep finds u, which follows the pressure
+      if (judged .and. .not. problem%friction%resists()) known = .false.
       if (.not. known) call now%forget_displacements()
       if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
       call record(now, state)
@@ -178,7 +180,7 @@ contains
   real(wp) function cut_off(now, state)
     type(friction_iterate_t), intent(in) :: now
     type(contact_state_t), intent(in) :: state
-    real(wp) :: largest, total, less, compliance
+    real(wp) :: largest, total, less, compliance, displaced
     integer :: n, row, col, i
 
     n = size(now%p)
@@ -199,11 +201,11 @@ contains
     associate (pair => now%problem%pair)
       compliance = 2.0_wp*(abs(pair%lambda_1)*(1.0_wp + max(pair%gamma(), 0.0_wp)) + abs(pair%lambda_2))
     end associate
-    cut_off = compliance*sqrt(pi*now%problem%lattice%cell_area()*total*largest)
-    cut_off = cut_off/(now%problem%normal_compliance*max(now%operators%space%max(state%pressure), tiny(1.0_wp)))
+    displaced = compliance*sqrt(pi*now%problem%lattice%cell_area()*total*largest)
+    cut_off = displaced/(now%problem%normal_compliance*max(now%operators%space%max(state%pressure), tiny(1.0_wp)))
     if (.not. now%problem%friction%resists()) return
-    cut_off = max(cut_off, cut_off*now%problem%normal_compliance*now%operators%space%max(state%pressure) &
-                  /(now%problem%tangential_compliance*now%traction_scale()))
+    displaced = displaced + now%problem%pair%tangential_layer*largest
+    cut_off = max(cut_off, displaced/(now%problem%tangential_compliance*now%traction_scale()))
   end function cut_off
 
 end module hc_lattice_solver

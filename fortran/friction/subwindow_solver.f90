@@ -139,7 +139,7 @@ contains
     self%high = high
     call self%problem%extract_part(low, high, problem)
     allocate (self%part)
-    call new_frictional_contact(self%part, problem, error, self%threads, self%cache)
+    call new_frictional_contact(self%part, problem, error, self%threads, self%cache, shared=self%problem%space%scratch)
   end subroutine extract_part
 
 end module hc_subwindow_solver

@@ -223,7 +223,8 @@ class TextTable(NamedTuple):
         whole = sum(widths) + len(between) * (len(widths) - 1)
         title = visible(self.title)
         doubtful = any(_DOUBTFUL.search(cell) for row in ([title], self.headers, *rows) for cell in row)
-        if doubtful or max(whole, len(title)) + 2 > width or len(title) > whole + 2:
+        padded = any(cell != cell.rstrip() for row in ([title], *rows) for cell in row)
+        if doubtful or padded or not rows or max(whole, len(title)) + 2 > width or len(title) > whole + 2:
             return None
 
         def line(row: Sequence[str]) -> str:

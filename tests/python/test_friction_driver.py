@@ -605,6 +605,44 @@ def test_a_first_step_in_parts_is_warned_of_and_named(
     assert tables.file_content(result)["warnings"] == told
 
 
+def sphere_of(pair: ElasticPair, friction_coefficient: float) -> tuple[FrictionalContact, float]:
+    """Return a sphere on 25 x 25 nodes, and the load under which its contact has 9 spacings in the radius."""
+    lattice = Lattice(1 / 9, -12, -12, 25, 25)
+    gap = 0.5 * (lattice.x**2 + lattice.y**2)
+    found = FrictionalContact(lattice, pair, gap, friction_coefficient=friction_coefficient, threads=1)
+    return found, 4.0 / 3.0 * pair.effective_modulus
+
+
+def test_a_start_serves_every_solution_of_a_step() -> None:
+    """With nodes that enter, a step is solved several times; each may begin from the given tractions."""
+    contact, load = sphere_of(ElasticPair.from_materials(None, None, 1e9, 0.1), 0.3)
+    before = contact.advance(contact.virgin(), ["force"] * 4, [0.7 * load, 0.0, 0.0, 0.0])
+    step = {"control": ["force"] * 4, "value": [load, 0.05 * load, 0.0, 0.0], "entry": "interpolated"}
+    alone = contact.advance(before, **step)
+    tractions = np.stack([alone.pressure, alone.traction_x, alone.traction_y])
+    after = contact.advance(
+        before, **step, guess=(tractions, [getattr(alone, name) for name in friction.MOTION])
+    )
+    assert after.converged
+    assert after.traction_x == pytest.approx(alone.traction_x, abs=1e-5 * alone.pressure.max())
+
+
+def test_displacements_without_friction_are_those_of_the_pressure() -> None:
+    """At a loose tolerance, too, where shear tractions need no solution: to its share of the approach."""
+    contact, load = sphere_of(ElasticPair.from_materials(None, None, 1e9, 0.1), 0.0)
+    found = []
+    for tolerance in (1e-6, 1e-9):
+        state = contact.virgin()
+        for share in (0.3, 0.9):
+            state = contact.advance(state, ["force"] * 4, [share * load, 0.0, 0.0, 0.0], tolerance=tolerance)
+        found.append(state)
+    loose, tight = found
+    assert loose.relative_displacement_x == pytest.approx(
+        tight.relative_displacement_x, abs=1e-5 * tight.approach
+    )
+    assert loose.slip_increment_x.max() == pytest.approx(tight.slip_increment_x.max(), rel=1e-4)
+
+
 def test_a_first_step_does_not_depend_on_the_window() -> None:
     """On the wide window it is found from smaller loads; taken as a path, these dissipated half as much."""
     pair = ElasticPair.from_materials(None, None, 1e9, 0.1)

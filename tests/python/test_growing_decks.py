@@ -97,6 +97,31 @@ def test_a_failure_to_write_leaves_no_reference_to_it(out: Path, monkeypatch: py
     assert len(open_result(out)) == 3
 
 
+@pytest.mark.parametrize("after", [0, 1])
+def test_a_failure_to_write_the_last_step_of_several(
+    out: Path, monkeypatch: pytest.MonkeyPatch, after: int
+) -> None:
+    write_record = store.write_record
+
+    def full(path: Path, *about: Any) -> None:
+        if path.name.startswith("000004"):
+            raise OSError(28, "No space left on device")
+        write_record(path, *about)
+
+    with pressed().start(out) as session:
+        session.advance(normal_load=10.0)
+        with monkeypatch.context() as patched:
+            patched.setattr(store, "write_record", full)
+            with pytest.raises(ResourceError, match="step 4"):
+                session.advance(tangential_load_x=1.5, steps=3, label="a long label of a segment")
+        for _ in range(after):
+            session.advance(tangential_load_x=1.2)
+    expected = [(10.0, 0.0), (10.0, 0.5), (10.0, 1.0), (10.0, 1.2)][: 3 + after]
+    loads = [(step.z.value, step.x.value) for step in Case.from_text(open_result(out).deck).load_steps]
+    assert np.array(loads) == pytest.approx(np.array(expected), rel=1e-12)
+    assert len(open_result(out)) == 3 + after
+
+
 def test_a_record_after_a_resumption_has_all_metadata(out: Path) -> None:
     def changed(count: int) -> Any:
         return lambda step: step.number == count

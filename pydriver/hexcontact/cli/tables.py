@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import io
 import math
+import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -46,8 +47,9 @@ _PIPE = 130  # characters of a line where there is no terminal
 
 
 def console() -> Console | Pipe:
-    """Return what prints tables on standard output: with colors on a terminal, plain wide text elsewhere."""
-    return rich_console() if sys.stdout.isatty() else Pipe()
+    """Return what prints tables: with colors on a terminal or by FORCE_COLOR, as plain wide text elsewhere."""
+    colored = sys.stdout.isatty() or os.environ.get("FORCE_COLOR")
+    return rich_console() if colored else Pipe()
 
 
 def rich_console() -> Console:

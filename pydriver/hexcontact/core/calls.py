@@ -103,8 +103,13 @@ class HeldState:
         self._recorded = weakref.ref(gap), numbers
 
     def _is_record(self, state: Any, numbers: list[float]) -> bool:
+        if not self._recorded:
+            return False
         gap, recorded = self._recorded
         if gap() is not state.gap or numbers != recorded:
+            return False
+        # a copy where nothing can touch
+        if not (np.isnan(state.gap) | (state.gap == self.view("gap"))).all():
             return False
         names = (name for name in self._places if name != "gap" and name not in SLIP)
         return all(self._is_view(name, getattr(state, name)) for name in names)

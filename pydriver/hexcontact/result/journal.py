@@ -204,6 +204,8 @@ class Description:
     ----------
     whole : Metadata
         The metadata at first.
+    number : int
+        Number of the record that holds them; 0: the next one will.
     planned_steps : int
         As in `Metadata`.
     """

@@ -98,7 +98,7 @@ class Session:
         self._log.begun(case.title, case.planned_steps)
         self._loads: list[dict[str, Any]] = []  # entries of [[load]] that `advance` applied
         self._resting = _AT_REST  # those that were zero in all steps
-        self._length = self._end = 0  # characters of the deck in the last record, without and with `advance`
+        self._length = self._end = 0  # characters of the deck before `advance`, and in the last record
         self._history: History | None = None  # of these loads; None: not unrolled
         self._driven = copy.copy(case)
         self._closed = False
@@ -249,7 +249,10 @@ class Session:
             except BaseException:
                 self._queue.clear()
                 self._loads += self._resolved(self._steps[done:])
-                self._length = self._end
+                # what the deck gained is no entry of these: the next record has all of it
+                self._length = self._end = 0
+                if self._store is not None:
+                    self._store.metadata = self._described(self._loads, len(self._steps))
                 raise
         self._loads.append(entry)
         self._length, self._history = self._end, history

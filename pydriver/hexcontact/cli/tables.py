@@ -47,7 +47,7 @@ _PIPE = 130  # characters of a line where there is no terminal
 
 
 def console() -> Console | Pipe:
-    """Return what prints tables: with colors on a terminal or by FORCE_COLOR, as plain wide text elsewhere."""
+    """Return what prints tables: with colors on a terminal or by FORCE_COLOR, else plain wide text."""
     colored = sys.stdout.isatty() or os.environ.get("FORCE_COLOR")
     return rich_console() if colored else Pipe()
 

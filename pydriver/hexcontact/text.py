@@ -223,7 +223,12 @@ class TextTable(NamedTuple):
         whole = sum(widths) + len(between) * (len(widths) - 1)
         title = visible(self.title)
         doubtful = any(_DOUBTFUL.search(cell) for row in ([title], self.headers, *rows) for cell in row)
-        padded = any(cell != cell.rstrip() for row in ([title], *rows) for cell in row)
+        # rich drops blanks at the end, then justifies
+        padded = title != title.rstrip() or any(
+            cell != cell.rstrip() and not _wraps(header)
+            for row in rows
+            for header, cell in zip(self.headers, row, strict=True)
+        )
         if doubtful or padded or not rows or max(whole, len(title)) + 2 > width or len(title) > whole + 2:
             return None
 

@@ -198,16 +198,14 @@ class Description:
     metadata : Metadata
         The metadata at first.
     number : int
-        Number of the record that holds them; 0: none.
+        Number of the record that holds them; 0: that of the next one.
 
     Attributes
     ----------
     whole : Metadata
         The metadata at first.
-    number : int
-        Number of the record that holds them; 0: the next one will.
-    planned_steps : int
-        As in `Metadata`.
+    number, planned_steps : int
+        As the argument, and as in `Metadata`.
     """
 
     def __init__(self, metadata: Metadata, number: int = 0) -> None:

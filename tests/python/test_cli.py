@@ -483,10 +483,10 @@ def test_a_command_imports_only_what_it_needs(deck: Path, command: str) -> None:
     if command == "check":
         spared |= {"hexcontact.solve.run", "hexcontact.analytic", "netCDF4", "numpy.ma"}
     program = (
-        "import sys\nfrom hexcontact.cli.app import main\n"
+        "import sys\nbefore = set(sys.modules)\nfrom hexcontact.cli.app import main\n"
         f"sys.argv = ['', {command!r}, {str(deck)!r}]\n"
         f"try:\n    main()\nexcept SystemExit as ending:\n    print(ending.code)\n"
-        f"print(sorted({spared} & set(sys.modules)))"
+        f"print(sorted({spared} & (set(sys.modules) - before)))"
     )
     folder = deck.parent
     done = subprocess.run(

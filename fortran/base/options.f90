@@ -82,7 +82,10 @@ module hc_options
     !> The least of a coupled sweep, whose accuracy is that of the residuals before it, too
     real(wp) :: coupled_accuracy = 1.0e-4_wp
     !> Accuracy of the last linear solution, relative to the tolerance; of the last pressure, which the shear traction still moves
-    real(wp) :: final_accuracy = 0.5_wp, final_pressure = 0.2_wp
+    real(wp) :: final_accuracy = 0.8_wp, final_pressure = 0.2_wp
+    !> Share of the preconditioned residual that a linear solution starts with, before the product of its start: about the first
+    !> step of conjugate gradients. Residual from which on sets change too much for it
+    real(wp) :: length_ahead = 0.6_wp, residual_ahead = 0.1_wp
     !> Iterations of a linear solver, and directions that GMRES stores: far more than the preconditioner needs
     integer :: max_iterations = 400, max_directions = 40
     !> Contact areas per staggered sweep: one where the shear traction moves the pressure, else until the area stands
@@ -113,6 +116,11 @@ module hc_options
     !> the solution worse than two blocks do
     real(wp) :: coupled_residual = 0.6_wp
     integer :: coupled_delay = 4
+    !> Relaxation of the shear traction at a front (F17): nodes in contact from which on the products saved take longer than it
+    !> does; rings of nodes on each side, and passes; residual R_t below which there is none, since zones stand then; changes that
+    !> are left out, over R_t and the largest traction
+    integer :: front_nodes = 10000, front_rings = 3, front_passes = 4
+    real(wp) :: front_residual = 1.0e-4_wp, front_share = 0.01_wp
     !> Tolerance from which on the residuals of a solution are those of the displacements that its linear solvers carried along:
     !> their rounding errors are far below. Share of it that what is cut off to record admissible tractions may displace
     real(wp) :: carried_tolerance = 1.0e-7_wp, cut_share = 0.05_wp

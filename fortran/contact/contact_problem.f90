@@ -20,14 +20,18 @@ module hc_contact_problem
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
     normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement_row, force_control, within_tolerance, sweeps_used_up, &
     loads_not_carried, out_of_range
-  use hc_contact_residuals, only: normal_self_compliance, tangential_self_compliance, normal_residual, &
+  use hc_contact_residuals, only: normal_self_compliance, tangential_compliances, normal_residual, &
     tangential_residual, force_residual, least_traction
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   implicit none
   private
 
-  public :: friction_problem_t, new_friction_problem
+  public :: friction_problem_t, new_friction_problem, near_reach
+
+  !> Columns and rows on each side of a node that its traction moves where tractions are relaxed node by node: measured, fewer
+  !> leave the zones less settled, more take longer
+  integer, parameter :: near_reach = 5
 
   !> Data of a contact problem.
   type, extends(level_t) :: friction_problem_t
@@ -41,6 +45,8 @@ module hc_contact_problem
     logical :: goodman = .false.
     !> Self-compliances d_n and d_t of a node [m/Pa]
     real(wp) :: normal_compliance = 0.0_wp, tangential_compliance = 0.0_wp
+    !> Tangential displacements near a node under its own pyramid of unit traction, xx, xy and yy [m/Pa]
+    real(wp) :: near_compliance(-near_reach:near_reach, -near_reach:near_reach, 3) = 0.0_wp
     !> Tolerances, caps and tuning numbers of the solver
     type(options_t) :: options
   contains
@@ -133,7 +139,8 @@ contains
     type(friction_problem_t), intent(inout) :: self
 
     self%normal_compliance = normal_self_compliance(self%lattice, self%pair)
-    self%tangential_compliance = tangential_self_compliance(self%lattice, self%pair)
+    self%near_compliance = tangential_compliances(self%lattice, self%pair, near_reach)
+    self%tangential_compliance = self%near_compliance(0, 0, 1)
   end subroutine set_geometry
 
   !> Return whether the bodies will touch: under any load, by an approach beyond the smallest gap.
@@ -187,14 +194,23 @@ contains
     !> Flexibility operator over the window
     class(flexibility_t), intent(inout) :: flexibility
     !> Pressure (n_col, n_row) and shear traction (n_col, n_row, 2) [Pa]
-    real(wp), intent(in) :: pressure(:, :), traction(:, :, :)
+    real(wp), intent(in), contiguous, target :: pressure(:, :), traction(:, :, :)
     !> w, u_x, u_y (n_col, n_row, 3) [m]
     real(wp), intent(out), contiguous :: displacement(:, :, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: tractions(:, :, :)
+    real(wp), pointer, contiguous :: alone(:, :, :)
     integer :: row
 
+    if (.not. abs(self%pair%lambda_2) > 0.0_wp) then
+      ! pressure and shear traction do not move each other: no copy of both
+      alone(1:size(pressure, 1), 1:size(pressure, 2), 1:1) => pressure
+      call flexibility%apply([normal], alone, [normal], displacement(:, :, :1), error)
+      if (allocated(error)) return
+      call flexibility%apply([along_x, along_y], traction, [along_x, along_y], displacement(:, :, 2:), error)
+      return
+    end if
     allocate (tractions(size(pressure, 1), size(pressure, 2), 3))
     !$omp parallel do schedule(static) num_threads(self%space%threads)
     do row = 1, size(pressure, 2)

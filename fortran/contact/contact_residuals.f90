@@ -4,7 +4,7 @@
 module hc_contact_residuals
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
-  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx
+  use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
@@ -16,7 +16,7 @@ module hc_contact_residuals
   implicit none
   private
 
-  public :: normal_self_compliance, tangential_self_compliance
+  public :: normal_self_compliance, tangential_self_compliance, tangential_compliances
   public :: normal_residual, tangential_residual, tangential_scale, force_residual, complete_state, &
             least_traction
 
@@ -47,13 +47,38 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
+    real(wp) :: own(1, 1, 3)
+
+    own = tangential_compliances(lattice, pair, 0)
+    tangential_self_compliance = own(1, 1, 1)
+  end function tangential_self_compliance
+
+  !> Compute the tangential displacements of the nodes around a pyramid of unit traction, with the spring of its node if there
+  !> is one: along x under a traction along x, across, and along y under one along y [m/Pa].
+  pure function tangential_compliances(lattice, pair, reach) result(compliance)
+    !> Lattice
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Columns and rows on each side
+    integer, intent(in) :: reach
+    real(wp) :: compliance(-reach:reach, -reach:reach, 3)
     type(pyramid_t) :: pyramid
-    real(wp) :: k(5)
+    real(wp) :: k(5), at(2)
+    integer :: i, j
 
     call new_pyramid(pyramid, lattice%basis)
-    k = pyramid%kernels(0.0_wp, 0.0_wp)
-    tangential_self_compliance = pair%lambda_1*k(k_1) + pair%lambda_5*k(k_xx) + pair%tangential_layer
-  end function tangential_self_compliance
+    do j = 0, reach
+      do i = -reach, reach
+        at = matmul(lattice%basis, real([i, j], wp))
+        k = pyramid%kernels(at(1), at(2))
+        compliance(i, j, :) = [pair%lambda_1*k(k_1) + pair%lambda_5*k(k_xx), pair%lambda_5*k(k_xy), &
+                               pair%lambda_1*k(k_1) + pair%lambda_5*(k(k_1) - k(k_xx))]
+        compliance(-i, -j, :) = compliance(i, j, :)
+      end do
+    end do
+    compliance(0, 0, [1, 3]) = compliance(0, 0, [1, 3]) + pair%tangential_layer
+  end function tangential_compliances
 
   !> Compute R_n = max |p - max(0, p - g/d_n)|/p_max over all candidate nodes, or that of another law.
   !>

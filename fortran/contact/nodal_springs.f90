@@ -8,21 +8,19 @@
 !>
 !> Equations: docs/theory/conditions.md, (C5); docs/theory/normal_contact.md, (N6).
 module hc_nodal_springs
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp
-  use hc_error, only: error_t, status, raise
-  use hc_normal_law, only: normal_law_t
+  use hc_normal_law, only: unilateral_t
   implicit none
   private
 
   public :: nodal_springs_t
 
   !> A spring at each node.
-  type, extends(normal_law_t) :: nodal_springs_t
+  type, extends(unilateral_t) :: nodal_springs_t
     !> Compliance of the spring of each node of the window, row by row [m/Pa]
     real(wp), allocatable :: spring(:)
   contains
-    procedure :: is_compliant, check, compliance_under, linearize, violation
+    procedure :: is_compliant, linearize, violation
   end type nodal_springs_t
 
 contains
@@ -33,27 +31,6 @@ contains
 
     is_compliant = allocated(self%spring)
   end function is_compliant
-
-  !> Refuse springs that are not finite or push.
-  pure subroutine check(self, error)
-    class(nodal_springs_t), intent(in) :: self
-    type(error_t), allocatable, intent(out) :: error
-    logical :: sound
-
-    sound = all(ieee_is_finite(self%spring))
-    if (sound) sound = all(self%spring >= 0.0_wp)
-    if (.not. sound) call raise(error, status%invalid_input, 'springs of nodes: finite compliances of at least 0 expected')
-  end subroutine check
-
-  !> Return 0, the compliance where there is no spring.
-  pure real(wp) function compliance_under(self, pressure) result(compliance)
-    class(nodal_springs_t), intent(in) :: self
-    real(wp), intent(in) :: pressure
-
-    associate (law => self, under_any => pressure)
-      compliance = 0.0_wp
-    end associate
-  end function compliance_under
 
   !> Return the springs themselves.
   pure subroutine linearize(self, first, r, softest, p, gap, contact, compliance, offset)

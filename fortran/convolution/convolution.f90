@@ -31,11 +31,12 @@ module hc_convolution
 
   !> Plans, spectra and scratch space.
   type :: convolution_t
-    !> Spectra (frequency, block, kernel), normalised; those of odd kernels are divided by i.
-    !> `frequencies` returns their frequencies. Other convolutions may share them.
+    !> Spectra (`frequencies`, block, kernel), normalised; those of odd kernels are divided by i. Convolutions may share them.
     real(wp), pointer, contiguous :: spectrum(:, :, :) => null()
     !> What the results are multiplied with
     real(wp) :: factor = 1.0_wp
+    !> The kernel `complement` is this times the first one less the second one
+    real(wp) :: whole = 0.0_wp
     !> Space of the fields
     type(field_space_t) :: space
     !> Transform lengths along the two lattice directions
@@ -204,9 +205,8 @@ contains
 
   !> Transform kernels that are given at the lattice offsets, for a padded convolution.
   !>
-  !> A row of negative index is the reverse of its mirror image, up to the sign
-  !> of an odd kernel, so that its transform is the conjugate: half of the
-  !> kernel values and of the row transforms suffice.
+  !> A row of negative index is the reverse of its mirror image, up to the sign of an odd kernel, so that its transform is
+  !> the conjugate: half of the kernel values and of the row transforms suffice.
   subroutine transform_kernels(self, source, error)
     class(convolution_t), intent(inout) :: self
     !> The kernels
@@ -297,7 +297,7 @@ contains
   !> Compute result(:, :, o) = sum over i of kernel(o, i) * field(:, :, i)
   subroutine convolve(self, kernel, field, result)
     class(convolution_t), intent(inout) :: self
-    !> Number of the kernel (onto, from), negative to reverse its sign
+    !> Number of the kernel (onto, from), negative to reverse its sign, or `complement`
     integer, intent(in) :: kernel(:, :)
     !> Fields to be convolved (n_col, n_row, from)
     real(wp), intent(in), contiguous :: field(:, :, :)
@@ -376,7 +376,7 @@ contains
     class(convolution_t), intent(inout) :: self
     !> Index of the block
     integer, intent(in) :: b
-    !> Number of the kernel (onto, from), negative to reverse its sign
+    !> Number of the kernel (onto, from), negative to reverse its sign, or `complement`
     integer, intent(in) :: kernel(:, :)
     !> Index of the thread, whose buffer is used
     integer, intent(in) :: thread
@@ -392,7 +392,7 @@ contains
       if (size(kernel) == 1 .and. kernel(1, 1) > 0 .and. kernel(1, 1) < self%first_odd) then
         call multiply_one(size(given, 1), self%spectrum(:, b, kernel(1, 1)), transformed(:, 1), given(:, 1))
       else
-        call multiply(self%spectrum(:, b, :), self%first_odd, kernel, transformed, given)
+        call multiply(self%spectrum(:, b, :), self%first_odd, self%whole, kernel, transformed, given)
       end if
       do o = 1, size(kernel, 1)
         call fftw_execute_dft(self%column_plan, given(:, o), transformed(:, o))

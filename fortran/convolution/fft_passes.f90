@@ -14,7 +14,10 @@ module hc_fft_passes
   implicit none
   private
 
-  public :: split_rows, join_rows, gather_columns, scatter_columns, multiply_one, multiply
+  public :: complement, split_rows, join_rows, gather_columns, scatter_columns, multiply_one, multiply
+
+  !> Number of the kernel that is a multiple of the first one less the second one, and has no spectrum of its own.
+  integer, parameter :: complement = 0
 
   !> Number of frequencies that are multiplied at a time.
   integer, parameter :: chunk = 128
@@ -126,11 +129,13 @@ contains
   end subroutine multiply_one
 
   !> Multiply up to three fields by any kernels: the conjugates of the sums over the fields. Kernels beyond the spectra are zero.
-  subroutine multiply(spectrum, first_odd, kernel, field, total)
+  subroutine multiply(spectrum, first_odd, whole, kernel, field, total)
     !> Spectra (frequency, kernel); those of odd kernels are divided by i
-    real(wp), intent(in) :: spectrum(:, :)
+    real(wp), intent(in), target :: spectrum(:, :)
     !> The first odd kernel
     integer, intent(in) :: first_odd
+    !> The kernel `complement` is this times the first one less the second one
+    real(wp), intent(in) :: whole
     !> Number of the kernel (onto, from), negative to reverse its sign
     integer, intent(in) :: kernel(:, :)
     !> Transformed fields and results (frequency, from and onto)
@@ -139,11 +144,14 @@ contains
 
     type :: part_t
       complex(wp), pointer, contiguous :: value(:)
+      real(wp), pointer :: spectrum(:)
     end type part_t
     !> Fields times i (frequency, from)
     complex(wp), target :: rotated(chunk, 3)
+    !> Spectrum of the complement
+    real(wp), target :: rest(chunk)
     type(part_t) :: part(3)
-    integer :: i, o, start, last, m, n_part, k(3)
+    integer :: i, o, start, last, m, n_part
     real(wp) :: sign(3)
 
     do start = 1, size(field, 1), chunk
@@ -154,30 +162,34 @@ contains
           call rotate(m, field(start:last, i), rotated(:, i))
         end if
       end do
+      if (any(kernel == complement)) rest(:m) = whole*spectrum(start:last, 1) - spectrum(start:last, 2)
       do o = 1, size(kernel, 1)
         n_part = 0
         do i = 1, size(kernel, 2)
           if (abs(kernel(o, i)) > size(spectrum, 2)) cycle
           n_part = n_part + 1
-          k(n_part) = abs(kernel(o, i))
-          sign(n_part) = merge(1.0_wp, -1.0_wp, kernel(o, i) > 0)
-          if (k(n_part) >= first_odd) then
+          sign(n_part) = merge(1.0_wp, -1.0_wp, kernel(o, i) >= 0)
+          if (abs(kernel(o, i)) >= first_odd) then
             part(n_part)%value => rotated(:m, i)
           else
             part(n_part)%value => field(start:last, i)
+          end if
+          if (kernel(o, i) == complement) then
+            part(n_part)%spectrum => rest(:m)
+          else
+            part(n_part)%spectrum => spectrum(start:last, abs(kernel(o, i)))
           end if
         end do
         select case (n_part)
         case (0)
           total(start:last, o) = (0.0_wp, 0.0_wp)
         case (1)
-          call add_1(m, sign, spectrum(start:last, k(1)), part(1)%value, total(start:last, o))
+          call add_1(m, sign, part(1)%spectrum, part(1)%value, total(start:last, o))
         case (2)
-          call add_2(m, sign, spectrum(start:last, k(1)), part(1)%value, spectrum(start:last, k(2)), part(2)%value, &
-                     total(start:last, o))
+          call add_2(m, sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, total(start:last, o))
         case default
-          call add_3(m, sign, spectrum(start:last, k(1)), part(1)%value, spectrum(start:last, k(2)), part(2)%value, &
-                     spectrum(start:last, k(3)), part(3)%value, total(start:last, o))
+          call add_3(m, sign, part(1)%spectrum, part(1)%value, part(2)%spectrum, part(2)%value, part(3)%spectrum, &
+                     part(3)%value, total(start:last, o))
         end select
       end do
     end do

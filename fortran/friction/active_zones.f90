@@ -5,12 +5,13 @@ module hc_active_zones
   use hc_precision, only: wp
   use hc_contact_state, only: separated, stick, slip, about_z, n_motion, force_control
   use hc_disc_law, only: normal_to
+  use hc_active_set, only: active_set_t
   use hc_friction_iterate, only: friction_iterate_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions, fix_in_stick
   implicit none
   private
 
-  public :: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
+  public :: find_contact, linearize_law, shear_parameter, classify, find_constraints, find_prescribed_displacement
 
 contains
 
@@ -67,6 +68,15 @@ contains
     call now%operators%normal%set_active(now%contact, now%pressure%compliance)
   end subroutine linearize_law
 
+  !> Compute r of (F8), smaller where the iteration goes badly, and where there is no shear traction yet [Pa/m].
+  real(wp) function shear_parameter(now) result(r)
+    type(friction_iterate_t), intent(in) :: now
+
+    r = now%globalization%share_of_r*now%problem%classification_parameter(now%operators%space%count(now%contact))
+    if (.not. now%first) return
+    if (.not. now%operators%space%max_abs(now%q) > 0.0_wp) r = now%problem%options%newton%cautious_share*r
+  end function shear_parameter
+
   !> Find stick, slip and frames that the present tractions call for.
   !>
   !> The shear traction is put on the cone where a node slips, and its component across
@@ -85,10 +95,7 @@ contains
 
     n = size(now%p)
     allocate (zone(n), active(2*n))
-    r = now%globalization%share_of_r*now%problem%classification_parameter(now%operators%space%count(now%contact))
-    if (now%first) then
-      if (.not. now%operators%space%max_abs(now%q) > 0.0_wp) r = now%problem%options%newton%cautious_share*r
-    end if
+    r = shear_parameter(now)
     associate (friction => now%problem%friction, soft => now%problem%options%preconditioner%soft_spring)
       p_max = now%operators%space%max(now%p)
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, i, from, to)
@@ -134,38 +141,39 @@ contains
   end subroutine classify
 
   !> Find the loads that are prescribed as constraints on the unknowns.
-  subroutine find_constraints(now, active, driven, constraint, missing)
+  subroutine find_constraints(now, nodes, driven, constraint, missing)
     !> Iterate
     type(friction_iterate_t), intent(in) :: now
-    !> Unknowns, in the frames (2 n)
-    logical, intent(in) :: active(:)
+    !> Unknowns, in the frames (of 2 n)
+    type(active_set_t), intent(in) :: nodes
     !> Motions that are driven by their loads
     type(driven_motions_t), intent(out) :: driven
-    !> Constraint vectors, in the frames (2 n, number of driven motions)
+    !> Constraint vectors at the unknowns (n_active, number of driven motions)
     real(wp), allocatable, intent(out) :: constraint(:, :)
     !> What the present traction lacks of the loads, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
-    real(wp) :: part(now%problem%lattice%extent(2)), unit(now%problem%lattice%extent(1), 2), t, e
+    real(wp) :: part(now%problem%lattice%extent(2)), unit(now%problem%lattice%extent(1), 2)
+    real(wp), allocatable :: frame(:)
     integer :: n, k, row, col, i
 
     n = size(now%p)
     call new_driven_motions(driven, now%problem, now%target, now%contact)
-    allocate (constraint(2*n, size(driven%motion)), missing(size(driven%motion)))
+    allocate (constraint(nodes%n_active, size(driven%motion)), missing(size(driven%motion)))
+    if (size(missing) > 0) allocate (frame(2*n))
     do k = 1, size(driven%motion)
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(unit, t, e, col, i)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(unit, col, i)
       do row = 1, size(part)
         call driven%direction_row(k, now%problem, row, unit(:, 1), unit(:, 2))
         part(row) = 0.0_wp
         do col = 1, size(unit, 1)
           i = (row - 1)*size(unit, 1) + col
           part(row) = part(row) + unit(col, 1)*now%q(i) + unit(col, 2)*now%q(n + i)
-          t = -now%shear%direction(2, i)*unit(col, 1) + now%shear%direction(1, i)*unit(col, 2)
-          e = now%shear%direction(1, i)*unit(col, 1) + now%shear%direction(2, i)*unit(col, 2)
-          constraint(i, k) = merge(t, 0.0_wp, active(i))
-          constraint(n + i, k) = merge(e, 0.0_wp, active(n + i))
+          frame(i) = -now%shear%direction(2, i)*unit(col, 1) + now%shear%direction(1, i)*unit(col, 2)
+          frame(n + i) = now%shear%direction(1, i)*unit(col, 1) + now%shear%direction(2, i)*unit(col, 2)
         end do
       end do
       !$omp end parallel do
+      call nodes%pack(frame, constraint(:, k))
       missing(k) = driven%load(k, now%problem, now%target) - sum(part)
     end do
   end subroutine find_constraints

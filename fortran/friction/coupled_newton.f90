@@ -28,7 +28,8 @@ module hc_coupled_newton
   use hc_friction_iterate, only: friction_iterate_t
   use hc_staggered_newton, only: find_punch_pressure, find_rigid_traction
   use hc_coupled_system, only: coupled_system_t
-  use hc_linear_system, only: satisfy_constraints
+  use hc_active_set, only: active_set_t, new_active_set
+  use hc_linear_system, only: satisfy_constraints, step_ahead
   use hc_projected_gmres, only: projected_gmres
   implicit none
   private
@@ -48,15 +49,16 @@ contains
 
     type(coupled_system_t) :: system
     real(wp), allocatable :: x(:), ax(:), rhs(:), columns(:, :), mb(:, :), rows(:, :)
-    real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:)
+    real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:), b(:, :), m_b(:, :), c(:, :)
     real(wp), allocatable :: gap(:), ahead(:), aside(:)
     logical, allocatable :: active(:), shear_active(:), contact(:)
+    type(active_set_t) :: nodes, sheared, pressed
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
     type(newton_options_t) :: options
     real(wp) :: missing(4), multiplier(4), weight(2), goal, residual, drift
     integer :: n, m, k, n_shear, iterations
-    logical :: independent
+    logical :: independent, sticks
 
     n = size(now%p)
     options = now%problem%options%newton
@@ -102,18 +104,24 @@ contains
     deallocate (ahead, aside)
 
     ! 3.
-    call find_constraints(now, shear_active, driven, shear_columns, shear_missing)
+    call new_active_set(nodes, active, system%space)
+    call new_active_set(sheared, shear_active, system%space)
+    call new_active_set(pressed, now%contact, system%space)
+    sticks = any(shear_active(n + 1:))
+    deallocate (active, shear_active)
+    call find_constraints(now, sheared, driven, shear_columns, shear_missing)
     n_shear = size(shear_missing)
     m = n_shear
     if (now%target%control(normal) == force_control) m = m + 1
     allocate (mb(3*n, m), source=0.0_wp)
-    call find_rigid_traction(now, shear_active, shear_columns, .false., part, error)
+    call find_rigid_traction(now, sheared, shear_columns, .false., part, error)
     if (allocated(error)) return
-    mb(n + 1:, :n_shear) = part
-    deallocate (part)
     allocate (columns(3*n, m), source=0.0_wp)
-    columns(n + 1:, :n_shear) = shear_columns
-    deallocate (shear_columns)
+    do k = 1, n_shear
+      call sheared%unpack(part(:, k), mb(n + 1:, k))
+      call sheared%unpack(shear_columns(:, k), columns(n + 1:, k))
+    end do
+    deallocate (part, shear_columns)
     if (m > n_shear) columns(:n, m) = merge(1.0_wp, 0.0_wp, now%contact)
     rows = columns
     do k = 1, n_shear
@@ -129,21 +137,39 @@ contains
     end if
     deallocate (plane)
     if (m > n_shear) then
-      call find_punch_pressure(now, columns(:n, m:), part, error)
+      allocate (shear_columns(pressed%n_active, 1), source=1.0_wp)
+      call find_punch_pressure(now, pressed, shear_columns, part, error)
       if (allocated(error)) return
-      mb(:n, m:) = part
-      deallocate (part)
+      call pressed%unpack(part(:, 1), mb(:n, m))
+      deallocate (part, shear_columns)
     end if
-    call satisfy_constraints(rows, mb, missing(:m), x, independent, system%space)
+    call nodes%pack_columns(columns, b)
+    deallocate (columns)
+    call nodes%pack_columns(mb, m_b)
+    deallocate (mb)
+    call nodes%pack_columns(rows, c)
+    deallocate (rows)
+    call satisfy_constraints(c, m_b, missing(:m), x, independent, system%space, nodes)
     ! 4.
     if (independent) then
       allocate (ax(3*n), rhs(3*n))
-      call system%product(x, ax, error)
-      if (allocated(error)) return
       rhs(:n) = -now%h + merge(0.0_wp, now%motion(normal), m > n_shear)
       if (allocated(now%pressure%offset)) rhs(:n) = rhs(:n) - now%pressure%offset
       call find_prescribed_displacement(now, rhs(n + 1:))
       call now%shear%add_rest(rhs(n + 1:))
+      if (max(now%residual_normal, now%residual_tangential) < options%residual_ahead) then
+        ax(:n) = now%w + now%closing
+        if (allocated(system%compliance)) ax(:n) = ax(:n) + system%compliance*x(:n)
+        ax(n + 1:) = now%u
+        call now%shear%add_springs(x(n + 1:), ax(n + 1:))
+        if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*system%tilt*x(:n)
+        call step_ahead(system, nodes, b, m_b, c, rhs, ax, multiplier(:m), options%length_ahead, x, error)
+        if (allocated(error)) return
+      end if
+      ! those of the iterate come from the solution, or anew
+      call now%forget_displacements()
+      call system%product(x, ax, error)
+      if (allocated(error)) return
       weight(1) = 1.0_wp/(now%problem%normal_compliance*system%space%max(now%p))
       if (allocated(system%compliance)) then
         weight(1) = now%problem%normal_compliance/now%problem%sprung_compliance(system%space%max(now%p))*weight(1)
@@ -151,8 +177,8 @@ contains
       weight(2) = 1.0_wp/(now%problem%tangential_compliance*now%traction_scale())
       goal = min(max(now%residual_normal, now%residual_tangential), 1.0_wp)
       goal = max(goal*min(options%inner_accuracy, max(goal, options%coupled_accuracy)), options%final_accuracy*now%tolerance)
-      goal = goal*real(system%space%count(active), wp)**0.25_wp
-      call projected_gmres(system, active, columns, mb, rows, weight([1, 2, 2]), rhs, x, ax, goal, options%max_directions, &
+      goal = goal*real(nodes%n_active, wp)**0.25_wp
+      call projected_gmres(system, nodes, b, m_b, c, weight([1, 2, 2]), rhs, x, ax, goal, options%max_directions, &
                            multiplier(:m), independent, residual, iterations, now%outcome, error, drift)
       if (allocated(error)) return
       if (drift > options%displacement_rounding) call system%product(x, ax, error)
@@ -161,7 +187,7 @@ contains
     ! where all nodes slip, only their directions resist a load: not beyond reason
     failed = .not. independent
     if (.not. failed .and. n_shear > 0) then
-      if (.not. any(shear_active(n + 1:))) then
+      if (.not. sticks) then
         failed = system%space%max_abs(x(n + 1:2*n)) > options%most_across*now%traction_scale()
       end if
     end if
@@ -176,6 +202,7 @@ contains
     now%p = x(:n)
     x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
     call now%shear%to_plane(x(n + 1:), now%q)
+    allocate (now%closing(n), now%u(2*n))
     now%w = ax(:n)
     call now%pressure%stretch(-1.0_wp, now%p, now%w)
     now%closing = 0.0_wp

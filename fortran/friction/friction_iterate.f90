@@ -6,7 +6,7 @@
 !> Equations: docs/theory/friction.md, (F1).
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t, status, raise
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, &
     force_control
@@ -60,7 +60,9 @@ module hc_friction_iterate
     type(globalization_t) :: globalization
     !> Estimates, with the preconditioner, of the pressure that an approach of the contact causes, and of the shear traction of
     !> each rigid motion, components along x and y: they correct tractions that do not carry the prescribed loads
-    real(wp), allocatable :: punch_pressure(:, :), rigid_traction(:, :)
+    real(sp), allocatable :: punch_pressure(:, :), rigid_traction(:, :)
+    !> Shear tractions that were to be relaxed along fronts so far
+    integer :: relaxations = 0
     !> How the linear solutions of the last sweep ended, the worst of them
     integer :: outcome = solution_accurate
     !> The start had no contact

@@ -118,31 +118,32 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
-    !> Directions of GMRES that are enough as a rule: five or six, and the holes in the heap that earlier sweeps and lattices left
-    integer, parameter :: n_direction = 10
+    !> Directions of GMRES that are enough as a rule
+    integer, parameter :: n_direction = 7
     integer(long) :: n, everywhere, building, iterating, inside, recording
 
     n = int(extent(1), long)*extent(2)
-    ! iterate with traction estimates; shear system; weights of its preconditioner
-    everywhere = (7 + 1 + 2*max(n_force - 1, 1))*field + 2*half + 3*field + 2*half
+    ! iterate; traction estimates; shear system; weights of its preconditioner
+    everywhere = 7*field + 2*half + (1 + 2*max(n_force - 1, 1))*half + 3*field + 2*half
+    building = 0
     if (coupled) then
-      ! unknowns, slope, constraints thrice, and either what makes them or product, right-hand side
-      everywhere = everywhere + (3 + 1)*field + 3*half
+      ! unknowns, slope; constraints thrice, and what makes them
+      everywhere = everywhere + (3 + 1)*field
       building = (3*3*n_force + 2)*field
-      ! products of the unknowns and of a direction, its tractions; the products of all directions off the contact
-      iterating = (3 + 3 + 3)*field + 3*n_direction*half + 2*2*half
+      ! products of the unknowns and of a direction, its tractions, what the preconditioner gets and gives; the products of
+      ! all directions off the contact; without the displacements of the iterate
+      iterating = (3 + 3 + 3 - 4)*field + 2*2*half + 3*n_direction*field
       ! packed: both of all directions, residuals, constraints thrice
-      inside = 3*(2*n_direction + 3 + 3*n_force)*field - 3*n_direction*half
+      inside = 3*(2*n_direction + 2 + 3*n_force)*field - 3*n_direction*field
     else
-      ! unknowns, product, traction before; constraints twice, or the vector and image of conjugate gradients
-      everywhere = everywhere + 3*2*field + 2*half
-      building = (2*2*max(n_force - 1, 1) + 2)*field
+      ! traction before
+      everywhere = everywhere + 2*field
       ! product of a direction, its tractions, and what the preconditioner gets and gives
       iterating = 2*2*field + 2*2*half
       ! packed: vectors of conjugate gradients, constraints twice
-      inside = 2*(7 + 2*max(n_force - 1, 1))*field
+      inside = 2*(4 + 2*max(n_force - 1, 1))*field
     end if
-    ! state after, displacements and their tractions, without the displacements of the iterate
+    ! state after, displacements and the tractions of unlike materials, without the displacements of the iterate
     recording = (10 + 3 + 3 - 4)*field + half
     friction_step_memory = n*everywhere + max(n*building, n*iterating + n_contact*inside, n*recording)
   end function friction_step_memory

@@ -55,6 +55,7 @@ contains
     type(friction_iterate_t), target :: now
     real(wp), allocatable :: displacement(:, :, :)
     type(newton_options_t) :: options
+    real(wp) :: less
     integer :: sweep, fixed, staggered
     logical :: failed, judged, known
 
@@ -103,11 +104,13 @@ contains
       call record(now, state)
       state%motion = now%motion
       allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
-      if (known .and. judged) known = cut_off(now, state) <= options%cut_share*tolerance
+      less = 0.0_wp
+      ! what carried displacements lack: those of the cut, and their rounding errors
+      if (known .and. judged) less = cut_off(now, state) + 2*options%displacement_rounding
+      known = known .and. less <= options%cut_share*tolerance
       if (known) then
         call collect(now, displacement)
-        call problem%complete_state(target, merge(1.0_wp - options%cut_share, 1.0_wp, judged)*tolerance, reference, &
-                                    displacement, state)
+        call problem%complete_state(target, tolerance - less, reference, displacement, state)
       end if
       if (.not. known .or. (judged .and. .not. state%converged)) then
         call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)

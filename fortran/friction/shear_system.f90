@@ -11,7 +11,7 @@
 !>
 !> A field with two components is one vector, first the one, then the other.
 module hc_shear_system
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
@@ -27,8 +27,8 @@ module hc_shear_system
   real(wp), parameter :: nothing = 1.0e-200_wp
   !> Components of the shear traction
   integer, parameter :: shear(2) = [along_x, along_y]
-  !> Nodes that one thread takes at a time
-  integer, parameter :: row_block = 4096
+  !> Nodes of a run that are treated at a time
+  integer, parameter :: most = 256
 
   !> Shear traction in the frames of the nodes.
   type, extends(linear_system_t) :: shear_system_t
@@ -51,8 +51,8 @@ module hc_shear_system
     procedure :: product_packed => shear_product_packed
     procedure :: precondition_packed => shear_precondition_packed
     procedure :: release => release_shear
-    !> Components along x and y from those in the frames, and back
-    procedure :: to_plane, to_frame
+    !> Components along x and y from those in the frames, and back; either in place
+    procedure :: to_plane, to_frame, turn
     !> Set the nodes in contact, with their frames and compliances
     procedure :: set_contact
     !> Add what springs at rest are stretched by
@@ -105,28 +105,38 @@ contains
   end subroutine set_contact
 
   !> Reduce tractions by springs in series with the stiffness that a node was found to have in stick.
-  subroutine apply_slip_compliance(self, displacement, plane, active, traction)
+  subroutine apply_slip_compliance(self, runs, along_t, along_e, plane, traction_t, traction_e)
     class(shear_system_t), intent(in) :: self
-    !> Displacement, in the frames (2 n)
-    real(wp), intent(in), contiguous :: displacement(:)
+    !> Nodes in contact, and which of them have a component along e
+    type(paired_runs_t), intent(in) :: runs
+    !> Displacement along t and e at these nodes
+    real(wp), intent(in), contiguous :: along_t(:), along_e(:)
     !> Its traction if all nodes stuck, along x and y (2 n)
-    real(wp), intent(in), contiguous :: plane(:)
-    !> Components that are wanted (2 n)
-    logical, intent(in), contiguous :: active(:)
-    !> The traction, in the frames; zero where it is not wanted (2 n)
-    real(wp), intent(out), contiguous :: traction(:)
-    integer :: i, n, from, to
+    real(sp), intent(in), contiguous :: plane(:)
+    !> The traction along t and e at these nodes
+    real(wp), intent(inout), contiguous :: traction_t(:), traction_e(:)
+    real(wp), dimension(most) :: q_t, q_e, u_e
+    integer :: i, k, n, from, to, m, at
 
     n = size(self%compliance)
-    call self%to_frame(plane, traction)
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, to)
-    do from = 1, n, row_block
-      to = min(from + row_block - 1, n)
-      call slip_compliance_row(to - from + 1, self%compliance(from:to), displacement(from:to), displacement(n + from:n + to), &
-                               traction(from:to), traction(n + from:n + to))
-      do i = from, to
-        if (.not. active(i)) traction(i) = 0.0_wp
-        if (.not. active(n + i)) traction(n + i) = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, from, to, m, at, q_t, q_e, u_e)
+    do k = 1, size(runs%first)
+      do from = runs%first(k), runs%last(k), most
+        to = min(from + most - 1, runs%last(k))
+        m = to - from + 1
+        at = runs%place(k) + from - runs%first(k)
+        do i = 1, m
+          associate (e => self%direction(:, from + i - 1), q_x => plane(from + i - 1), q_y => plane(n + from + i - 1))
+            q_t(i) = -e(2)*q_x + e(1)*q_y
+            q_e(i) = e(1)*q_x + e(2)*q_y
+          end associate
+        end do
+        ! a slipping node does not move along e
+        u_e(:m) = 0.0_wp
+        if (runs%second(k) > 0) u_e(:m) = along_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k))
+        call slip_compliance_row(m, self%compliance(from:to), along_t(at:at + m - 1), u_e, q_t, q_e)
+        traction_t(at:at + m - 1) = q_t(:m)
+        if (runs%second(k) > 0) traction_e(runs%second(k) + from - runs%first(k):runs%second(k) + to - runs%first(k)) = q_e(:m)
       end do
     end do
     !$omp end parallel do
@@ -231,6 +241,24 @@ contains
     end do
     !$omp end parallel do
   end subroutine to_frame
+
+  !> Turn components along x and y to those along t and e, or back: a reflection, which is its own inverse.
+  subroutine turn(self, values)
+    class(shear_system_t), intent(in) :: self
+    !> The components (2 n)
+    real(wp), intent(inout), contiguous :: values(:)
+    real(wp) :: v(2)
+    integer :: i, n
+
+    n = size(values)/2
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(v)
+    do i = 1, n
+      v = [values(i), values(n + i)]
+      values(i) = -self%direction(2, i)*v(1) + self%direction(1, i)*v(2)
+      values(n + i) = self%direction(1, i)*v(1) + self%direction(2, i)*v(2)
+    end do
+    !$omp end parallel do
+  end subroutine turn
 
   !> Multiply by the tangential flexibility with the springs of slipping nodes, in their frames.
   subroutine shear_product(self, x, y, error)

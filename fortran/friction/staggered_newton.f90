@@ -22,14 +22,16 @@
 !>
 !> Linear problems are solved no more accurately than the sets deserve; the numbers are those of `newton_options_t`.
 module hc_staggered_newton
-  use hc_precision, only: wp
+  use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: newton_options_t
   use hc_contact_state, only: normal, along_x, along_y, n_motion, force_control
   use hc_load_constraints, only: driven_motions_t
   use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
-  use hc_linear_system, only: precondition_constraints, satisfy_constraints, solution_accurate
+  use hc_front_relaxation, only: relax_fronts
+  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t, pair_runs
+  use hc_linear_system, only: precondition_constraints, satisfy_constraints, step_ahead, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
   private
@@ -83,6 +85,7 @@ contains
 
     real(wp), allocatable :: gap(:), rhs(:), constraint(:, :), mb(:, :)
     logical, allocatable :: contact(:)
+    type(active_set_t) :: nodes
     type(newton_options_t) :: options
     real(wp) :: goal, scale, residual, drift, multiplier(1), missing(1), cell_area, carried, level
     integer :: n, i, area, n_constraint, iterations, outcome
@@ -131,20 +134,22 @@ contains
 
       if (changed .and. (.not. compliant .or. unknown_gap)) call now%operators%normal%set_active(now%contact)
       if (searching .and. now%pressure_feels_shear .and. allocated(now%punch_pressure)) deallocate (now%punch_pressure)
-      allocate (constraint(n, n_constraint), rhs(n))
+      call new_active_set(nodes, now%contact, now%pressure%space)
+      if (allocated(constraint)) deallocate (constraint)
+      allocate (constraint(nodes%n_active, n_constraint), source=1.0_wp)
+      allocate (rhs(n))
       !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, n
-        if (n_constraint == 1) constraint(i, 1) = merge(1.0_wp, 0.0_wp, now%contact(i))
         rhs(i) = level - now%h(i) - now%closing(i)
         if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
       end do
       !$omp end parallel do
-      call find_punch_pressure(now, constraint, mb, error)
+      call find_punch_pressure(now, nodes, constraint, mb, error)
       if (allocated(error)) return
       if (changed) then
         if (n_constraint == 1) then
           missing = now%target%value(normal)/cell_area - now%pressure%space%sum(now%p)
-          call satisfy_constraints(constraint, mb, missing, now%p, independent, now%pressure%space)
+          call satisfy_constraints(constraint, mb, missing, now%p, independent, now%pressure%space, nodes)
         end if
         if (compliant .and. unknown_gap) call linearize_law(now, gap, .true.)
         call now%pressure%product(now%p, now%w, error)
@@ -163,7 +168,7 @@ contains
       else
         scale = now%problem%normal_compliance*scale
       end if
-      call projected_cg(now%pressure, now%contact, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
+      call projected_cg(now%pressure, nodes, constraint, mb, rhs, now%p, now%w, goal*scale, options%max_iterations, &
                         multiplier(:n_constraint), residual, iterations, outcome, error, drift)
       if (allocated(error)) return
       if (drift > options%displacement_rounding*scale) call now%pressure%product(now%p, now%w, error)
@@ -185,12 +190,13 @@ contains
 
     real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :), q(:)
     logical, allocatable :: active(:)
+    type(active_set_t) :: nodes
     real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
     type(newton_options_t) :: options
-    real(wp) :: goal, scale, residual, drift, share, motion(n_motion)
+    real(wp) :: goal, highest, scale, residual, drift, share, rounding, motion(n_motion)
     integer :: n, iterations, outcome
-    logical :: independent, fixing
+    logical :: independent, fixing, sticks
 
     n = size(now%p)
     options = now%problem%options%newton
@@ -199,36 +205,56 @@ contains
       now%q = 0.0_wp
       return
     end if
-    allocate (x(2*n), ax(2*n), q(2*n))
+    call relax_fronts(now)
+    allocate (q(2*n))
     call now%shear%space%copy(now%q, q)
     fixing = .false.
-    scale = now%problem%tangential_compliance*now%traction_scale()
+    highest = now%traction_scale()
+    scale = now%problem%tangential_compliance*highest
     do
       call classify(now, fixing, active)
-      call now%shear%to_frame(now%q, x)
-      call find_constraints(now, active, driven, constraint, missing)
+      call new_active_set(nodes, active, now%shear%space)
+      sticks = any(active(n + 1:))
+      deallocate (active)
+      call find_constraints(now, nodes, driven, constraint, missing)
       multiplier = driven%multipliers(now%motion)
-      call find_rigid_traction(now, active, constraint, .false., mb, error)
+      call find_rigid_traction(now, nodes, constraint, .false., mb, error)
       if (allocated(error)) return
-      call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space)
+      ! traction and displacement stay where they are, in the frames: a window is too large for copies
+      call move_alloc(now%q, x)
+      call now%shear%turn(x)
+      call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space, nodes)
       if (.not. independent) then
-        call find_rigid_traction(now, active, constraint, .true., mb, error)
+        call find_rigid_traction(now, nodes, constraint, .true., mb, error)
         if (allocated(error)) return
-        call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space)
+        call satisfy_constraints(constraint, mb, missing, x, independent, now%shear%space, nodes)
       end if
       if (independent) then
-        call displace(now, x, ax, error)
-        if (allocated(error)) return
         ! motions that are prescribed are known; the others are multipliers
         allocate (rhs(2*n))
         call find_prescribed_displacement(now, rhs)
         call now%shear%add_rest(rhs)
+        if (size(missing) == 0 .or. fixing .or. sticks) then
+          call move_alloc(now%u, ax)
+        else
+          ! the old displacements may be needed again
+          allocate (ax(2*n))
+          call now%shear%space%copy(now%u, ax)
+        end if
+        ! the pressure moves what u does not contain yet
+        if (.not. (now%first .or. now%shear_feels_pressure) .and. now%residual_tangential < options%residual_ahead) then
+          call now%shear%add_springs(x, ax)
+          call step_ahead(now%shear, nodes, constraint, mb, constraint, rhs, ax, multiplier, options%length_ahead, x, error)
+          if (allocated(error)) return
+        end if
+        call displace(now, x, ax, error)
+        if (allocated(error)) return
         ! Newton's method alone converges the faster the more accurate its steps are
         goal = min(now%residual_tangential, 1.0_wp)
         goal = goal*min(options%inner_accuracy, max(goal, merge(options%late_accuracy, options%uncoupled_accuracy, &
                                                               now%pressure_feels_shear)))
         goal = max(goal, options%final_accuracy*now%tolerance)
-        call projected_cg(now%shear, active, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
+        call projected_cg(now%shear, nodes, constraint, mb, rhs, x, ax, goal*scale, options%max_iterations, multiplier, &
                           residual, iterations, outcome, error, drift)
         if (allocated(error)) return
         if (drift > options%displacement_rounding*scale) call displace(now, x, ax, error)
@@ -239,13 +265,15 @@ contains
       if (size(missing) == 0 .or. fixing) exit
       ! where all nodes slip, only their directions resist a load: not beyond reason
       if (independent) then
-        if (any(active(n + 1:))) exit
-        if (now%shear%space%max_abs(x(:n)) <= options%most_across*now%traction_scale()) exit
+        if (sticks) exit
+        if (now%shear%space%max_abs(x(:n)) <= options%most_across*highest) exit
+        deallocate (ax)
       end if
       fixing = .true.
       call now%globalization%cut(options%cautious_share, options)
       now%q = q
     end do
+    deallocate (constraint, mb)
     if (now%unsupported) then
       now%q = q
       call now%refresh(error)
@@ -253,9 +281,7 @@ contains
     end if
     motion = now%motion
     call driven%set_motions(multiplier, now%motion)
-    call now%shear%to_plane(x, now%q)
-    call now%shear%subtract_springs(x, ax)
-    call now%shear%to_plane(ax, now%u)
+    call take(x, ax)
     call now%find_tangential_residual()
     judged = .true.
     call now%globalization%step_share(now%residual_tangential, options, share)
@@ -264,16 +290,33 @@ contains
       ! Newton's method oscillates: any iterate between carries the same loads
       now%q = merge(q + share*(now%q - q), 0.0_wp, [now%contact, now%contact])
       now%motion = motion + share*(now%motion - motion)
-      call now%shear%to_frame(now%q, x)
+      call move_alloc(now%q, x)
+      call now%shear%turn(x)
+      call move_alloc(now%u, ax)
       call displace(now, x, ax, error)
       if (allocated(error)) return
-      call now%shear%subtract_springs(x, ax)
-      call now%shear%to_plane(ax, now%u)
+      call take(x, ax)
     end if
-    if (now%shear%spring_rounding(x) > options%displacement_rounding*scale) then
+    if (rounding > options%displacement_rounding*scale) then
       judged = .false.
       call now%refresh(error)
     end if
+
+  contains
+
+    !> Take a traction and its displacement out of the frames.
+    subroutine take(traction, displacement)
+      !> Traction, and displacement with the springs, in the frames (2 n)
+      real(wp), allocatable, intent(inout) :: traction(:), displacement(:)
+
+      rounding = now%shear%spring_rounding(traction)
+      call now%shear%subtract_springs(traction, displacement)
+      call now%shear%turn(traction)
+      call now%shear%turn(displacement)
+      call move_alloc(traction, now%q)
+      call move_alloc(displacement, now%u)
+    end subroutine take
+
   end subroutine solve_shear
 
   !> Compute the displacements by a shear traction and the pressure together, springs included.
@@ -303,62 +346,82 @@ contains
   end subroutine displace
 
   !> Estimate the pressure that an approach of the nodes in contact causes, V of (F11): made once a step.
-  subroutine find_punch_pressure(now, constraint, mb, error)
+  subroutine find_punch_pressure(now, nodes, constraint, mb, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
-    !> One on the nodes in contact; or no constraint at all (n, 1 or 0)
-    real(wp), intent(in) :: constraint(:, :)
-    !> The pressure, zero off the contact (n, 1 or 0)
+    !> Nodes in contact
+    type(active_set_t), intent(in) :: nodes
+    !> One at these nodes; or no constraint at all (n_active, 1 or 0)
+    real(wp), intent(in), contiguous :: constraint(:, :)
+    !> The pressure there (n_active, 1 or 0)
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    integer :: i, k
+    real(wp), allocatable :: pressure(:)
+    integer :: k
 
+    allocate (pressure(merge(size(now%p), 0, size(constraint, 2) > 0)))
     if (.not. allocated(now%punch_pressure)) then
-      call precondition_constraints(now%pressure, now%contact, constraint, now%punch_pressure, error)
+      call precondition_constraints(now%pressure, nodes, size(now%p), constraint, mb, error)
       if (allocated(error)) return
-    end if
-    allocate (mb, mold=now%punch_pressure)
-    do k = 1, size(mb, 2)
-      !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
-      do i = 1, size(mb, 1)
-        mb(i, k) = merge(now%punch_pressure(i, k), 0.0_wp, now%contact(i))
+      allocate (now%punch_pressure(size(pressure), size(mb, 2)))
+      do k = 1, size(mb, 2)
+        call now%pressure%space%fill(pressure, 0.0_wp)
+        call nodes%unpack(mb(:, k), pressure)
+        now%punch_pressure(:, k) = real(pressure, sp)
       end do
-      !$omp end parallel do
+      return
+    end if
+    allocate (mb, mold=constraint)
+    do k = 1, size(mb, 2)
+      pressure = now%punch_pressure(:, k)
+      call nodes%pack(pressure, mb(:, k))
     end do
   end subroutine find_punch_pressure
 
   !> Estimate the shear traction that rigid motions of the unknowns cause, V of (F11): made once a step, if it serves.
-  subroutine find_rigid_traction(now, active, constraint, afresh, mb, error)
+  subroutine find_rigid_traction(now, nodes, constraint, afresh, mb, error)
     !> Tractions and motions
     type(friction_iterate_t), intent(inout) :: now
-    !> Unknowns, in the frames (2 n)
-    logical, intent(in), contiguous :: active(:)
-    !> Constraint vectors, in the frames (2 n, number of constraints)
+    !> Unknowns, in the frames (of 2 n)
+    type(active_set_t), intent(in) :: nodes
+    !> Constraint vectors at the unknowns (n_active, number of constraints)
     real(wp), intent(in), contiguous :: constraint(:, :)
     !> Make it again
     logical, intent(in) :: afresh
-    !> The traction, in the frames (2 n, number of constraints)
+    !> The traction there (n_active, number of constraints)
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    integer :: k
+    type(active_set_t) :: along_t
+    type(paired_runs_t) :: runs
+    real(wp), allocatable :: plane(:)
+    integer :: n, k, n_t
     logical :: known
+
+    n = size(now%p)
+    along_t = nodes%slice(1, n)
+    n_t = along_t%n_active
+    call pair_runs(along_t, nodes%slice(n + 1, 2*n), runs)
 
     known = allocated(now%rigid_traction) .and. .not. afresh
     if (known) known = size(now%rigid_traction, 2) == size(constraint, 2)
     if (known) then
       allocate (mb, mold=constraint)
       do k = 1, size(mb, 2)
-        call now%shear%apply_slip_compliance(constraint(:, k), now%rigid_traction(:, k), active, mb(:, k))
+        call now%shear%apply_slip_compliance(runs, constraint(:n_t, k), constraint(n_t + 1:, k), now%rigid_traction(:, k), &
+                                             mb(:n_t, k), mb(n_t + 1:, k))
       end do
     else
-      call precondition_constraints(now%shear, active, constraint, mb, error)
+      call precondition_constraints(now%shear, nodes, 2*n, constraint, mb, error)
       if (allocated(error)) return
       if (allocated(now%rigid_traction)) deallocate (now%rigid_traction)
-      allocate (now%rigid_traction, mold=mb)
+      allocate (now%rigid_traction(2*n, size(mb, 2)))
+      if (size(mb, 2) > 0) allocate (plane(2*n))
       do k = 1, size(mb, 2)
-        call now%shear%to_plane(mb(:, k), now%rigid_traction(:, k))
+        call now%shear%space%fill(plane, 0.0_wp)
+        call now%shear%put_in_plane(runs, mb(:n_t, k), mb(n_t + 1:, k), plane)
+        now%rigid_traction(:, k) = real(plane, sp)
       end do
     end if
   end subroutine find_rigid_traction

@@ -140,6 +140,7 @@ contains
     call self%problem%extract_part(low, high, problem)
     allocate (self%part)
     call new_frictional_contact(self%part, problem, error, self%threads, self%cache, shared=self%problem%space%scratch)
+    if (allocated(error)) deallocate (self%part)
   end subroutine extract_part
 
 end module hc_subwindow_solver

@@ -30,8 +30,12 @@ module hc_active_set
     procedure :: pack_columns
     !> Put them where they belong, the rest of the field stays as it is
     procedure :: unpack => unpack_field
+    !> Add a multiple of them to the field
+    procedure :: add => add_to_field
     !> Those of a part of the nodes
     procedure :: slice
+    !> The nodes that are not active
+    procedure :: complement
     !> The same nodes of several components
     procedure :: repeated
     !> Is it a given set?
@@ -175,6 +179,43 @@ contains
     end do
     !$omp end parallel do
   end subroutine unpack_field
+
+  !> Add a multiple of values to the active nodes of a field.
+  subroutine add_to_field(self, factor, packed, field)
+    class(active_set_t), intent(in) :: self
+    !> The multiple
+    real(wp), intent(in) :: factor
+    !> Values at the active nodes (n_active)
+    real(wp), intent(in), contiguous :: packed(:)
+    !> Field over all nodes
+    real(wp), intent(inout), contiguous :: field(:)
+    integer :: k, i, shift
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
+    do k = 1, size(self%first)
+      shift = self%place(k) - self%first(k)
+      do i = self%first(k), self%last(k)
+        field(i) = field(i) + factor*packed(i + shift)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine add_to_field
+
+  !> Return the nodes that are not active.
+  pure type(active_set_t) function complement(self, n) result(others)
+    class(active_set_t), intent(in) :: self
+    !> Number of all nodes
+    integer, intent(in) :: n
+    logical :: gap(size(self%first) + 1)
+
+    others%space%threads = self%space%threads
+    associate (first => [1, self%last + 1], last => [self%first - 1, n])
+      gap = first <= last
+      others%first = pack(first, gap)
+      others%last = pack(last, gap)
+    end associate
+    call number_nodes(others)
+  end function complement
 
   !> Return the active nodes among those of a part, counted from its beginning.
   pure type(active_set_t) function slice(self, from, to) result(part)

@@ -14,12 +14,12 @@ module hc_linear_system
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
   use hc_field_space, only: field_space_t
-  use hc_active_set, only: active_set_t, new_active_set
+  use hc_active_set, only: active_set_t
   implicit none
   private
 
   public :: solution_accurate, iterations_used_up, solution_broke_off
-  public :: linear_system_t, precondition_constraints, satisfy_constraints, invert_gram
+  public :: linear_system_t, precondition_constraints, satisfy_constraints, invert_gram, step_ahead
 
   !> Why a linear solver stopped, from best to worst: the residual is within its bound; all iterations allowed were made;
   !> it falls along no direction (rounding errors, a matrix that is not positive definite, numbers that are not finite).
@@ -120,53 +120,99 @@ contains
     end associate
   end subroutine release
 
-  !> Compute M B, the constraint vectors after the preconditioner, zero off the active nodes.
-  subroutine precondition_constraints(system, active, constraint, mb, error)
+  !> Compute M B, the constraint vectors after the preconditioner.
+  subroutine precondition_constraints(system, nodes, n, constraint, mb, error)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
-    !> Nodes that carry unknowns (n)
-    logical, intent(in) :: active(:)
-    !> Constraint vectors B (n, number of constraints), zero off the active nodes
+    !> Nodes that carry unknowns, and number of all nodes
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    !> Constraint vectors B at these nodes (n_active, number of constraints)
     real(wp), intent(in), contiguous :: constraint(:, :)
-    !> M B (n, number of constraints)
+    !> M B there
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    type(active_set_t) :: nodes
-    real(wp), allocatable :: r(:), z(:)
     integer :: m
 
-    call new_active_set(nodes, active, system%space)
-    allocate (r(nodes%n_active), z(nodes%n_active), mb(size(constraint, 1), size(constraint, 2)))
+    allocate (mb, mold=constraint)
     do m = 1, size(constraint, 2)
-      call nodes%pack(constraint(:, m), r)
-      call system%precondition_packed(nodes, size(active), r, z, error)
+      call system%precondition_packed(nodes, n, constraint(:, m), mb(:, m), error)
       if (allocated(error)) return
-      call system%space%fill(mb(:, m), 0.0_wp)
-      call nodes%unpack(z, mb(:, m))
     end do
   end subroutine precondition_constraints
 
   !> Correct x <- x + M B (C^T M B)^-1 missing, so that C^T x has its prescribed value; mostly C is B.
   !>
   !> M B is about the traction that a rigid motion of the active nodes causes.
-  subroutine satisfy_constraints(rows, mb, missing, x, independent, space)
+  subroutine satisfy_constraints(rows, mb, missing, x, independent, space, nodes)
     !> C and M B
     real(wp), intent(in), contiguous :: rows(:, :), mb(:, :)
     !> What C^T x lacks
     real(wp), intent(in) :: missing(:)
-    !> Unknowns
+    !> Unknowns, over all nodes if `nodes` are given
     real(wp), intent(inout), contiguous :: x(:)
     !> False where the constraints depend on each other: x is left alone
     logical, intent(out) :: independent
     !> Space of the fields
     type(field_space_t), intent(in) :: space
-    real(wp) :: inverse(size(missing), size(missing))
+    !> Nodes to which C and M B belong; absent: all
+    type(active_set_t), intent(in), optional :: nodes
+    real(wp) :: inverse(size(missing), size(missing)), factor(size(missing))
+    real(wp), allocatable :: values(:)
     integer :: m
 
     call invert_gram(rows, mb, inverse, independent, space)
-    if (independent) call space%add_columns(mb, [(dot_product(inverse(m, :), missing), m=1, size(missing))], x)
+    if (.not. independent) return
+    factor = [(dot_product(inverse(m, :), missing), m=1, size(missing))]
+    if (.not. present(nodes)) then
+      call space%add_columns(mb, factor, x)
+    else if (size(missing) > 0) then
+      allocate (values(nodes%n_active))
+      call nodes%pack(x, values)
+      call space%add_columns(mb, factor, values)
+      call nodes%unpack(values, x)
+    end if
   end subroutine satisfy_constraints
+
+  !> Take a step along the preconditioned residual, projected on the constraints, before the product A x is known: that of the
+  !> unknowns before small changes serves for the residual, and the product that follows is that of changes and step together.
+  subroutine step_ahead(system, nodes, columns, mb, rows, rhs, ax, multiplier, length, x, error)
+    !> Operator and preconditioner
+    class(linear_system_t), intent(inout) :: system
+    !> Nodes that carry unknowns
+    type(active_set_t), intent(in) :: nodes
+    !> B, M B and C at these nodes (n_active, number of constraints)
+    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
+    !> Right-hand side, and nearly A x (n)
+    real(wp), intent(in), contiguous :: rhs(:), ax(:)
+    !> Multipliers of the constraints, nearly
+    real(wp), intent(in) :: multiplier(:)
+    !> Share of the preconditioned residual
+    real(wp), intent(in) :: length
+    !> Unknowns (n), whose C^T x stays
+    real(wp), intent(inout), contiguous :: x(:)
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: r(:), z(:)
+    real(wp) :: inverse(size(multiplier), size(multiplier)), share(size(multiplier))
+    logical :: independent
+
+    call invert_gram(rows, mb, inverse, independent, system%space)
+    if (.not. independent) return
+    allocate (r(nodes%n_active), z(nodes%n_active))
+    call nodes%pack(rhs, r)
+    call nodes%pack(ax, z)
+    r = r - z
+    call system%space%add_columns(columns, multiplier, r)
+    call system%precondition_packed(nodes, size(x), r, z, error)
+    if (allocated(error)) return
+    share = -matmul(inverse, system%space%dots(rows, z))
+    call system%space%add_columns(mb, share, z)
+    call nodes%pack(x, r)
+    r = r + length*z
+    call nodes%unpack(r, x)
+  end subroutine step_ahead
 
   !> Compute (C^T M B)^-1, zero if the constraints depend on each other.
   subroutine invert_gram(rows, mb, inverse, independent, space)

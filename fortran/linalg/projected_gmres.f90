@@ -5,13 +5,16 @@
 !>
 !>     z <- M r - M B (C^T M B)^-1 C^T M r.
 !>
+!> Of the products A z only the part off the active nodes is stored: with the weights W, the matrix H of Arnoldi's method and
+!> the shares s of the constraints, on the active nodes A Z = W^-1 V H + B s.
+!>
 !> (Y. Saad and M. H. Schultz, SIAM J. Sci. Stat. Comput. 7, 1986, 856-869).
 !>
 !> Equations: docs/theory/friction.md, (F11).
 module hc_projected_gmres
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_active_set, only: active_set_t, new_active_set
+  use hc_active_set, only: active_set_t
   use hc_field_space, only: field_space_t
   use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
   implicit none
@@ -22,18 +25,17 @@ module hc_projected_gmres
 contains
 
   !> Solve by GMRES, preconditioned from the right, with the constraints C^T x satisfied exactly.
-  subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
+  subroutine projected_gmres(system, nodes, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
                              multiplier, independent, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
-    !> Nodes that carry unknowns (n)
-    logical, intent(in) :: active(:)
-    !> B, along which the multipliers act, M B, and C of the constraints (n, number of constraints), zero off the active nodes;
-    !> freed, once there are copies of their active part
-    real(wp), allocatable, intent(inout) :: columns(:, :), mb(:, :), rows(:, :)
+    !> Nodes that carry unknowns
+    type(active_set_t), intent(in) :: nodes
+    !> B, along which the multipliers act, M B, and C of the constraints at these nodes (n_active, number of constraints)
+    real(wp), intent(in), contiguous :: columns(:, :), mb(:, :), rows(:, :)
     !> Weights of the residuals, one for each part of the vectors; the parts are equally long
     real(wp), intent(in) :: weight(:)
-    !> Right-hand side (n), freed likewise
+    !> Right-hand side (n), freed once there is a copy of its active part
     real(wp), allocatable, intent(inout) :: rhs(:)
     !> Unknowns (n), on entry a start that satisfies the constraints
     real(wp), intent(inout), contiguous :: x(:)
@@ -53,22 +55,24 @@ contains
     integer, intent(out) :: iterations, outcome
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    !> What rounding errors of the first residual may have left in A x, in that norm
+    !> What rounding errors may have left in A x, in that norm
     real(wp), intent(out), optional :: drift
 
     type :: direction_t
       !> Weighted residual v; z = M (r + B share) with C^T z = 0, r that residual without its weights, on the active
-      !> nodes; the product A z over all nodes
-      real(wp), allocatable :: v(:), z(:), image(:)
+      !> nodes; the product A z on the others
+      real(wp), allocatable :: v(:), z(:), beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
     type(direction_t) :: basis(max_iterations + 1)
-    type(active_set_t) :: nodes, of_part
-    !> On the active nodes
-    real(wp), allocatable :: packed(:), b(:, :), m_b(:, :), c_rows(:, :)
+    type(active_set_t) :: others, of_part
+    !> On the active nodes; a product over all nodes
+    real(wp), allocatable :: packed(:), image(:)
     !> Places of the last active nodes of the parts
     integer :: last(0:size(weight))
-    real(wp) :: h(max_iterations + 1, max_iterations), g(max_iterations + 1), c(max_iterations), s(max_iterations)
+    !> H, and after rotations
+    real(wp), dimension(max_iterations + 1, max_iterations) :: arnoldi, h
+    real(wp) :: g(max_iterations + 1), c(max_iterations), s(max_iterations)
     real(wp) :: y(max_iterations), share(size(multiplier), max_iterations), length, rotated
     real(wp) :: inverse(size(multiplier), size(multiplier))
     integer :: i, k, part, stat
@@ -79,14 +83,8 @@ contains
     if (present(drift)) drift = 0.0_wp
     outcome = solution_broke_off
     space = system%space
-    call new_active_set(nodes, active, space)
-    call nodes%pack_columns(columns, b)
-    deallocate (columns)
-    call nodes%pack_columns(mb, m_b)
-    deallocate (mb)
-    call nodes%pack_columns(rows, c_rows)
-    deallocate (rows)
-    call invert_gram(c_rows, m_b, inverse, independent, space)
+    others = nodes%complement(size(x))
+    call invert_gram(rows, mb, inverse, independent, space)
     if (.not. independent) return
     associate (n => nodes%n_active)
       allocate (basis(1)%v(n), packed(n))
@@ -101,7 +99,7 @@ contains
     deallocate (rhs)
     call nodes%pack(ax, packed)
     basis(1)%v = basis(1)%v - packed
-    call space%add_columns(b, multiplier, basis(1)%v)
+    call space%add_columns(columns, multiplier, basis(1)%v)
     call weigh(weight, basis(1)%v)
     length = sqrt(space%dot(basis(1)%v, basis(1)%v))
     residual = length
@@ -115,7 +113,8 @@ contains
     h = 0.0_wp
 
     do k = 1, max_iterations
-      allocate (basis(k)%z(nodes%n_active), basis(k)%image(size(x)), basis(k + 1)%v(nodes%n_active), stat=stat)
+      allocate (basis(k)%z(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
+      if (stat == 0 .and. .not. allocated(image)) allocate (image(size(x)), stat=stat)
       if (stat /= 0) then
         call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
         return
@@ -124,18 +123,20 @@ contains
       call weigh(1.0_wp/weight, packed)
       call system%precondition_packed(nodes, size(x), packed, basis(k)%z, error)
       if (allocated(error)) return
-      share(:, k) = -matmul(inverse, space%dots(c_rows, basis(k)%z))
-      call space%add_columns(m_b, share(:, k), basis(k)%z)
-      call system%product_packed(nodes, basis(k)%z, basis(k)%image, error)
+      share(:, k) = -matmul(inverse, space%dots(rows, basis(k)%z))
+      call space%add_columns(mb, share(:, k), basis(k)%z)
+      call system%product_packed(nodes, basis(k)%z, image, error)
       if (allocated(error)) return
-      call nodes%pack(basis(k)%image, basis(k + 1)%v)
-      call space%add_columns(b, -share(:, k), basis(k + 1)%v)
+      call nodes%pack(image, basis(k + 1)%v)
+      call others%pack(image, basis(k)%beyond)
+      call space%add_columns(columns, -share(:, k), basis(k + 1)%v)
       call weigh(weight, basis(k + 1)%v)
       do i = 1, k
         h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
         basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
       end do
       h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
+      arnoldi(:, k) = h(:, k)
       if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
       do i = 1, k - 1
         rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
@@ -156,19 +157,30 @@ contains
     end do
     if (residual <= tolerance) outcome = solution_accurate
     call system%release()
+    if (allocated(image)) deallocate (image)
 
     do i = iterations, 1, -1
       y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
     end do
+    if (present(drift)) then
+      ! where nodes slip far, the terms of A x are large and cancel
+      do i = 1, iterations
+        drift = drift + epsilon(1.0_wp)*abs(y(i))*norm2(arnoldi(:i + 1, i))
+      end do
+    end if
     ! solution and product from the same directions: the preconditioner is of single precision, and where a node
     ! slips far the matrix would make displacements of its rounding errors
-    call nodes%pack(x, packed)
-    do i = 1, iterations
-      packed = packed + y(i)*basis(i)%z
-      ax = ax + y(i)*basis(i)%image
-      deallocate (basis(i)%z, basis(i)%image)
+    packed = 0.0_wp
+    do i = 1, iterations + 1
+      packed = packed + dot_product(arnoldi(i, :iterations), y(:iterations))*basis(i)%v
     end do
-    call nodes%unpack(packed, x)
+    call weigh(1.0_wp/weight, packed)
+    call space%add_columns(columns, matmul(share(:, :iterations), y(:iterations)), packed)
+    call nodes%add(1.0_wp, packed, ax)
+    do i = 1, iterations
+      call nodes%add(y(i), basis(i)%z, x)
+      call others%add(y(i), basis(i)%beyond, ax)
+    end do
     multiplier = multiplier + matmul(share(:, :iterations), y(:iterations))
 
   contains

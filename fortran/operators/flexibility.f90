@@ -22,14 +22,14 @@ module hc_flexibility
   private
 
   public :: flexibility_t, check_operator, normal, along_x, along_y
-  public :: n_block, first_odd_block, blocks, block_index
+  public :: n_block, blocks, block_index
 
   !> Components of a traction and of a relative displacement.
   integer, parameter :: normal = 1, along_x = 2, along_y = 3
 
   !> The operator has six different blocks: normal, xx, xy, yy, which are even in the
   !> distance of two nodes, and normal-x, normal-y, which are odd.
-  integer, parameter :: n_block = 6, first_odd_block = 5
+  integer, parameter :: n_block = 6
   !> Block that stands at (onto, from), negative where its sign is reversed.
   integer, parameter :: block_index(3, 3) = reshape([1, -5, -6, 5, 2, 3, 6, 3, 4], [3, 3])
 

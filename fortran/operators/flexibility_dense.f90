@@ -109,8 +109,8 @@ contains
     n_window = int(extent(1), long)*extent(2)
     dense_memory = buffers + 8*n_block*4*n_window
     if (normal_only) then
-      ! the first guess is larger than the contact; half of the matrix is touched
-      dense_memory = dense_memory + 8*min(7*n/5, n_window)**2/2
+      ! the first area, of the lattice of every second node, has some rings more than the contact; half of the matrix is touched
+      dense_memory = dense_memory + 8*min(n + nint(13*sqrt(real(n, wp)), long), n_window)**2/2
     else
       slides = .true.
       if (present(unlike)) slides = unlike

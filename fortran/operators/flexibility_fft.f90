@@ -8,9 +8,10 @@ module hc_flexibility_fft
   use hc_field_space, only: field_space_t, space_over
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
-  use hc_flexibility, only: flexibility_t, check_operator, normal, n_block, first_odd_block, blocks, block_index
+  use hc_flexibility, only: flexibility_t, check_operator, normal, n_block, blocks
   use hc_fftw, only: good_size
   use hc_convolution, only: convolution_t, new_convolution, kernel_source_t
+  use hc_fft_passes, only: complement
   use hc_fft_layout, only: convolution_memory, transform_memory
   use hc_spectrum, only: kernel_key_t, new_kernel_key, of_pressure, of_all_tractions
   use hc_spectrum_cache, only: kernel_cache_t
@@ -20,9 +21,14 @@ module hc_flexibility_fft
 
   public :: fft_flexibility_t, new_fft_flexibility, fft_memory, fft_setup_memory
 
+  !> Blocks that have spectra, the odd ones last; that of yy is a multiple of the normal one less that of xx.
+  integer, parameter :: transformed(5) = [1, 2, 3, 5, 6], n_spectrum = size(transformed), first_odd = 4
+  !> Spectrum that stands at (onto, from), negative where its sign is reversed
+  integer, parameter :: spectrum_index(3, 3) = reshape([1, -4, -5, 4, 2, 3, 5, 3, complement], [3, 3])
+
   !> Convolution operator over a window.
   type, extends(flexibility_t) :: fft_flexibility_t
-    !> Spectra of the blocks over lambda_1 and the spacing, that of the pressure and the gap alone or all six
+    !> Spectra of the blocks over lambda_1 and the spacing, that of the pressure and the gap alone or all of them
     type(convolution_t) :: convolution
     !> Components that the operator was set up for
     integer, private :: n_component = 0
@@ -76,13 +82,14 @@ contains
     operator%lattice = lattice
     operator%pair = pair
     operator%n_component = merge(1, 3, only_normal)
-    n_kernel = merge(1, n_block, only_normal)
+    n_kernel = merge(1, n_spectrum, only_normal)
     ! the odd blocks of like materials vanish
-    if (.not. abs(pair%lambda_2) > 0.0_wp) n_kernel = min(n_kernel, first_odd_block - 1)
+    if (.not. abs(pair%lambda_2) > 0.0_wp) n_kernel = min(n_kernel, first_odd - 1)
     call new_convolution(operator%convolution, lattice%extent, good_size(2*lattice%extent - 1), n_kernel, &
-                         components_at_once(n_kernel), shared, error, first_odd=first_odd_block)
+                         components_at_once(n_kernel), shared, error, first_odd=first_odd)
     if (allocated(error)) return
     operator%convolution%factor = pair%lambda_1*lattice%spacing()
+    operator%convolution%whole = 2.0_wp + pair%gamma()
     key = new_kernel_key(merge(of_pressure, of_all_tractions, only_normal), lattice, pair)
     call operator%convolution%find_spectra(found, error, cache, key)
     if (found .or. allocated(error)) return
@@ -115,8 +122,8 @@ contains
     logical, intent(in), optional :: shared
     integer :: n_kernel, n_component
 
-    n_kernel = merge(1, n_block, normal_only)
-    if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, first_odd_block - 1), unlike)
+    n_kernel = merge(1, n_spectrum, normal_only)
+    if (present(unlike)) n_kernel = merge(n_kernel, min(n_kernel, first_odd - 1), unlike)
     n_component = components_at_once(n_kernel)
     if (present(shared)) n_component = merge(0, n_component, shared)
     fft_memory = convolution_memory(extent, good_size(2*extent - 1), n_kernel, n_component, threads)
@@ -128,7 +135,7 @@ contains
     integer, intent(in) :: n_kernel
 
     components_at_once = 1
-    if (n_kernel > 1) components_at_once = merge(3, 2, n_kernel >= first_odd_block)
+    if (n_kernel > 1) components_at_once = merge(3, 2, n_kernel >= first_odd)
   end function components_at_once
 
   !> Count the additional bytes while the full operator is set up.
@@ -136,7 +143,7 @@ contains
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
 
-    fft_setup_memory = transform_memory(extent, good_size(2*extent - 1), n_block)
+    fft_setup_memory = transform_memory(extent, good_size(2*extent - 1), n_spectrum)
   end function fft_setup_memory
 
   !> Evaluate the blocks of the operator along a row of offsets.
@@ -151,7 +158,7 @@ contains
     do i = -n, n
       position = i*self%basis(:, 1) + j*self%basis(:, 2)
       block = blocks(self%pair, self%pyramid%kernels(position(1), position(2)))
-      k(:, n + 1 + i) = block(:size(k, 1))
+      k(:, n + 1 + i) = block(transformed(:size(k, 1)))
     end do
   end subroutine lattice_block_row
 
@@ -172,7 +179,7 @@ contains
       return
     end if
     if (max(size(from), size(onto)) <= components_at_once(size(self%convolution%spectrum, 3))) then
-      call self%convolution%convolve(block_index(onto, from), traction, displacement)
+      call self%convolution%convolve(spectrum_index(onto, from), traction, displacement)
     else if (any(from(2:) == normal) .or. any(onto(2:) == normal)) then
       call raise(error, status%invalid_input, 'of several components the pressure is the first')
       return
@@ -202,9 +209,9 @@ contains
     i = merge(1, 0, from(1) == normal)
     o = merge(1, 0, onto(1) == normal)
     if (i == 0 .or. i == size(from)) displacement = 0.0_wp
-    if (i*o > 0) call self%convolution%convolve(block_index(onto(:o), from(:i)), traction(:, :, :i), displacement(:, :, :o))
+    if (i*o > 0) call self%convolution%convolve(spectrum_index(onto(:o), from(:i)), traction(:, :, :i), displacement(:, :, :o))
     if (i == size(from) .or. o == size(onto)) return
-    call self%convolution%convolve(block_index(onto(o + 1:), from(i + 1:)), traction(:, :, i + 1:), displacement(:, :, o + 1:))
+    call self%convolution%convolve(spectrum_index(onto(o + 1:), from(i + 1:)), traction(:, :, i + 1:), displacement(:, :, o + 1:))
   end subroutine apply_apart
 
 end module hc_flexibility_fft

@@ -25,6 +25,8 @@ module hc_pressure_kernel
   contains
     !> Tabulate the kernel, unless the table covers the window
     procedure :: cover
+    !> Free the table
+    procedure :: clear
     procedure :: row => kernel_row
   end type normal_kernel_t
 
@@ -68,6 +70,14 @@ contains
       self%same(:j - 1, j) = self%same(j, :j - 1)
     end do
   end subroutine cover
+
+  !> Free the table; `cover` makes it again.
+  subroutine clear(self)
+    class(normal_kernel_t), intent(inout) :: self
+
+    if (allocated(self%same)) deallocate (self%same)
+    if (allocated(self%opposite)) deallocate (self%opposite)
+  end subroutine clear
 
   !> Take a row of offsets from the table.
   pure subroutine kernel_row(self, j, k)

@@ -119,19 +119,28 @@ contains
     logical, intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
 
-    logical :: stiff(size(active))
-
     associate (direction => direction)
-      stiff = active
-      ! displacements go on beyond the nodes on stiff springs
       if (present(compliance)) then
         call self%inverse%set_springs(self%options, compliance, active)
-        stiff = active .and. .not. self%inverse%is_loose(compliance)
+        ! displacements go on beyond the nodes on stiff springs
+        call continue_beyond(self, self%extent, active .and. .not. self%inverse%is_loose(compliance))
+      else
+        call continue_beyond(self, self%extent, active)
       end if
-      if (.not. allocated(self%edge)) allocate (self%edge)
-      call new_edge_extension(self%edge, reshape(stiff, self%extent), self%space, self%options)
     end associate
   end subroutine set_contact
+
+  !> Set up the continuation beyond some nodes, which are handed on without a copy.
+  subroutine continue_beyond(self, extent, active)
+    class(symbol_preconditioner_t), intent(inout) :: self
+    !> Columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> The nodes
+    logical, intent(in) :: active(extent(1), extent(2))
+
+    if (.not. allocated(self%edge)) allocate (self%edge)
+    call new_edge_extension(self%edge, active, self%space, self%options)
+  end subroutine continue_beyond
 
   !> Estimate the pressure that causes a closing of the gap.
   subroutine apply_to_pressure(self, displacement, traction, work)
@@ -212,8 +221,7 @@ contains
     known = allocated(self%weight)
     if (known) known = self%nodes%is_set(active)
     if (.not. known) then
-      if (.not. allocated(self%edge)) allocate (self%edge)
-      call new_edge_extension(self%edge, reshape(active, self%extent), self%space, self%options)
+      call continue_beyond(self, self%extent, active)
       call new_active_set(self%nodes, active, self%space)
     end if
     if (.not. allocated(self%weight)) allocate (self%weight(size(active), 2))

@@ -15,6 +15,7 @@ module test_friction
   use hc_disc_law, only: linearize, on_cone, normal_to
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
+  use hc_active_set, only: active_set_t, new_active_set
   use hc_projected_cg, only: projected_cg
   use hc_elastic_operators, only: operators_t, new_operators
   use hc_shear_system, only: shear_system_t, new_shear_system
@@ -415,6 +416,7 @@ contains
     type(elastic_pair_t) :: pair
     real(wp), allocatable :: x(:, :), y(:, :), unknown(:), image(:), rhs(:), none(:, :), m_none(:, :)
     logical, allocatable :: active(:)
+    type(active_set_t) :: nodes
     real(wp) :: no_multiplier(0), residual
     integer :: level, side, n, iterations, outcome
 
@@ -426,7 +428,7 @@ contains
       if (allocated(error)) return
       call new_operators(operators, lattice, pair, field_space_t(), error)
       if (allocated(error)) return
-      if (allocated(x)) deallocate (x, y, unknown, image)
+      if (allocated(x)) deallocate (x, y, unknown, image, none, m_none)
       allocate (x(side, side), y(side, side), unknown(2*n), image(2*n), rhs(2*n), none(2*n, 0), m_none(2*n, 0))
       call lattice%coordinates(x, y)
       call new_shear_system(system, operators)
@@ -438,8 +440,9 @@ contains
       unknown = 0.0_wp
       image = 0.0_wp
       rhs = merge(1.0_wp, 0.0_wp, active)
-      call projected_cg(system, active, none, m_none, rhs, unknown, image, 1.0e-6_wp, 100, no_multiplier, residual, &
-                        iterations, outcome, error)
+      call new_active_set(nodes, active, system%space)
+      call projected_cg(system, nodes, none(:nodes%n_active, :), m_none(:nodes%n_active, :), rhs, unknown, &
+                        image, 1.0e-6_wp, 100, no_multiplier, residual, iterations, outcome, error)
       if (allocated(error)) return
       call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 9, 'iterations')
       if (allocated(error)) return

@@ -3,16 +3,22 @@ module test_friction_sweeps
   use hc_precision, only: wp, pi
   use hc_error, only: error_t
   use hc_field_space, only: field_space_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
+    along_x, along_y, slip
+  use hc_contact_residuals, only: tangential_compliances
+  use hc_contact_problem, only: near_reach
   use hc_coulomb, only: coulomb_t
   use hc_elastic_operators, only: operators_t, new_operators
   use hc_friction_iterate, only: friction_iterate_t
+  use hc_active_zones, only: classify
+  use hc_front_relaxation, only: relax_fronts
   use hc_staggered_newton, only: staggered_sweep
   use hc_coupled_newton, only: coupled_sweep
   use hc_load_constraints, only: overloads
   use hc_frictional_contact, only: frictional_contact_t
   use test_friction, only: new_sphere
-  use testing, only: test_t, new_test, check_true, coordinate
+  use testing, only: test_t, new_test, check, check_true, coordinate
   implicit none
   private
 
@@ -30,6 +36,8 @@ contains
 
     tests = [ &
       new_test('any_order', test_any_order), &
+      new_test('near_compliance', test_near_compliance), &
+      new_test('fronts', test_fronts), &
       new_test('load_factor', test_load_factor), &
       new_test('load_factor_of_shifts', test_load_factor_of_shifts) &
     ]
@@ -76,6 +84,97 @@ contains
     if (failed) deallocate (error)
     call check_true(error, failed, 'displacements of other tractions')
   end subroutine test_any_order
+
+  !> What the pyramids of two nodes displace around them is what the operator says, spring of the layer included.
+  subroutine test_near_compliance(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(operators_t) :: operators
+    type(elastic_pair_t) :: pair
+    real(wp) :: near(-near_reach:near_reach, -near_reach:near_reach, 3), expected(2)
+    real(wp), dimension(21, 21, 2), target :: q, u
+    real(wp), pointer, contiguous :: traction(:), displacement(:)
+    integer, parameter :: node(2, 2) = reshape([9, 10, 12, 11], [2, 2])
+    integer :: col, row, k
+
+    call new_sphere(contact, 10, 0.4_wp, 0.2_wp, coulomb_t(1.0_wp), error, n_threads=1)
+    if (allocated(error)) return
+    pair = contact%problem%pair
+    pair%tangential_layer = 0.02_wp
+    near = tangential_compliances(contact%problem%lattice, pair, near_reach)
+    call new_operators(operators, contact%problem%lattice, pair, field_space_t(), error)
+    if (allocated(error)) return
+    q = 0.0_wp
+    q(node(1, 1), node(2, 1), :) = [0.7_wp, -0.3_wp]
+    q(node(1, 2), node(2, 2), :) = [0.2_wp, 1.1_wp]
+    traction(1:size(q)) => q
+    displacement(1:size(u)) => u
+    call operators%apply([along_x, along_y], traction, [along_x, along_y], displacement, error)
+    if (allocated(error)) return
+    do row = 6, 15
+      do col = 7, 14
+        expected = 0.0_wp
+        do k = 1, size(node, 2)
+          associate (t => q(node(1, k), node(2, k), :), by => near(col - node(1, k), row - node(2, k), :))
+            expected = expected + [by(1)*t(1) + by(2)*t(2), by(2)*t(1) + by(3)*t(2)]
+          end associate
+        end do
+        call check(error, u(col, row, :), expected, 1.0e-12_wp, 'displacement near the nodes')
+        if (allocated(error)) return
+      end do
+    end do
+  end subroutine test_near_compliance
+
+  !> Relaxed fronts are nearer to those of the solution; small contacts do without.
+  subroutine test_fronts(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t), target :: contact
+    type(operators_t), target :: operators
+    type(contact_state_t) :: start, solution
+    type(friction_iterate_t), target :: now
+    type(load_target_t) :: target
+    real(wp), allocatable :: q(:)
+    integer :: before, after, k
+
+    call new_sphere(contact, 40, 0.0_wp, 0.0_wp, coulomb_t(0.5_wp), error, n_threads=1)
+    if (allocated(error)) return
+    call new_friction_state(solution, contact%problem%lattice)
+    do k = 1, 2
+      start = solution
+      target = load_target_t([f, f, f, f], [load, merge(0.0_wp, 0.25_wp*load, k == 1), 0.0_wp, 0.0_wp])
+      call contact%solve_step(start, start%relative_displacement, target, 1.0e-8_wp, 60, solution, error)
+      if (allocated(error)) return
+    end do
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    if (allocated(error)) return
+    call now%set_start(contact%problem, operators, start, start%relative_displacement, target, 1.0e-8_wp, error)
+    if (allocated(error)) return
+    call staggered_sweep(now, error)
+    if (allocated(error)) return
+    before = count_wrong()
+    q = now%q
+    call relax_fronts(now)
+    call check(error, now%q, q, 0.0_wp, 'few nodes in contact')
+    if (allocated(error)) return
+    contact%problem%options%newton%front_nodes = 0
+    call relax_fronts(now)
+    after = count_wrong()
+    call check_true(error, before > 100 .and. 2*after < before, 'fronts nearer to those of the solution')
+  contains
+
+    !> Nodes whose zone is not that of the solution.
+    integer function count_wrong()
+      type(friction_iterate_t), target :: copy
+      logical, allocatable :: active(:)
+
+      copy = now
+      call classify(copy, .false., active)
+      associate (n => size(copy%p))
+        count_wrong = count((active(:n) .and. .not. active(n + 1:)) .neqv. reshape(solution%zone == slip, [n]))
+      end associate
+    end function count_wrong
+
+  end subroutine test_fronts
 
   !> Shift and torque on Hertz' pressure: too much by a thousandth, and not quite.
   !>

@@ -6,8 +6,9 @@ module test_linear_solvers
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_projected_cg, only: freeing_cg => projected_cg
   use hc_projected_gmres, only: freeing_gmres => projected_gmres
-  use hc_linear_system, only: linear_system_t, precondition_constraints, satisfy_constraints, solution_accurate, &
-    iterations_used_up, solution_broke_off
+  use hc_active_set, only: active_set_t, new_active_set
+  use hc_linear_system, only: linear_system_t, precondition_packed_constraints => precondition_constraints, &
+    satisfy_constraints, step_ahead, solution_accurate, iterations_used_up, solution_broke_off
   use testing, only: test_t, new_test, check, check_true
   implicit none
   private
@@ -34,6 +35,7 @@ contains
       new_test('recurrence', test_recurrence), &
       new_test('projected_cg', test_projected_cg), &
       new_test('three_constraints', test_three_constraints), &
+      new_test('step_ahead', test_step_ahead), &
       new_test('outcomes', test_outcomes), &
       new_test('norm_of_gmres', test_norm_of_gmres), &
       new_test('products_that_are_carried', test_products_that_are_carried), &
@@ -84,15 +86,38 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(out), optional :: drift
     real(wp), allocatable :: b(:, :), m_b(:, :), right(:)
+    type(active_set_t) :: nodes
 
-    allocate (b, source=constraint)
-    allocate (m_b, source=mb)
+    call new_active_set(nodes, active, system%space)
+    call nodes%pack_columns(constraint, b)
+    call nodes%pack_columns(mb, m_b)
     allocate (right, source=rhs)
-    call freeing_cg(system, active, b, m_b, right, x, ax, tolerance, max_iterations, multiplier, residual, iterations, &
+    call freeing_cg(system, nodes, b, m_b, right, x, ax, tolerance, max_iterations, multiplier, residual, iterations, &
                     outcome, error, drift)
   end subroutine projected_cg
 
-  !> GMRES that frees copies of what is given.
+  !> M B over all nodes, zero off the active ones.
+  subroutine precondition_constraints(system, active, constraint, mb, error)
+    type(dense_system_t), intent(inout) :: system
+    logical, intent(in) :: active(:)
+    real(wp), intent(in) :: constraint(:, :)
+    real(wp), allocatable, intent(out) :: mb(:, :)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: b(:, :), m_b(:, :)
+    type(active_set_t) :: nodes
+    integer :: k
+
+    call new_active_set(nodes, active, system%space)
+    call nodes%pack_columns(constraint, b)
+    call precondition_packed_constraints(system, nodes, size(active), b, m_b, error)
+    allocate (mb(size(constraint, 1), size(constraint, 2)), source=0.0_wp)
+    if (allocated(error)) return
+    do k = 1, size(mb, 2)
+      call nodes%unpack(m_b(:, k), mb(:, k))
+    end do
+  end subroutine precondition_constraints
+
+  !> GMRES with constraints over all nodes, which frees a copy of the right-hand side.
   subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, multiplier, &
                              independent, residual, iterations, outcome, error, drift)
     type(dense_system_t), intent(inout) :: system
@@ -107,12 +132,14 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(out), optional :: drift
     real(wp), allocatable :: b(:, :), m_b(:, :), c(:, :), right(:)
+    type(active_set_t) :: nodes
 
-    allocate (b, source=columns)
-    allocate (m_b, source=mb)
-    allocate (c, source=rows)
+    call new_active_set(nodes, active, system%space)
+    call nodes%pack_columns(columns, b)
+    call nodes%pack_columns(mb, m_b)
+    call nodes%pack_columns(rows, c)
     allocate (right, source=rhs)
-    call freeing_gmres(system, active, b, m_b, c, weight, right, x, ax, tolerance, max_iterations, multiplier, independent, &
+    call freeing_gmres(system, nodes, b, m_b, c, weight, right, x, ax, tolerance, max_iterations, multiplier, independent, &
                        residual, iterations, outcome, error, drift)
   end subroutine projected_gmres
 
@@ -331,6 +358,49 @@ contains
     if (allocated(error)) return
     call check(error, x, ax, 0.0_wp, 'the unknowns are left alone')
   end subroutine test_three_constraints
+
+  !> A step before the product is known: that of the unknowns before one of them was changed; rows differ from columns.
+  subroutine test_step_ahead(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    type(active_set_t) :: nodes
+    real(wp) :: x(5), before(5), ax(5), r(5), z(5), columns(5, 1), rows(5, 1), multiplier(1)
+    real(wp), allocatable :: mb(:, :), b(:, :), m_b(:, :), c(:, :)
+    real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], length = 0.6_wp
+    logical, parameter :: active(5) = [.true., .true., .false., .true., .true.]
+    integer :: i
+
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    columns(:, 1) = [1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp]
+    rows(:, 1) = [1.0_wp, 2.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
+    multiplier = 0.5_wp
+    call precondition_constraints(system, active, columns, mb, error)
+    if (allocated(error)) return
+    x = [1.0_wp, 0.0_wp, 2.0_wp, -1.0_wp, 3.0_wp]
+    ax = matmul(system%matrix, x)
+    x(3) = 2.1_wp
+    before = x
+    call new_active_set(nodes, active, system%space)
+    call nodes%pack_columns(columns, b)
+    call nodes%pack_columns(mb, m_b)
+    call nodes%pack_columns(rows, c)
+    call step_ahead(system, nodes, b, m_b, c, rhs, ax, multiplier, length, x, error)
+    if (allocated(error)) return
+    r = merge(rhs - ax + 0.5_wp*columns(:, 1), 0.0_wp, active)
+    z = r/[(1.0_wp + i, i=1, 5)]
+    z = z - mb(:, 1)*(dot_product(rows(:, 1), z)/dot_product(rows(:, 1), mb(:, 1)))
+    call check(error, x, before + length*z, 1.0e-13_wp, 'unknowns')
+    if (allocated(error)) return
+    call check(error, dot_product(rows(:, 1), x), dot_product(rows(:, 1), before), 1.0e-13_wp, 'constraint')
+    if (allocated(error)) return
+    before = x
+    call step_ahead(system, nodes, b, m_b, 0.0_wp*c, rhs, ax, multiplier, length, x, error)
+    if (allocated(error)) return
+    call check(error, x, before, 0.0_wp, 'no step where constraints depend on each other')
+  end subroutine test_step_ahead
 
   subroutine dense_product(self, x, y, error)
     class(dense_system_t), intent(inout) :: self

@@ -1,0 +1,214 @@
+!> Relaxation of the shear traction along the fronts between stick and slip.
+!>
+!> A sweep with wrong zones leaves residuals in a few rings of nodes along the front. A few passes of nonlinear Gauss-Seidel over
+!> these, each of which changes the displacements of its neighborhood alone, bring traction and front into place, without a
+!> product over the window.
+!>
+!> Equations: docs/theory/friction.md, (F17).
+module hc_front_relaxation
+  use, intrinsic :: iso_fortran_env, only: int8
+  use hc_precision, only: wp
+  use hc_lattice, only: neighbors
+  use hc_options, only: newton_options_t
+  use hc_contact_problem, only: near_reach
+  use hc_friction_iterate, only: friction_iterate_t
+  use hc_active_zones, only: shear_parameter
+  implicit none
+  private
+
+  !> Marks of nodes: off the contact or at the rim of the window, sticking, slipping, among those relaxed
+  integer(int8), parameter :: is_off = 0_int8, sticks = 1_int8, slips = 2_int8, is_near = 3_int8
+
+  public :: relax_fronts
+
+contains
+
+  !> Relax the shear traction near the fronts, and estimate the displacements that it causes.
+  subroutine relax_fronts(now)
+    !> Iterate: traction and tangential displacement change, the latter but for an error
+    type(friction_iterate_t), intent(inout), target :: now
+    real(wp), pointer, contiguous :: q(:, :, :), u(:, :, :)
+    integer, allocatable :: node(:, :)
+    real(wp), allocatable :: rest(:, :), bound(:)
+    type(newton_options_t) :: options
+    real(wp) :: least
+    integer :: pass
+    logical :: changed
+
+    options = now%problem%options%newton
+    now%relaxations = now%relaxations + 1
+    if (now%relaxations > options%undamped_sweeps .or. now%residual_tangential < options%front_residual) return
+    ! a pressure that moves with the shear traction moves the fronts again
+    if (now%pressure_feels_shear .or. (now%without_start .and. now%first)) return
+    if (.not. (now%problem%friction%is_bounded() .and. now%problem%friction%is_isotropic())) return
+    if (now%operators%space%count(now%contact) < options%front_nodes) return
+    call find_fronts(now, options%front_rings, node)
+    if (size(node, 2) == 0) return
+    call describe(now, node, rest, bound)
+    associate (extent => now%problem%lattice%extent)
+      q(1:extent(1), 1:extent(2), 1:2) => now%q
+      u(1:extent(1), 1:extent(2), 1:2) => now%u
+    end associate
+    least = options%front_share*now%residual_tangential*now%traction_scale()
+    do pass = 1, options%front_passes
+      call relax(now%problem%near_compliance, near_reach, node, mod(pass, 2) == 0, now%problem%tangential_compliance, least, &
+                 bound, rest, q, u, changed)
+      if (.not. changed) exit
+    end do
+  end subroutine relax_fronts
+
+  !> Find the nodes in contact within some rings of a front between stick and slip, ring by ring.
+  subroutine find_fronts(now, rings, node)
+    type(friction_iterate_t), intent(in) :: now
+    !> Rings on each side of a front
+    integer, intent(in) :: rings
+    !> Columns and rows (2, nodes)
+    integer, allocatable, intent(out) :: node(:, :)
+    integer(int8), allocatable :: mark(:, :)
+    integer, allocatable :: found(:, :)
+    integer :: row, col, ring, k, i, first, last, at
+
+    associate (extent => now%problem%lattice%extent)
+      allocate (mark(extent(1), extent(2)))
+    end associate
+    call mark_nodes(now, mark)
+    allocate (found(2, count(mark /= is_off)))
+    at = 0
+    do row = 2, size(mark, 2) - 1
+      do col = 2, size(mark, 1) - 1
+        if (mark(col, row) == is_off) cycle
+        do k = 1, size(neighbors, 2)
+          ! one of them sticks, the other one slips
+          if (mark(col, row) + mark(col + neighbors(1, k), row + neighbors(2, k)) == sticks + slips .and. &
+              mark(col + neighbors(1, k), row + neighbors(2, k)) /= is_off) then
+            at = at + 1
+            found(:, at) = [col, row]
+            exit
+          end if
+        end do
+      end do
+    end do
+    do i = 1, at
+      mark(found(1, i), found(2, i)) = is_near
+    end do
+    first = 1
+    do ring = 2, rings
+      last = at
+      do i = first, last
+        do k = 1, size(neighbors, 2)
+          associate (x => found(1, i) + neighbors(1, k), y => found(2, i) + neighbors(2, k))
+            if (mark(x, y) == is_off .or. mark(x, y) == is_near) cycle
+            mark(x, y) = is_near
+            at = at + 1
+            found(:, at) = [x, y]
+          end associate
+        end do
+      end do
+      first = last + 1
+    end do
+    node = found(:, :at)
+  end subroutine find_fronts
+
+  !> Find out which nodes in contact stick, and which slip, as their classification will.
+  subroutine mark_nodes(now, mark)
+    type(friction_iterate_t), intent(in) :: now
+    !> Marks (n_col, n_row)
+    integer(int8), intent(out) :: mark(:, :)
+    real(wp) :: ds(size(mark, 1), 2), bound(size(mark, 1)), r
+    integer :: row, col, n, i
+
+    n = size(now%p)
+    r = shear_parameter(now)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, bound, col, i)
+    do row = 1, size(mark, 2)
+      mark(:, row) = is_off
+      i = (row - 1)*size(bound)
+      if (row == 1 .or. row == size(mark, 2)) cycle
+      if (.not. any(now%contact(i + 1:i + size(bound)))) cycle
+      call now%problem%friction%find_bounds(i + 1, now%p(i + 1:i + size(bound)), bound)
+      call now%slip_row(row, ds(:, 1), ds(:, 2))
+      do col = 2, size(bound) - 1
+        if (.not. (now%contact(i + col) .and. bound(col) > 0.0_wp)) cycle
+        mark(col, row) = merge(slips, sticks, (now%q(i + col) - r*ds(col, 1))**2 + (now%q(n + i + col) - r*ds(col, 2))**2 &
+                               > bound(col)**2)
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine mark_nodes
+
+  !> Find what is subtracted from the displacement of a node for its slip, and the largest traction that it bears.
+  subroutine describe(now, node, rest, bound)
+    type(friction_iterate_t), intent(in) :: now
+    !> Columns and rows (2, nodes)
+    integer, intent(in) :: node(:, :)
+    !> u - ds (2, nodes) [m]
+    real(wp), allocatable, intent(out) :: rest(:, :)
+    !> Largest tractions (nodes) [Pa]
+    real(wp), allocatable, intent(out) :: bound(:)
+    real(wp) :: rigid(now%problem%lattice%extent(1), 2)
+    integer :: k, i, n, row
+
+    n = size(now%p)
+    row = 0
+    allocate (rest(2, size(node, 2)), bound(size(node, 2)))
+    do k = 1, size(node, 2)
+      if (node(2, k) /= row) then
+        row = node(2, k)
+        call now%problem%rigid_displacement_row(now%motion, row, rigid(:, 1), rigid(:, 2))
+      end if
+      i = (row - 1)*size(rigid, 1) + node(1, k)
+      rest(1, k) = now%origin(i) + rigid(node(1, k), 1)
+      rest(2, k) = now%origin(n + i) + rigid(node(1, k), 2)
+      call now%problem%friction%find_bounds(i, now%p(i:i), bound(k:k))
+    end do
+  end subroutine describe
+
+  !> Make one pass of nonlinear Gauss-Seidel, (F17).
+  pure subroutine relax(near, reach, node, backwards, compliance, least, bound, rest, q, u, changed)
+    !> Nodes that a traction moves, in each direction
+    integer, intent(in) :: reach
+    !> Displacements around a node under unit traction, xx, xy and yy [m/Pa]
+    real(wp), intent(in) :: near(-reach:reach, -reach:reach, 3)
+    !> Columns and rows of the nodes (2, nodes)
+    integer, intent(in) :: node(:, :)
+    !> From the last node to the first
+    logical, intent(in) :: backwards
+    !> d_t [m/Pa]; changes of a traction below which it stays [Pa]
+    real(wp), intent(in) :: compliance, least
+    !> Largest traction of each node (nodes) [Pa]; what its displacement has beyond its slip (2, nodes) [m]
+    real(wp), intent(in) :: bound(:), rest(:, :)
+    !> Shear traction [Pa] and tangential displacement [m] (n_col, n_row, 2)
+    real(wp), intent(inout), contiguous :: q(:, :, :), u(:, :, :)
+    !> A traction has changed
+    logical, intent(out) :: changed
+    real(wp) :: trial(2), change(2), length
+    integer :: m, k, i, j, row, col, low(2), high(2)
+
+    changed = .false.
+    do m = 1, size(node, 2)
+      k = merge(size(node, 2) + 1 - m, m, backwards)
+      i = node(1, k)
+      j = node(2, k)
+      trial(1) = q(i, j, 1) - (u(i, j, 1) - rest(1, k))/compliance
+      trial(2) = q(i, j, 2) - (u(i, j, 2) - rest(2, k))/compliance
+      length = sqrt(trial(1)**2 + trial(2)**2)
+      if (length > bound(k)) trial = trial*(bound(k)/length)
+      change(1) = trial(1) - q(i, j, 1)
+      change(2) = trial(2) - q(i, j, 2)
+      if (max(abs(change(1)), abs(change(2))) <= least) cycle
+      changed = .true.
+      q(i, j, 1) = trial(1)
+      q(i, j, 2) = trial(2)
+      low = max([i, j] - reach, 1)
+      high = min([i, j] + reach, [size(u, 1), size(u, 2)])
+      do row = low(2), high(2)
+        !$omp simd
+        do col = low(1), high(1)
+          u(col, row, 1) = u(col, row, 1) + near(col - i, row - j, 1)*change(1) + near(col - i, row - j, 2)*change(2)
+          u(col, row, 2) = u(col, row, 2) + near(col - i, row - j, 2)*change(1) + near(col - i, row - j, 3)*change(2)
+        end do
+      end do
+    end do
+  end subroutine relax
+
+end module hc_front_relaxation

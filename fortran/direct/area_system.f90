@@ -11,6 +11,7 @@ module hc_area_system
   use hc_error, only: error_t
   use hc_flexibility, only: flexibility_t, normal, along_x
   use hc_contact_problem, only: friction_problem_t
+  use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, satisfy_constraints, solution_accurate
   use hc_projected_gmres, only: projected_gmres
   use hc_area_factors, only: area_factors_t
@@ -65,7 +66,8 @@ contains
     type(area_system_t) :: system
     real(wp), allocatable :: columns(:, :), mb(:, :), rows(:, :), right(:), ax(:), multiplier(:)
     integer, allocatable :: determined(:)
-    logical :: active(size(x)), independent
+    type(active_set_t) :: nodes
+    logical :: independent
     real(wp) :: scale, residual, largest
     integer :: k, n, iterations, outcome
 
@@ -99,9 +101,9 @@ contains
     if (problem%friction%is_bounded()) then
       if (problem%friction%resists()) scale = min(scale, problem%friction%largest_bound(largest))
     end if
-    active = .true.
+    call new_active_set(nodes, spread(.true., 1, n), system%space)
     allocate (multiplier(size(determined)), source=0.0_wp)
-    call projected_gmres(system, active, columns, mb, rows, [1.0_wp], right, x, ax, accuracy*scale*real(n, wp)**0.25_wp, &
+    call projected_gmres(system, nodes, columns, mb, rows, [1.0_wp], right, x, ax, accuracy*scale*real(n, wp)**0.25_wp, &
                          problem%options%direct%max_directions, multiplier, independent, residual, iterations, outcome, error)
     if (allocated(error)) return
     solved = independent .and. outcome == solution_accurate

@@ -12,6 +12,7 @@ module hc_direct_contact
   use hc_options, only: options_t
   use hc_lapack, only: dposv
   use hc_lattice, only: lattice_t
+  use hc_transfer, only: prolong_edge, restrict_field, restrict_mask
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: normal
@@ -40,6 +41,8 @@ module hc_direct_contact
     class(normal_law_t), allocatable :: law
     !> Matrix of the contact area and its factor: as large as the largest area so far
     real(wp), allocatable :: matrix(:, :)
+    !> The same on the lattice of every second node, where a first contact is found first
+    type(direct_contact_t), allocatable :: coarser
     type(options_t) :: options
   contains
     procedure :: solve_step
@@ -108,7 +111,7 @@ contains
   end subroutine solve_step
 
   !> Solve for a normal load or an approach.
-  subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)
+  recursive subroutine solve(self, control, target, tolerance, max_sweeps, state, error, start)
     class(direct_contact_t), intent(inout) :: self
     !> force_control or displacement_control
     integer, intent(in) :: control
@@ -122,7 +125,7 @@ contains
     type(contact_state_t), intent(out) :: state
     !> Allocated on failure: a target that cannot be solved for, not enough memory, a matrix that is not positive definite
     type(error_t), allocatable, intent(out) :: error
-    !> Contact area to start from (n_col, n_row); absent: where the undeformed bodies would overlap
+    !> Contact area to start from (n_col, n_row); absent: that of the coarser lattice, or where the undeformed bodies would overlap
     logical, intent(in), optional :: start(:, :)
 
     real(wp), allocatable :: h(:), p(:), compliance(:), offset(:)
@@ -151,6 +154,7 @@ contains
       if (.not. any(active)) active = candidate
     else
       active = first_guess(self%flexibility%lattice, self%flexibility%pair, control, target, h, candidate)
+      call find_coarse_area(self, control, target, max_sweeps, active)
     end if
     if (target <= merge(0.0_wp, delta, control == force_control)) then
       active = .false.
@@ -190,6 +194,44 @@ contains
                   field_space_t(), error, self%law)
     state%operator_applications = self%flexibility%applications
   end subroutine solve
+
+  !> Find the contact area on the lattice of every second node, if that has nodes enough: each one takes fewer exchanges.
+  recursive subroutine find_coarse_area(self, control, target, max_sweeps, active)
+    class(direct_contact_t), intent(inout) :: self
+    !> force_control or displacement_control
+    integer, intent(in) :: control
+    !> Normal load [N] or approach [m]
+    real(wp), intent(in) :: target
+    !> Active sets that may be tried
+    integer, intent(in) :: max_sweeps
+    !> First guess of the contact area; then the better one, if there is one
+    logical, intent(inout) :: active(:)
+    !> A start is of use only: without the coarse one the first guess serves
+    type(error_t), allocatable :: error
+    type(direct_contact_t), allocatable :: coarser
+    type(contact_state_t) :: state
+    type(lattice_t) :: coarse
+    real(wp) :: pressure(self%flexibility%lattice%extent(1), self%flexibility%lattice%extent(2))
+    logical :: found(size(active))
+
+    associate (lattice => self%flexibility%lattice, options => self%options)
+      if (count(active) < 4*options%multilevel%least_contact) return
+      if (.not. allocated(self%coarser)) then
+        coarse = lattice%coarsened()
+        if (.not. any(restrict_mask(lattice, self%candidate, coarse))) return
+        allocate (coarser)
+        call new_direct_contact(coarser, coarse, self%flexibility%pair, restrict_field(lattice, self%initial_gap, coarse), &
+                                restrict_mask(lattice, self%candidate, coarse), error, options, self%law)
+        if (allocated(error)) return
+        call move_alloc(coarser, self%coarser)
+      end if
+      call self%coarser%solve(control, target, options%direct%nested_tolerance, max_sweeps, state, error)
+      if (allocated(error)) return
+      call prolong_edge(self%coarser%flexibility%lattice, state%pressure, lattice, pressure, field_space_t())
+      found = reshape(self%candidate .and. pressure > 0.0_wp, [size(active)])
+      if (any(found)) active = found
+    end associate
+  end subroutine find_coarse_area
 
   !> Nodes in contact, and springs of a compliant law that is linearised about the present pressure and gap.
   pure subroutine linearize_law(self, p, gap, candidate, active, compliance, offset)

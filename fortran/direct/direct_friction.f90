@@ -365,9 +365,6 @@ contains
       if (self%problem%normal_law%is_compliant() .and. any(abs(it%p) > 0.0_wp)) call linearize_law(self%problem, it)
       call solve_area(self%problem, self%flexibility, self%operator, self%factors, target, it, error)
       if (allocated(error)) return
-      it%solves = it%solves + 1
-      call evaluate(self%problem, self%operator, it, error)
-      if (allocated(error)) return
       if (self%problem%normal_law%is_compliant()) then
         violation = 0.0_wp
         call self%problem%normal_law%violation(1, self%problem%normal_compliance, it%p, it%gap, it%candidate, violation)

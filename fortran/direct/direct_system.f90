@@ -11,7 +11,7 @@ module hc_direct_system
   use hc_flexibility, only: flexibility_t
   use hc_flexibility_dense, only: dense_flexibility_t
   use hc_area_factors, only: area_factors_t
-  use hc_direct_iterate, only: direct_iterate_t, infinite, unloaded, ring
+  use hc_direct_iterate, only: direct_iterate_t, evaluate, infinite, unloaded, ring
   use hc_area_system, only: solve_with_factors
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, n_motion, force_control
   use hc_disc_law, only: normal_to
@@ -27,7 +27,7 @@ module hc_direct_system
 
 contains
 
-  !> Tractions and motions with g = 0 on the contact, ds = 0 in stick, t.ds + D tau = 0 in slip.
+  !> Tractions and motions with g = 0 on the contact, ds = 0 in stick, t.ds + D tau = 0 in slip; gap and slip under them.
   !>
   !> The unknowns are p on the contact, q_x and q_y in stick, tau in slip, in this order, and the changes
   !> of the rigid motions whose loads are prescribed. Unknown k acts with `traction(:, k)`, and its row
@@ -146,6 +146,8 @@ contains
     do k = 1, n
       it%q(node(k), :) = it%q(node(k), :) + unknown(k, 0)*traction(along_x:, k)
     end do
+    it%solves = it%solves + 1
+    call evaluate(problem, operator, it, error)
   end subroutine solve_area
 
   !> Factorize the area as it stands.

@@ -28,7 +28,7 @@ module hc_written_iteration
   use hc_load_constraints, only: overloads
   use hc_direct_contact, only: first_guess
   use hc_area_factors, only: area_factors_t
-  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, evaluate, record
+  use hc_direct_iterate, only: direct_iterate_t, new_direct_iterate, infinite, ring, record
   use hc_direct_system, only: solve_area
   implicit none
   private
@@ -137,9 +137,6 @@ contains
       call before%add(it, repeated)
       if (repeated) return
       call solve_area(problem, flexibility, operator, factors, target, it, error)
-      if (allocated(error)) return
-      it%solves = it%solves + 1
-      call evaluate(problem, operator, it, error)
       if (allocated(error)) return
       negligible = max(problem%options%direct%pressure_rounding, it%accuracy)*maxval(it%p)
       tension = it%contact .and. it%p < -negligible

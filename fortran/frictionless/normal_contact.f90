@@ -10,6 +10,7 @@ module hc_normal_contact
   use hc_options, only: options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: field_space_t, space_over
+  use hc_scratch, only: scratch_t
   use hc_hierarchy, only: level_count, build_levels
   use hc_elastic_pair, only: elastic_pair_t
   use hc_fftw, only: good_size
@@ -36,8 +37,10 @@ module hc_normal_contact
     private
     !> From the finest to the coarsest lattice
     type(normal_lattice_t), allocatable :: level(:)
-    !> Fields of the iterations on each of them, from one solution to the next
-    type(normal_iterate_t), allocatable :: iterate(:)
+    !> Fields of the iterations on the finest one: memory that the next solution uses again
+    type(normal_iterate_t) :: iterate
+    !> Memory of the transforms of all lattices, which run one after the other; their convolutions free it
+    type(scratch_t), pointer :: scratch => null()
     !> The part of the finest lattice around the contact, and its first column and row there
     type(normal_lattice_t), allocatable :: inner
     integer :: corner(2) = 0
@@ -90,7 +93,7 @@ contains
     if (present(law)) call law%check(error)
     if (allocated(error)) return
     allocate (self%level(level_count(lattice%extent, self%options%multilevel%smallest_side)))
-    allocate (self%iterate(size(self%level)))
+    allocate (self%scratch)
     associate (finest => self%level(1))
       finest%lattice = lattice
       finest%initial_gap = initial_gap
@@ -123,13 +126,12 @@ contains
     integer(long) :: n, each
 
     n = int(extent(1), long)*extent(2)
-    ! on all lattices: products in single precision; gap, candidates; pressure, closing, vectors, zones, punch
-    each = preconditioner_memory(extent, threads, .false.) - 2*half*n &
-           + convolution_memory(extent, good_size(2*extent - 1), 1, 1, threads) &
-           + n*(field + half + 2*field + 4*half + 2*half)
-    ! on the finest: products in double precision, the kernel; states, start, zones to come, edge of the contact
-    normal_contact_memory = each + each/3 + fft_memory(extent, .true., threads) &
-                            + field*int(maxval(extent), long)**2 + n*(2*field + half + 2*field + 4*half)
+    ! on all lattices: spectra in single precision; gap, candidates
+    each = preconditioner_memory(extent, threads, .false., shared=.true.) - 2*half*n &
+           + convolution_memory(extent, good_size(2*extent - 1), 1, 0, threads) + n*(field + half)
+    ! on the finest: products in double precision, whose memory the others share; pressure, closing, four vectors, punch, zones
+    ! now and next, marks about the edge of the contact
+    normal_contact_memory = each + each/3 + fft_memory(extent, .true., threads) + n*(2*field + 5*half + 3*half)
   end function normal_contact_memory
 
   !> Solve a load step, of which the normal load or the approach matters.
@@ -166,6 +168,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(contact_state_t) :: coarse
+    type(normal_iterate_t), allocatable :: passing
     real(wp) :: work, coarse_tolerance
     integer :: l
 
@@ -175,6 +178,7 @@ contains
     do l = size(self%level), 1, -1
       associate (level => self%level(l))
         if (level%space%count(level%candidate) == 0) cycle
+        if (l > 1 .and. .not. allocated(passing)) allocate (passing)
         allocate (state%pressure(level%lattice%extent(1), level%lattice%extent(2)), source=0.0_wp)
         coarse_tolerance = self%options%normal%coarse_tolerance
         if (allocated(coarse%pressure)) then
@@ -186,13 +190,15 @@ contains
           where (level%candidate) state%pressure = 1.0_wp
         end if
         if (l > 1) then
-          call solve_on_normal_lattice(level, self%iterate(l), control, target, &
+          call solve_on_normal_lattice(level, passing, control, target, &
                                        max(tolerance, coarse_tolerance), max_sweeps, state, error)
           if (allocated(error)) return
           work = work + share_of(level, self%level(1))*level%work()
           call move_alloc(state%pressure, coarse%pressure)
           call move_alloc(state%gap, coarse%gap)
         else
+          if (allocated(passing)) deallocate (passing)
+          coarse = contact_state_t()
           call solve_finest(self, control, target, tolerance, max_sweeps, state, work, error)
           if (allocated(error)) return
         end if
@@ -251,10 +257,10 @@ contains
     class(normal_contact_t), intent(in) :: self
     type(lattice_t), intent(in) :: lattice
 
-    space_of%threads = 1
     if (self%threads > 0 .or. lattice%size() >= self%options%normal%worth_sharing) then
       space_of = space_over(lattice%extent, self%threads)
     end if
+    space_of%scratch => self%scratch
   end function space_of
 
   !> Return the nodes of a part of a lattice over those of the whole.
@@ -297,7 +303,7 @@ contains
         associate (inner => self%inner, first => self%corner, last => self%corner + self%inner%lattice%extent - 1)
           part%pressure = state%pressure(first(1):last(1), first(2):last(2))
           ! the product over the window contains the errors of single precision
-          call solve_on_normal_lattice(inner, self%iterate(1), control, target, &
+          call solve_on_normal_lattice(inner, self%iterate, control, target, &
                                        self%options%normal%part_tolerance*tolerance, max_sweeps, part, error)
           if (allocated(error)) return
           work = work + share_of(inner, whole)*inner%work()
@@ -315,9 +321,11 @@ contains
         if (.not. part%converged) exit
       end do
       if (allocated(self%inner)) deallocate (self%inner)                      ! its memory first
+      ! the whole takes no further spectra from the kernel; a part for a smaller load later tabulates it again
+      if (.not. whole%iterating) call self%kernel%clear()
       call whole%prepare(self%kernel, .true., .true., space_of(self, whole%lattice), error, self%cache)
       if (allocated(error)) return
-      call solve_on_normal_lattice(whole, self%iterate(1), control, target, tolerance, max_sweeps, state, error)
+      call solve_on_normal_lattice(whole, self%iterate, control, target, tolerance, max_sweeps, state, error)
       if (allocated(error)) return
       state%sweeps = state%sweeps + sweeps
       work = work + whole%work()
@@ -341,6 +349,7 @@ contains
     self%corner = low
     call self%level(1)%extract_part(low, high, self%inner)
     call self%inner%prepare(self%kernel, .true., .true., space_of(self, self%inner%lattice), error, self%cache)
+    if (allocated(error)) deallocate (self%inner)
   end subroutine extract_part
 
 end module hc_normal_contact

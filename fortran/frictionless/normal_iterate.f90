@@ -13,7 +13,7 @@ module hc_normal_iterate
   private
 
   public :: normal_iterate_t, find_span, rescale, find_approach, classify, classification_parameter, set_active, linearize_law, &
-            add_springs, subtract_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
+            add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
 
   !> Error of a product in single precision, relative to its largest value.
   real(wp), parameter :: single_error = epsilon(1.0_sp)
@@ -231,7 +231,7 @@ contains
     real(wp) :: gap(size(now%p, 1)), softest, p_max
     integer :: row
 
-    call subtract_springs(level, now)
+    call add_springs(level, now, -1)
     p_max = level%space%max(abs(now%p))
     softest = level%options%contact%softest_layer*(level%compliance + level%law%compliance_under(p_max))
     !$omp parallel do schedule(static) num_threads(level%space%threads) private(gap)
@@ -241,53 +241,40 @@ contains
                                now%compliance(:, row), now%offset(:, row))
     end do
     !$omp end parallel do
-    call add_springs(level, now)
+    call add_springs(level, now, 1)
     associate (n => size(now%p))
       call level%preconditioner%set_active(reshape(now%active, [n]), reshape(now%compliance, [n]))
     end associate
   end subroutine linearize_law
 
   !> Add the springs to what the pressure closes, or take them off again.
-  subroutine add_springs(level, now)
+  subroutine add_springs(level, now, sign)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
+    !> 1 to add them, -1 to take them off
+    integer, intent(in) :: sign
     integer :: row
 
     if (.not. allocated(now%offset)) return
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      now%w(:, row) = now%w(:, row) + (now%compliance(:, row)*now%p(:, row) + now%offset(:, row))
+      now%w(:, row) = now%w(:, row) + sign*(now%compliance(:, row)*now%p(:, row) + now%offset(:, row))
     end do
     !$omp end parallel do
   end subroutine add_springs
-
-  !> Subtract the springs from what the pressure closes.
-  subroutine subtract_springs(level, now)
-    !> Problem on the lattice, with its operators
-    type(normal_lattice_t), intent(in) :: level
-    !> Iterate
-    type(normal_iterate_t), intent(inout) :: now
-    integer :: row
-
-    if (.not. allocated(now%offset)) return
-    !$omp parallel do schedule(static) num_threads(level%space%threads)
-    do row = 1, size(now%p, 2)
-      now%w(:, row) = now%w(:, row) - (now%compliance(:, row)*now%p(:, row) + now%offset(:, row))
-    end do
-    !$omp end parallel do
-  end subroutine subtract_springs
 
   !> Take a new set of active nodes; under a compliant law the preconditioner receives it with the springs.
   subroutine set_active(level, now, next)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
     !> Iterate
-    type(normal_iterate_t), intent(inout) :: now
+    type(normal_iterate_t), intent(inout), target :: now
     !> The new set; on return the old one
     logical, allocatable, intent(inout) :: next(:, :)
     logical, allocatable :: swap(:, :)
+    logical, pointer, contiguous :: active(:)
     integer :: row
 
     call move_alloc(now%active, swap)
@@ -295,7 +282,8 @@ contains
     call move_alloc(swap, next)
     now%n_active = now%n_next
     call find_span(now, level%space)
-    if (.not. allocated(now%compliance)) call level%preconditioner%set_active(reshape(now%active, [size(now%active)]))
+    active(1:size(now%active)) => now%active
+    if (.not. allocated(now%compliance)) call level%preconditioner%set_active(active)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%r(:, row, 1) = 0.0_sp

@@ -22,14 +22,14 @@
 !> Equations: docs/theory/normal_contact.md, (N2) to (N7).
 module hc_normal_lattice_solver
   use hc_precision, only: wp
-  use hc_error, only: error_t
+  use hc_error, only: error_t, status, raise
   use hc_options, only: normal_options_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_contact_state, only: contact_state_t, new_contact_state, force_control, normal, sweeps_used_up, no_progress
   use hc_contact_residuals, only: complete_state
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t, rescale, find_approach, classify, classification_parameter, set_active, &
-    linearize_law, add_springs, subtract_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
+    linearize_law, add_springs, find_punch_pressure, advance, missing_load, fit_load, remove_tension
   use hc_normal_start, only: set_start
   use hc_normal_directions, only: find_residual, projected_step, next_direction, next_sprung_direction, find_step, &
     find_sprung_step
@@ -59,33 +59,48 @@ contains
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
 
-    real(wp), allocatable :: start(:, :)
     real(wp) :: delta
     logical :: pulls
-    integer :: row
+    integer :: row, stat
 
     level%flexibility%applications = 0.0_wp
     level%single_work = 0.0_wp
-    call move_alloc(state%pressure, start)
-    call new_contact_state(state, level%lattice, level%space)
+    call move_alloc(state%pressure, now%p)
+    state = contact_state_t()
     delta = level%space%min(level%initial_gap, level%candidate)
     if (target <= merge(0.0_wp, delta, control == force_control)) then         ! nothing touches
+      call new_contact_state(state, level%lattice, level%space)
       state%motion(normal) = merge(delta, target, control == force_control)
       state%gap = level%initial_gap - state%motion(normal)
     else
-      call iterate(level, now, control == force_control, target, tolerance, max_sweeps, start, state%sweeps, error)
+      if (control == force_control) then
+        call iterate(level, now, level%candidate, .true., target, tolerance, max_sweeps, state%sweeps, error)
+      else
+        ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
+        call iterate(level, now, level%candidate .and. level%initial_gap < target, .false., target, tolerance, max_sweeps, &
+                     state%sweeps, error)
+      end if
+      call level%preconditioner%clear()                              ! before there are fields of the solution
       if (allocated(error)) return
       state%stopped = merge(sweeps_used_up, no_progress, state%sweeps >= max_sweeps)
       call remove_tension(level, now, pulls)
       if (pulls .and. level%exact) call find_closing(level, now, error)
       if (allocated(error)) return
-      call subtract_springs(level, now)
+      call add_springs(level, now, -1)
       !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%w, 2)
-        state%gap(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
+        now%w(:, row) = level%initial_gap(:, row) + now%w(:, row) - now%approach
       end do
       !$omp end parallel do
       call move_alloc(now%p, state%pressure)
+      call move_alloc(now%w, state%gap)
+      if (allocated(now%punch)) deallocate (now%punch)
+      if (allocated(now%compliance)) deallocate (now%compliance, now%offset)
+      allocate (state%zone(size(state%gap, 1), size(state%gap, 2)), stat=stat)
+      if (stat /= 0) then
+        call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
+        return
+      end if
       state%motion(normal) = now%approach
     end if
     call complete_state(state, level%lattice, level%candidate, level%compliance, control, target, tolerance, level%space, error, &
@@ -93,22 +108,23 @@ contains
   end subroutine solve_on_normal_lattice
 
   !> Iterate up to the tolerance.
-  subroutine iterate(level, now, by_load, target, tolerance, max_sweeps, start, sweeps, error)
+  subroutine iterate(level, now, candidate, by_load, target, tolerance, max_sweeps, sweeps, error)
     type(normal_lattice_t), intent(inout) :: level
+    !> Its pressure is the start, up to a factor; on return the solution
     type(normal_iterate_t), intent(inout) :: now
+    !> Nodes that may come into contact (n_col, n_row)
+    logical, intent(in), contiguous :: candidate(:, :)
     !> The normal load is prescribed, not the approach
     logical, intent(in) :: by_load
     !> Normal load [N] or approach [m]
     real(wp), intent(in) :: target
     real(wp), intent(in) :: tolerance
     integer, intent(in) :: max_sweeps
-    !> Pressure to start from, up to a factor
-    real(wp), intent(in) :: start(:, :)
     !> Iterations made
     integer, intent(out) :: sweeps
     type(error_t), allocatable, intent(out) :: error
 
-    logical, allocatable :: candidate(:, :), next(:, :)
+    logical, allocatable :: next(:, :)
     real(wp) :: history(3), fixed_start, pressures, share, softness, r
     type(conjugate_gradient_t) :: recurrence
     logical :: changed, fixed, fresh, compliant, settled, stalled, anew
@@ -116,11 +132,8 @@ contains
     type(normal_options_t) :: options
 
     options = level%options%normal
-    allocate (candidate, source=level%candidate)
-    ! pressure only opens the gap elsewhere: no contact where the bodies would not even overlap
-    if (.not. by_load) candidate = candidate .and. level%initial_gap < target
     pressures = target/level%lattice%cell_area()                  ! of no meaning under a prescribed approach
-    call set_start(level, now, by_load, target, candidate, start, error)
+    call set_start(level, now, by_load, target, candidate, error)
     if (allocated(error)) return
     allocate (next, mold=candidate)
     compliant = level%law%is_compliant()
@@ -231,7 +244,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call level%multiply_exactly(now%p, now%w, error)
-    call add_springs(level, now)
+    call add_springs(level, now, 1)
     now%closing_error = 0.0_wp
   end subroutine find_closing
 

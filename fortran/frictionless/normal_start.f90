@@ -17,10 +17,10 @@ module hc_normal_start
 contains
 
   !> Set the pressure to start from, scaled to the load or to the least energy, and its closing of the gap.
-  subroutine set_start(level, now, by_load, target, candidate, start, error)
+  subroutine set_start(level, now, by_load, target, candidate, error)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(inout) :: level
-    !> Iterate
+    !> Iterate, whose pressure is the one to start from, up to a factor
     type(normal_iterate_t), intent(inout) :: now
     !> The normal load is prescribed, not the approach
     logical, intent(in) :: by_load
@@ -28,8 +28,6 @@ contains
     real(wp), intent(in) :: target
     !> Nodes that may come into contact (n_col, n_row)
     logical, intent(in) :: candidate(:, :)
-    !> Pressure to start from, up to a factor (n_col, n_row)
-    real(wp), intent(in) :: start(:, :)
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: scale, largest
@@ -37,32 +35,32 @@ contains
     logical :: known
 
     n = level%lattice%extent
-    stat = 0
-    if (allocated(now%w)) then
-      if (any(shape(now%w) /= n)) deallocate (now%w, now%r, now%z, now%d, now%kd, now%active, now%span)
+    if (allocated(now%active)) then
+      if (any(shape(now%active) /= n)) deallocate (now%r, now%z, now%d, now%kd, now%active, now%span)
     end if
     if (allocated(now%punch)) deallocate (now%punch)
     if (allocated(now%compliance)) deallocate (now%compliance, now%offset)
-    if (allocated(now%p)) deallocate (now%p)
-    if (.not. allocated(now%w)) then
-      allocate (now%w(n(1), n(2)), now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
+    if (allocated(now%w)) deallocate (now%w)                                   ! of a solution that failed
+    stat = 0
+    if (.not. allocated(now%active)) then
+      allocate (now%r(n(1), n(2), 1), now%z(n(1), n(2), 1), now%d(n(1), n(2), 1), now%kd(n(1), n(2), 1), &
                 now%active(n(1), n(2)), now%span(2, n(2)), stat=stat)
     end if
-    if (stat == 0) allocate (now%p(n(1), n(2)), stat=stat)
+    if (stat == 0) allocate (now%w(n(1), n(2)), stat=stat)
     if (stat == 0 .and. level%law%is_compliant()) then
       allocate (now%compliance(n(1), n(2)), now%offset(n(1), n(2)), source=0.0_wp, stat=stat)
     end if
     if (stat /= 0) then
+      now = normal_iterate_t()                                                 ! fields that did fit
       call raise(error, status%resources, 'not enough memory for the fields: use a smaller window')
       return
     end if
-    known = any(start > 0.0_wp .and. candidate)
+    known = any(now%p > 0.0_wp .and. candidate)
     !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, n(2)
       now%active(:, row) = candidate(:, row)
-      if (known) now%active(:, row) = candidate(:, row) .and. start(:, row) > 0.0_wp
-      now%p(:, row) = 1.0_wp
-      if (known) now%p(:, row) = start(:, row)
+      if (known) now%active(:, row) = candidate(:, row) .and. now%p(:, row) > 0.0_wp
+      if (.not. known) now%p(:, row) = 1.0_wp
       now%p(:, row) = merge(now%p(:, row), 0.0_wp, now%active(:, row))
       now%w(:, row) = 0.0_wp
       now%r(:, row, 1) = 0.0_sp

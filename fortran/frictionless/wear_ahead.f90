@@ -10,7 +10,7 @@ module hc_wear_ahead
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
   use hc_lattice, only: lattice_t
-  use hc_field_space, only: field_space_t, space_over
+  use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_pressure_kernel, only: normal_kernel_t
   use hc_spectrum_cache, only: kernel_cache_t
@@ -20,10 +20,12 @@ module hc_wear_ahead
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
   use hc_normal_lattice_solver, only: solve_on_normal_lattice
+  use hc_normal_contact, only: normal_contact_memory
+  use hc_flexibility_fft, only: fft_memory
   implicit none
   private
 
-  public :: worn_cycle_t, energy_ahead
+  public :: worn_cycle_t, energy_ahead, energy_ahead_memory
 
   !> What is known at the end of a cycle; fields over the window (n_col, n_row).
   type :: worn_cycle_t
@@ -53,8 +55,22 @@ contains
     if (energy > 0.0_wp .and. path > 0.0_wp .and. friction > 0.0_wp) slipping_pressure = energy/(friction*path)
   end function slipping_pressure
 
+  !> Count the bytes that `energy_ahead` takes, for a window of the given size.
+  pure integer(selected_int_kind(18)) function energy_ahead_memory(extent, threads)
+    !> Number of columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Threads to use
+    integer, intent(in) :: threads
+    !> Bytes of a node: five fields and two masks of the cycle; pressures, springs, gaps and what they are computed from
+    integer(selected_int_kind(18)), parameter :: node = 5*8 + 2*4 + 12*8
+
+    ! the transforms share no memory here: three more than there
+    energy_ahead_memory = normal_contact_memory(extent, threads) + 3*fft_memory(extent, .true., threads) &
+                          + node*extent(1)*extent(2)
+  end function energy_ahead_memory
+
   !> Find the energy of a cycle by which a jump wears, (V4): that of the cycle before it, times the pressure after over before.
-  subroutine energy_ahead(now, lattice, pair, law, coefficient, cycles, tolerance, ahead, error, n_threads, cache)
+  subroutine energy_ahead(now, lattice, pair, law, coefficient, cycles, tolerance, ahead, error, space, cache)
     !> The cycle before the jump
     type(worn_cycle_t), intent(in) :: now
     !> Lattice and window
@@ -73,8 +89,8 @@ contains
     real(wp), intent(out) :: ahead(:, :)
     !> Allocated on failure: no convergence, not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> Threads to use; absent or 0: as many as OpenMP would take
-    integer, intent(in), optional :: n_threads
+    !> Where sums are taken
+    type(field_space_t), intent(in) :: space
     !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
     real(wp), dimension(size(ahead, 1), size(ahead, 2)) :: before, after, spring
@@ -85,7 +101,7 @@ contains
     before = slipping_pressure(now%energy, now%path, now%friction, now%pressure)
     if (.not. any(now%candidate .and. before > 0.0_wp)) return
     spring = merge(cycles*coefficient*now%path, 0.0_wp, now%energy > 0.0_wp .and. before > 0.0_wp)
-    call settle(now, lattice, pair, law, before, spring, tolerance, after, error, space_over(lattice%extent, n_threads), cache)
+    call settle(now, lattice, pair, law, before, spring, tolerance, after, error, space, cache)
     if (allocated(error)) return
     do row = 1, size(ahead, 2)
       do col = 1, size(ahead, 1)

@@ -14,6 +14,7 @@ module hc_edge_residue
   use hc_pyramid_influence, only: pyramid_t, new_pyramid
   use hc_flexibility, only: blocks, block_index
   use hc_field_space, only: field_space_t
+  use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
@@ -135,6 +136,7 @@ contains
     type(means_t) :: means
     real(wp) :: weight(-2*self%samples:2*self%samples, -2*self%samples:2*self%samples), residual, none(0)
     real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :)
+    type(active_set_t) :: nodes
     integer :: i, j, k, col, row, component, iterations, outcome
 
     associate (m => self%samples, n => self%lattice%extent)
@@ -169,8 +171,9 @@ contains
         allocate (ax(size(x)))
         call means%product(x, ax, error)
         if (allocated(error)) return
-        allocate (constraint(size(x), 0), mb(size(x), 0))
-        call projected_cg(means, spread(.true., 1, size(x)), constraint, mb, rhs, x, ax, accuracy*maxval(abs(rhs)), &
+        call new_active_set(nodes, spread(.true., 1, size(x)), space)
+        if (.not. allocated(mb)) allocate (constraint(size(x), 0), mb(size(x), 0))
+        call projected_cg(means, nodes, constraint, mb, rhs, x, ax, accuracy*maxval(abs(rhs)), &
                           most_iterations, none, residual, iterations, outcome, error)
         if (allocated(error)) return
         if (outcome /= solution_accurate) then

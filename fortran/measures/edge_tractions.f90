@@ -19,6 +19,7 @@ module hc_edge_tractions
   use hc_flexibility, only: normal, along_x, along_y
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_spectrum_cache, only: kernel_cache_t
+  use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: linear_system_t, solution_accurate, precondition_constraints, satisfy_constraints
   use hc_projected_cg, only: projected_cg
   use hc_contact_edges, only: contact_edges_t
@@ -232,6 +233,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :)
     logical, allocatable :: active(:)
+    type(active_set_t) :: set
     real(wp) :: multiplier(size(change, 3)), residual
     logical :: independent
     integer :: k, iterations, outcome
@@ -241,18 +243,19 @@ contains
       active = reshape(spread(nodes, 3, size(change, 3)), [size(change)])
       x = reshape(change, [size(change)])
       rhs = merge(-reshape(moved, [size(change)]), 0.0_wp, active)
-      allocate (constraint(size(x), size(change, 3)), ax(size(x)))
-      constraint = 0.0_wp
+      call new_active_set(set, active, system%space)
+      allocate (constraint(set%n_active, size(change, 3)), source=0.0_wp)
+      allocate (ax(size(x)))
       do k = 1, size(change, 3)
-        constraint((k - 1)*n + 1:k*n, k) = reshape(merge(1.0_wp, 0.0_wp, nodes), [n])
+        constraint((k - 1)*count(nodes) + 1:k*count(nodes), k) = 1.0_wp
       end do
-      call precondition_constraints(system, active, constraint, mb, error)
+      call precondition_constraints(system, set, size(x), constraint, mb, error)
       if (allocated(error)) return
-      call satisfy_constraints(constraint, mb, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, system%space)
+      call satisfy_constraints(constraint, mb, -sum(reshape(x, [n, size(change, 3)]), dim=1), x, independent, system%space, set)
       call system%product(x, ax, error)
       if (allocated(error)) return
       residual = maxval(abs(rhs - ax), mask=active)
-      call projected_cg(system, active, constraint, mb, rhs, x, ax, options%accuracy*residual, options%max_iterations, multiplier, &
+      call projected_cg(system, set, constraint, mb, rhs, x, ax, options%accuracy*residual, options%max_iterations, multiplier, &
                         residual, iterations, outcome, error)
       if (allocated(error)) return
       if (outcome /= solution_accurate) call raise(error, status%no_convergence, not_found)

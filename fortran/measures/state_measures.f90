@@ -18,7 +18,7 @@ module hc_state_measures
   private
 
   public :: nodal_normal_residual, nodal_tangential_residual, elastic_energy, zone_extent
-  public :: state_measures_t, zone_measures_t, measure_state
+  public :: state_measures_t, zone_measures_t, measure_state, measure_contact
 
   !> Size of a zone: of the cells of its nodes, and to its edge between the nodes.
   type :: zone_measures_t
@@ -116,24 +116,53 @@ contains
     real(wp), intent(in) :: initial_gap(:, :)
     !> State, with friction or without
     type(contact_state_t), intent(in) :: state
+
+    energy = normal_energy(lattice, initial_gap, state%zone /= separated, state%pressure, state%gap, state%motion(normal))
+    if (allocated(state%traction)) energy = energy + shear_energy(lattice, state)
+  end function elastic_energy
+
+  !> Compute the part of the pressure [J].
+  pure real(wp) function normal_energy(lattice, initial_gap, contact, pressure, gap, approach) result(energy)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Gap before loading [m], nodes in contact, pressure [Pa] and gap [m] (n_col, n_row)
+    real(wp), intent(in) :: initial_gap(:, :), pressure(:, :), gap(:, :)
+    logical, intent(in) :: contact(:, :)
+    !> Approach [m]
+    real(wp), intent(in) :: approach
+    integer :: col, row
+
+    energy = 0.0_wp
+    do row = 1, size(contact, 2)
+      do col = 1, size(contact, 1)
+        if (contact(col, row)) energy = energy + pressure(col, row)*(gap(col, row) - initial_gap(col, row) + approach)
+      end do
+    end do
+    energy = 0.5_wp*lattice%cell_area()*energy
+  end function normal_energy
+
+  !> Compute the part of the shear tractions [J].
+  pure real(wp) function shear_energy(lattice, state) result(energy)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> State with friction
+    type(contact_state_t), intent(in) :: state
     real(wp), allocatable :: x(:, :), y(:, :)
     real(wp) :: moved(2)
     integer :: col, row
 
-    allocate (x(size(initial_gap, 1), size(initial_gap, 2)), y(size(initial_gap, 1), size(initial_gap, 2)))
+    allocate (x, y, mold=state%pressure)
     call lattice%coordinates(x, y)
     energy = 0.0_wp
-    do row = 1, size(initial_gap, 2)
-      do col = 1, size(initial_gap, 1)
+    do row = 1, size(x, 2)
+      do col = 1, size(x, 1)
         if (state%zone(col, row) == separated) cycle
-        energy = energy + state%pressure(col, row)*(state%gap(col, row) - initial_gap(col, row) + state%motion(normal))
-        if (.not. allocated(state%traction)) cycle
         moved = state%relative_displacement(col, row, :) + remote_displacement(state%motion, x(col, row), y(col, row))
         energy = energy + dot_product(state%traction(col, row, :), moved)
       end do
     end do
     energy = 0.5_wp*lattice%cell_area()*energy
-  end function elastic_energy
+  end function shear_energy
 
   !> Find the center of area of a zone, and smallest and largest coordinates of its nodes; NaN if there are none [m].
   subroutine zone_extent(x, y, zone, center, lower, upper, space)
@@ -176,16 +205,12 @@ contains
     logical, allocatable :: zone(:, :)
     integer :: row
 
-    allocate (x, y, mold=initial_gap)
-    call lattice%coordinates(x, y)
-    zone = state%zone /= separated
-    call new_contact_edges(edges, lattice, state%pressure, state%gap, zone, candidate)
-    found%contact = size_of(lattice, space%count(zone), edges%contact_edge())
-    found%pressure_center = pressure_center(x, y, state%pressure)
-    found%max_pressure = space%max(state%pressure)
-    found%elastic_energy = elastic_energy(lattice, initial_gap, state)
+    call measure_contact(lattice, initial_gap, candidate, state%zone /= separated, state%pressure, state%gap, &
+                         state%motion(normal), space, found, edges)
     if (.not. allocated(state%traction)) return
-    allocate (reserve, mold=initial_gap)
+    found%elastic_energy = found%elastic_energy + shear_energy(lattice, state)
+    allocate (reserve, x, y, mold=initial_gap)
+    call lattice%coordinates(x, y)
     reserve = 0.0_wp ! of no use where nothing slips
     if (friction%is_bounded()) then
       allocate (length(size(reserve, 1)))
@@ -200,6 +225,36 @@ contains
     call zone_extent(x, y, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
     found%max_traction = space%max(norm2(state%traction, dim=3))
   end function measure_state
+
+  !> Measure the area of contact, the pressure and its energy.
+  subroutine measure_contact(lattice, initial_gap, candidate, contact, pressure, gap, approach, space, found, edges)
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Gap before loading (n_col, n_row) [m]
+    real(wp), intent(in) :: initial_gap(:, :)
+    !> Nodes that can touch, and nodes in contact (n_col, n_row)
+    logical, intent(in) :: candidate(:, :), contact(:, :)
+    !> Pressure [Pa] and gap [m] (n_col, n_row)
+    real(wp), intent(in) :: pressure(:, :), gap(:, :)
+    !> Approach [m]
+    real(wp), intent(in) :: approach
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> What is found; nothing about shear
+    type(state_measures_t), intent(out) :: found
+    !> Edges of the contact
+    type(contact_edges_t), intent(out) :: edges
+    real(wp), allocatable :: x(:, :), y(:, :)
+
+    allocate (x, y, mold=initial_gap)
+    call lattice%coordinates(x, y)
+    found%pressure_center = pressure_center(x, y, pressure)
+    deallocate (x, y)                                                          ! before the edges, which take as much
+    call new_contact_edges(edges, lattice, pressure, gap, contact, candidate)
+    found%contact = size_of(lattice, space%count(contact), edges%contact_edge())
+    found%max_pressure = space%max(pressure)
+    found%elastic_energy = normal_energy(lattice, initial_gap, contact, pressure, gap, approach)
+  end subroutine measure_contact
 
   !> Measure a zone with this edge.
   pure type(zone_measures_t) function size_of(lattice, n_node, edge) result(found)

@@ -13,8 +13,9 @@ module hc_f2py_measures
   use hc_zone_estimators, only: boundary, boundary_circle, area_radius, edge_radius, pressure_center, moment_ellipse, &
     edge_ellipse, circle_fit_t, ellipse_t
   use hc_friction_law, only: friction_law_t
-  use hc_contact_state, only: contact_state_t
-  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, measure_state, state_measures_t
+  use hc_contact_edges, only: contact_edges_t
+  use hc_contact_state, only: contact_state_t, separated, normal
+  use hc_state_measures, only: nodal_normal_residual, nodal_tangential_residual, measure_state, measure_contact, state_measures_t
   use hc_discretization_error, only: limits_of_error, is_slip_zone_unresolved
   use hc_load_cycles, only: turning_points, find_cycles, loop_area
   implicit none
@@ -288,7 +289,8 @@ contains
 
   !> Measure what a load history records of a state, in the order of variables.py.
   subroutine measures_of_state(n_col, n_row, basis, first, origin, n_coefficient, coefficient, law, frictional, pressure, &
-                               gap, initial_gap, zone, candidate, motion, vectors, numbers, code, message)
+                               gap, initial_gap, zone, candidate, motion, traction_x, traction_y, displacement_x, displacement_y, &
+                               numbers, code, message)
     !f2py threadsafe
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -310,7 +312,8 @@ contains
     !> Approach, shifts [m], twist [rad] and bulk strain
     real(c_double), intent(in) :: motion(7)
     !> Traction along x and y [Pa], relative displacement along x and y [m]; of no use without friction
-    real(c_double), intent(in) :: vectors(n_col, n_row, 4)
+    real(c_double), intent(in) :: traction_x(n_col, n_row), traction_y(n_col, n_row), displacement_x(n_col, n_row), &
+                                  displacement_y(n_col, n_row)
     !> Areas [m^2], radii and places [m], tractions [Pa], energy [J]
     real(c_double), intent(out) :: numbers(21)
     !> Status and its message
@@ -321,20 +324,27 @@ contains
     class(friction_law_t), allocatable :: friction
     type(contact_state_t) :: state
     type(state_measures_t) :: found
+    type(contact_edges_t) :: edges
 
     numbers = 0.0_c_double
     call new_lattice(lattice, basis, first, [n_col, n_row], error, origin)
     if (.not. allocated(error)) then
-      allocate (state%pressure, source=pressure)
-      allocate (state%gap, source=gap)
-      allocate (state%zone, source=zone)
-      state%motion = motion
       if (frictional /= 0) then
-        allocate (state%traction, source=vectors(:, :, 1:2))
-        allocate (state%relative_displacement, source=vectors(:, :, 3:4))
+        allocate (state%pressure, source=pressure)
+        allocate (state%gap, source=gap)
+        allocate (state%zone, source=zone)
+        state%motion = motion
+        allocate (state%traction(n_col, n_row, 2), state%relative_displacement(n_col, n_row, 2))
+        state%traction(:, :, 1) = traction_x
+        state%traction(:, :, 2) = traction_y
+        state%relative_displacement(:, :, 1) = displacement_x
+        state%relative_displacement(:, :, 2) = displacement_y
+        call friction_of(coefficient, law, lattice%size(), friction)
+        found = measure_state(lattice, friction, initial_gap, candidate /= 0, state, field_space_t())
+      else
+        call measure_contact(lattice, initial_gap, candidate /= 0, zone /= separated, pressure, gap, motion(normal), &
+                             field_space_t(), found, edges)
       end if
-      call friction_of(coefficient, law, lattice%size(), friction)
-      found = measure_state(lattice, friction, initial_gap, candidate /= 0, state, field_space_t())
       numbers = [found%contact%area, found%stick%area, found%contact%radius, found%contact%area_fit, &
                  found%contact%radius_fit, found%contact%semi_major, found%contact%semi_minor, found%pressure_center, &
                  found%stick%radius, found%stick%area_fit, found%stick%radius_fit, found%stick_center, found%stick_lower(1), &

@@ -252,6 +252,8 @@ contains
     !> Pressure [Pa], gap [m] and zone of each node
     real(c_double), intent(out) :: pressure(n_node), gap(n_node)
     integer(c_int), intent(out) :: zone(n_node)
+    ! no memory is touched for them before the solution is there
+    !f2py intent(out, cache) :: pressure, gap, zone
     !> Normal load [N] and approach [m]
     real(c_double), intent(out) :: normal_load, approach
     !> R_n and R_P
@@ -272,9 +274,6 @@ contains
     real(wp) :: no_reference(0, 0, 0)
     logical :: is_frictionless
 
-    pressure = 0.0_c_double
-    gap = 0.0_c_double
-    zone = 0
     call enter(handle, n_node, slot, error)
     if (.not. allocated(error)) then
       is_frictionless = associated(slot%solver)
@@ -293,10 +292,14 @@ contains
       end if
       call leave(slot)
     end if
-    if (.not. allocated(error)) then
-      pressure = reshape(state%pressure, [n_node])
-      gap = reshape(state%gap, [n_node])
-      zone = reshape(state%zone, [n_node])
+    if (allocated(error)) then
+      pressure = 0.0_c_double
+      gap = 0.0_c_double
+      zone = 0
+    else
+      call hand_over(state%pressure, pressure)
+      call hand_over(state%gap, gap)
+      zone = pack(state%zone, .true.)
     end if
     normal_load = state%load(normal)
     approach = state%motion(normal)
@@ -306,6 +309,17 @@ contains
     flags = [merge(1, 0, [state%converged, state%clipped]), state%stopped]
     call report(error, code, message)
   end subroutine solve_normal_contact
+
+  !> Copy a field to Python, and free it.
+  subroutine hand_over(field, values)
+    !> Field (n_col, n_row)
+    real(wp), allocatable, intent(inout) :: field(:, :)
+    !> Its values
+    real(c_double), intent(out) :: values(size(field, 1), size(field, 2))
+
+    values = field
+    deallocate (field)
+  end subroutine hand_over
 
   !> Free the object of a handle; a stale handle is ignored.
   subroutine free_handle(handle)

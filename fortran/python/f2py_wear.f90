@@ -3,10 +3,12 @@ module hc_f2py_wear
   use iso_c_binding, only: c_double, c_float, c_int
   use hc_error, only: error_t
   use hc_f2py_handles, only: report, pair_of, normal_law_of, kernel_cache
+  use hc_field_space, only: field_space_t, space_over
   use hc_lattice, only: lattice_t, new_lattice
+  use hc_memory, only: require_memory
   use hc_step_error, only: step_change_t
   use hc_wear_jumps, only: wear_by, jump_change, energy_of_second_jump, expect_end, remember_end
-  use hc_wear_ahead, only: worn_cycle_t, energy_ahead
+  use hc_wear_ahead, only: worn_cycle_t, energy_ahead, energy_ahead_memory
   implicit none
   private
 
@@ -40,7 +42,7 @@ contains
 
   !> Find the energy of a cycle by which a jump wears.
   subroutine energy_of_jump(n_col, n_row, basis, lambda, interface, energy, path, pressure, gap, candidate, friction, by_load, &
-                            coefficient, cycles, tolerance, n_threads, ahead, code, message)
+                            coefficient, cycles, tolerance, ahead, code, message)
     !f2py threadsafe
     !> Number of columns and rows
     integer(c_int), intent(in) :: n_col, n_row
@@ -62,8 +64,6 @@ contains
     integer(c_int), intent(in) :: by_load
     !> Coefficient of wear [m^2/N], cycles of the jump, bound of the residual of the pressure
     real(c_double), intent(in) :: coefficient, cycles, tolerance
-    !> Threads to use; 0: as many as OpenMP would take
-    integer(c_int), intent(in) :: n_threads
     !> Energy by area of each cycle [J/m^2]
     real(c_double), intent(out) :: ahead(n_col, n_row)
     !> Status and its message
@@ -71,13 +71,16 @@ contains
     character(len=512), intent(out) :: message
     type(error_t), allocatable :: error
     type(lattice_t) :: lattice
+    type(field_space_t) :: space
 
     ahead = 0.0_c_double
     call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error)
+    space = space_over([n_col, n_row])
+    if (.not. allocated(error)) call require_memory(energy_ahead_memory(lattice%extent, space%threads), error, space%threads)
     if (.not. allocated(error)) then
       call energy_ahead(worn_cycle_t(energy, path, pressure, gap, candidate /= 0, friction, by_load /= 0), lattice, &
-                        pair_of(lambda), normal_law_of(interface), coefficient, cycles, tolerance, ahead, error, n_threads, &
-                        kernel_cache)
+                        pair_of(lambda), normal_law_of(interface), coefficient, cycles, tolerance, ahead, error, &
+                        space, kernel_cache)
     end if
     call report(error, code, message)
   end subroutine energy_of_jump

@@ -27,6 +27,7 @@ contains
       new_test('any_approach', test_any_approach), &
       new_test('flat_punch', test_flat_punch), &
       new_test('methods_agree', test_methods_agree), &
+      new_test('coarse_area', test_coarse_area), &
       new_test('any_start', test_any_start), &
       new_test('nothing_touches', test_nothing_touches), &
       new_test('threads', test_threads), &
@@ -195,6 +196,28 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_methods_agree
+
+  !> The lattice of every second node gives the direct method nearly the area of a first contact.
+  subroutine test_coarse_area(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(direct_contact_t) :: direct
+    type(contact_state_t) :: state, again
+    real(wp) :: gap(51, 51)
+    logical :: candidate(51, 51)
+
+    call paraboloid(25, lattice, gap, candidate, error)
+    if (allocated(error)) return
+    call new_direct_contact(direct, lattice, elastic_pair_t(1.0_wp/pi, 0.0_wp, 0.0_wp), gap, candidate, error)
+    if (allocated(error)) return
+    call direct%solve(force_control, 1.2_wp, 1.0e-10_wp, 20, state, error)
+    if (allocated(error)) return
+    call check_true(error, state%converged .and. state%sweeps <= 3, 'areas: five from where the bodies would overlap')
+    if (allocated(error)) return
+    call direct%solve(force_control, 1.2_wp, 1.0e-10_wp, 20, again, error, candidate)
+    if (allocated(error)) return
+    call check(error, maxval(abs(again%pressure - state%pressure)), 0.0_wp, 1.0e-12_wp*maxval(state%pressure), 'pressure')
+  end subroutine test_coarse_area
 
   !> Nodes enter and leave: one node, its complement and a random half lead to the same contact.
   subroutine test_any_start(error)

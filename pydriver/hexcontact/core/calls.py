@@ -46,9 +46,11 @@ class Handle:
         weakref.finalize(self, _core.hc_f2py_normal.free_handle, self._handle)
         kernel_cache.warn_of_faults()
 
-    def _solve(self, procedure: Callable[..., Any], *arguments: Any) -> Any:
+    def _solve(self, procedure: Callable[..., Any], *arguments: Any, held: Any = None) -> Any:
+        """Call a solver; `held` makes an object of its first result, an address, before any warning."""
         try:
-            return called(procedure, self._handle, *arguments)
+            first, *others = called(procedure, self._handle, *arguments)
+            return [held(first) if held else first, *others]
         finally:
             kernel_cache.warn_of_faults()
 

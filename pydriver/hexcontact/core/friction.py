@@ -296,14 +296,14 @@ class FrictionalContact(Contact):
             traction = np.reshape(np.asarray(guess[0], dtype=float), (3, self.lattice.size))
             called(_api.set_guess, self._handle, traction.T, [*guess[1]])
         before = self._held(state)
-        out = self._solve(
+        after, new_numbers, residuals, sweeps, cuts, work, flags = self._solve(
             _api.advance_friction,
             *([_CONTROLS[word] for word in control], [*targets, *strain], static, entry == "interpolated"),
             *(tolerance, integer(max_sweeps, "max_sweeps"), integer(max_cuts, "max_cuts")),
             *(self.lattice.size, before.address),
+            held=lambda address: HeldState(address, self.lattice.shape),
         )
-        address, new_numbers, residuals, sweeps, cuts, work, flags = out
-        after, numbers = HeldState(address, self.lattice.shape), new_numbers.tolist()
+        numbers = new_numbers.tolist()
         arrays: dict[str, Any] = {name: after.view(name) for name in _FIELDS}
         if not self._mask.all():
             arrays["gap"] = np.where(self._mask, arrays["gap"], np.nan)

@@ -13,6 +13,8 @@ from .friction import MOTION, ContactState, FrictionLaw
 from .lattice import Lattice
 
 _api = _core.hc_f2py_measures
+# what measures need of a state with friction beside pressure and gap
+_MEASURED = ("traction_x", "traction_y", "relative_displacement_x", "relative_displacement_y")
 
 
 def nodal_residuals(
@@ -72,7 +74,8 @@ def measures(
         *(lattice.basis.T, lattice.first, lattice.origin, *friction.as_arguments(), frictional),
         *(solution.pressure.T, solution.gap.T, initial_gap.T, solution.zone.T, candidate.T),
         [getattr(solution, name, 0.0) for name in MOTION],
-        _vectors(solution, "traction", "relative_displacement"),
+        # one by one: a stack of them would be a copy of half of the state
+        *(getattr(solution, name, solution.pressure).T for name in _MEASURED),
     )
     found = dict(zip(CORE["measures"], numbers.tolist(), strict=True))
     return {name: value for name, value in found.items() if frictional or not VARIABLES[name].frictional}

@@ -212,7 +212,7 @@ def energy_of_jump(
         _wear.energy_of_jump,
         *(lattice.basis.T, pair.as_array(), checked_interface(interface)),
         *(field.T for field in fields),
-        *(candidate.T, mu.T, by_load, coefficient, cycles, tolerance, 0),
+        *(candidate.T, mu.T, by_load, coefficient, cycles, tolerance),
     )
     return np.ascontiguousarray(ahead.T)
 

@@ -113,7 +113,8 @@ class Gap:
             raise DeckError("gap: expected numbers, or inf where nothing can touch, at every node")
         if (abs(gap[np.isfinite(gap)]) > LARGEST).any():
             raise DeckError(f"gap: expected lengths of at most {LARGEST:g} m, or inf where nothing can touch")
-        return gap
+        ours = isinstance(self.source, np.ndarray | HeightMap | Separation)
+        return gap if ours else gap.copy()  # a function may keep, and change, what it returns
 
     def ends_within(self, distance: float, x: Array, y: Array) -> bool:
         """Test whether one of some points is within a distance (m) of the end of a height map."""

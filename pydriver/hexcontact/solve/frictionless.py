@@ -34,10 +34,10 @@ from ..text import listed
 from ..variables import BULK_STRESS, DISPLACEMENTS, LOADS, STATE, WORN, names_where
 from .events import Listener
 
-# Fields that Python holds while a step is solved and written. Without friction: initial gap, pressure, gap
-# and zones, with the copies of f2py. With friction: the state before, which the core holds, gaps, and holes
-# in the heap of the C library.
-ARRAYS = {False: 8, True: 20}
+# Fields that Python holds while a step is solved and measured. Without friction: initial gap, pressure, gap
+# and zones, beside them those that the measures take in place of the iteration's. With friction: the state
+# before, which the core holds, gaps, and holes in the heap of the C library.
+ARRAYS = {False: 3, True: 20}
 S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 
 _ITEM = 8  # bytes of a float
@@ -47,6 +47,7 @@ _WRITING = 18 * 2**20  # bytes of netCDF and HDF5, which are loaded to write the
 _LOADED = 5 * 2**20  # bytes of modules that a run imports
 _LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
 _LEFT = {False: 0.5, True: 0.75}  # share of operators and states, which remain for the output, by friction
+_HOLES = 32 * 2**20  # bytes at most of freed arrays in the heap, by FFTs without friction: larger go back
 _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction
 _COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
 _LAW_ARRAYS = 6  # coefficients by node, here, in the core, on its lattices and parts
@@ -138,6 +139,8 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
+    if not case.frictional and case.method_for(lattice) == "fft":
+        needed += min(needed // 2, _HOLES)
     return _LOADED + max(needed, int(_LEFT[case.frictional] * needed) + _WRITING)
 
 
@@ -243,7 +246,7 @@ class Window(ABC, Generic[S]):
         self.case, self.lattice, self.steps_held = case, lattice, steps_held
         self.listener = listener or Listener()
         gap, self.candidate = case.initial_gap(lattice)
-        self.initial_gap: Array = np.where(self.candidate, gap, np.nan)
+        self.initial_gap: Array = self._where_touching(gap)
         self.friction = case.friction_law(lattice)
         self._bodies: dict[int, FlexibilityOperator] = {}
         self._contact: Any = self._solver(gap)
@@ -318,7 +321,7 @@ class Window(ABC, Generic[S]):
         """
         fields = {"initial_gap": self.initial_gap}
         fields |= {name: getattr(solution, name) for name in self.state}
-        fields["gap"] = np.where(self.candidate, solution.gap, np.nan)
+        fields["gap"] = self._where_touching(solution.gap)
         if self.worn is not None:
             fields["worn_depth"] = self.worn
         for body in (1, 2):
@@ -351,6 +354,10 @@ class Window(ABC, Generic[S]):
             limits=self.friction.limits if self.case.frictional else None,
         )
 
+    def _where_touching(self, values: Array) -> Array:
+        """Return values that are NaN where the bodies cannot touch, without a copy if they can everywhere."""
+        return values if self.candidate.all() else np.where(self.candidate, values, np.nan)
+
     def _prescribed(self, target: LoadStep, history: Mapping[str, Any]) -> dict[str, float]:
         """Return the prescribed loads and motions of a load step, by the keys of the deck."""
         driven = {}
@@ -367,10 +374,8 @@ class Window(ABC, Generic[S]):
         """Return the numbers of a state: those of the solver, and its measures."""
         known = solution.__dict__
         given = {name: known[name] for name in _STEPPED if name in known}
-        worn = 0.0 if (depth := self.worn) is None else depth
-        return given | measures(
-            self.lattice, self.friction, self.initial_gap + worn, self.candidate, solution
-        )
+        gap = self.initial_gap if self.worn is None else self.initial_gap + self.worn
+        return given | measures(self.lattice, self.friction, gap, self.candidate, solution)
 
     def _displacement(self, number: int, fields: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
         """Return the surface displacement of one body, z into the body itself.

@@ -8,7 +8,6 @@ import fcntl
 import json
 import math
 import os
-import socket
 import stat
 import time
 from pathlib import Path
@@ -61,7 +60,7 @@ class Lock:
         if holder is None:
             os.close(self._descriptor)
             raise _no_lock(path)
-        if held or holder.get("host", socket.gethostname()) != socket.gethostname():
+        if held or holder.get("host", os.uname().nodename) != os.uname().nodename:
             os.close(self._descriptor)
             since = f" since {holder['since']}" if "since" in holder else ""
             advice = f"if that run is over, delete {path}"
@@ -73,7 +72,7 @@ class Lock:
             )
         text = {
             "process": os.getpid(),
-            "host": socket.gethostname(),
+            "host": os.uname().nodename,
             "since": time.strftime("%F %T"),
             "time": time.time(),
         }
@@ -141,7 +140,7 @@ def _is_running(holder: dict[str, Any] | None) -> bool:
     """Test whether the process that wrote the lock runs on this machine, not a later one of its number."""
     import psutil
 
-    if not holder or holder.get("host") != socket.gethostname():
+    if not holder or holder.get("host") != os.uname().nodename:
         return False
     try:
         began = psutil.Process(int(holder.get("process", -1))).create_time()

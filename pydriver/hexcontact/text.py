@@ -152,6 +152,11 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if math.isfinite(share) else "-"
 
 
+def cycle_count(cycles: float) -> str:
+    """Write a number of cycles, which jumps may leave broken: "12,000", "12.5"."""
+    return (f"{cycles:,.1f}" if cycles >= 1.0 else f"{cycles:.2g}").removesuffix(".0")
+
+
 def text_table(headers: Row, rows: Iterable[Row]) -> str:
     """Return a table as plain text with numbers at the right of their columns."""
     table = [[visible(cell) for cell in row] for row in (headers, *rows)]

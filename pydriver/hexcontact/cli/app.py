@@ -41,7 +41,7 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     # Most objects of a short process are functions and classes of modules, which stay: with Python's own
     # threshold of 700 a sixth of the time of `check` goes into looking for garbage among them.
-    gc.set_threshold(50_000)
+    gc.set_threshold(100_000)
     interruption.ends_process = True
     warn_plainly()
     try:

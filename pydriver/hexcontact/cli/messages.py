@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..result.store import Store
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Messages:
     """The messages of a command that solves, from its options.
 

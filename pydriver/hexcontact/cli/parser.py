@@ -81,9 +81,10 @@ def _typed(function: Callable[..., None]) -> Callable[..., None]:
     signature, hints = inspect.signature(function), {}
     for name, (names, words, metavar), hint, *_ in parameters(function):
         if names:
-            hints[name] = Annotated[hint, typer.Option(*names, metavar=metavar, help=words)]
+            kind: Any = typer.Option(*names, metavar=metavar, help=words, readable=False)
         else:
-            hints[name] = Annotated[hint, typer.Argument(metavar=metavar, help=words, show_default=False)]
+            kind = typer.Argument(metavar=metavar, help=words, show_default=False, readable=False)
+        hints[name] = Annotated[hint, kind]  # the command itself tests whether it can read a file
     typed.__annotations__ = hints
     typed.__signature__ = signature.replace(  # type: ignore[attr-defined]
         parameters=[one.replace(annotation=hints[name]) for name, one in signature.parameters.items()],

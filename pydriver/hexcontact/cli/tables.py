@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import functools
-import io
 import math
 import os
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from ..errors import HexcontactError
 from ..result.history import (
@@ -56,9 +54,8 @@ def rich_console() -> Console:
     """Return the console of `rich` on standard output."""
     from rich.console import Console
 
-    piped = not sys.stdout.isatty()
-    width, file = (_PIPE, cast(IO[str], _Unpadded())) if piped else (None, None)
-    return Console(file=file, highlight=False, markup=False, emoji=False, width=width)
+    width = None if sys.stdout.isatty() else _PIPE
+    return Console(highlight=False, markup=False, emoji=False, width=width)
 
 
 class Pipe:
@@ -73,14 +70,6 @@ class Pipe:
             rich_console().print(shown, soft_wrap=soft_wrap)
         else:
             print(text)
-
-
-class _Unpadded(io.TextIOBase):
-    """Standard output without blanks at the ends of lines."""
-
-    def write(self, text: str) -> int:
-        """Write text."""
-        return sys.stdout.write(re.sub(r" +(?=\n)", "", text))
 
 
 def pairs(title: str, rows: Iterable[Row]) -> TextTable:

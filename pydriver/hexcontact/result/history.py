@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..core.measures import cycles as cycles_of
 from ..core.measures import line_of, turning_points
 from ..deck.below import Stage
-from ..text import Row, listed, percent, quantity
+from ..text import Row, cycle_count, listed, percent, quantity
 from ..variables import (
     BULK_STRESS,
     LOADS,
@@ -157,7 +157,7 @@ def describe(history: History, short: bool = False) -> str:
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
     if history.get("wear_cycles", -1.0) >= 0.0:
         worn = quantity(history["max_worn_depth"], "m")
-        parts.append(f"cycles {history['wear_cycles']:,.0f}  worn {worn}")
+        parts.append(f"cycles {cycle_count(history['wear_cycles'])}  worn {worn}")
     parts.append(parts_of(history))
     if not short:
         parts.append(quantity(history["seconds"], "s", 3))
@@ -180,7 +180,7 @@ def step_rows(history: History) -> list[Row]:
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
     if history.get("wear_cycles", -1.0) >= 0.0:
-        rows.append(("cycles of wear", f"{history['wear_cycles']:,.0f}"))
+        rows.append(("cycles of wear", cycle_count(history["wear_cycles"])))
         names = "wear_volume", "max_worn_depth"
         rows += [(spelled(name), quantity(history[name], VARIABLES[name].units)) for name in names]
     if (error := step_error_share(history)) is not None:

@@ -16,6 +16,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -162,7 +163,7 @@ def _is_temporary(name: str, folder: Path) -> bool:
 # --- records ------------------------------------------------------------------------------------------------
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Growth:
     """Reference of a record to metadata in an earlier one, and the text that it adds to the deck.
 
@@ -334,8 +335,12 @@ def _write_array(archive: zipfile.ZipFile, name: str, parts: Sequence[NDArray[An
             member.write(np.ascontiguousarray(part).data)
 
 
-def read_record(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
-    """Read a record, with its companion or without, and the metadata that it refers to.
+def read_step(
+    path: Path, companion: bool = True, whole: Metadata | None = None, check: bool = True
+) -> tuple[Metadata | Growth, Step]:
+    """Read a record, with its companion or without, and without the metadata that it may refer to.
+
+    To `check` the step, these are given by `whole`, or read.
 
     Raises
     ------
@@ -344,25 +349,14 @@ def read_record(path: Path, companion: bool = True) -> tuple[Metadata, Step]:
     FileNotFoundError
         If it is missing.
     """
-    return described(path).metadata, read_step(path, companion)[1]
-
-
-def read_step(
-    path: Path, companion: bool = True, whole: Metadata | None = None, check: bool = True
-) -> tuple[Metadata | Growth, Step]:
-    """Read a record, as `read_record`, without the metadata that it refers to.
-
-    To `check` the step, these are given by `whole`, or read.
-    """
     with reading(path, _KIND), zipfile.ZipFile(path) as file:
         known = _known(file, path)
         about = _about(known)
         fields = _fields(file, _FIELDS, known)
-        fields_beside = _fields(file, _COMPANION, known) if companion else {}
         lattice = Lattice(**known["lattice"] | {"origin": tuple(known["lattice"]["origin"])})
         step = Step(
             *(known["index"], lattice, fields, known["history"]),
-            companion=fields_beside,
+            companion=_fields(file, _COMPANION, known) if companion else {},
             control=known["control"],
         )
         if not check:

@@ -104,6 +104,7 @@ def add_column(
     """
     column = file.createVariable(name, dtype, dims, **options)
     column.setncatts(attributes)
+    column.set_auto_maskandscale(False)  # which looks for more attributes
     if values is not None:
         column[...] = values
     return column

@@ -79,12 +79,7 @@ def open_result(path: str | os.PathLike[str]) -> Result:
 
 def _continues(journal: Journal, output: Result) -> bool:
     """Test whether the steps of `output` are the first ones of `journal`."""
-    return len(journal) >= len(output) and same_run(journal, output)
-
-
-def same_run(journal: Journal, output: Result) -> bool:
-    """Test whether `output` and the steps of `journal` are of one run."""
-    return journal.run == output.dataset.attrs.get("run")
+    return len(journal) >= len(output) and journal.run == output.dataset.attrs.get("run")
 
 
 class Store:
@@ -193,12 +188,10 @@ class Store:
         output = None
         with contextlib.suppress(DeckError):  # another file is not replaced
             output = read_output(self.path) if self.path.exists() else None
-        if left is not None:
-            ours = output is not None and output.dataset.attrs.get("run") == left.run
-        else:
-            ours = output is not None and (not journal or same_run(journal, output))
-        steps, complete = (len(output), output.complete) if output is not None else (0, False)
+        ours, steps, complete = False, 0, False
         if output is not None:
+            run = left.run if left else journal.run if journal else output.dataset.attrs.get("run")
+            ours, steps, complete = output.dataset.attrs.get("run") == run, len(output), output.complete
             output.close()
         if ours and complete:  # killed while it deleted the journal
             remove_all(self.folder)
@@ -363,20 +356,24 @@ class Store:
             except BaseException:
                 self._about.number = 0  # the next record does not refer to this one
                 raise
-            if step.companion and "until" in step.control:
-                self._lighten(self.folder / f"{len(self.heads):06d}{SUFFIX}")
+            if step.companion and "until" in step.control and step.number > 2:
+                self._lighten(self.folder / f"{step.number - 2:06d}{SUFFIX}")
             self.heads.append(step.head)
+
+    def publish(self) -> None:
+        """Write an interim output if one is due; errors as those of `append`, but all steps remain."""
+        with self._mutex:
             steps, moment = self._published
             # by doubling, the cost of all interim versions is linear
             due = len(self.heads) >= 2 * steps and time.monotonic() >= moment + PUBLISH_INTERVAL
             if due and self.interim and not self._in_the_way:
+                self._published = (len(self.heads), time.monotonic())  # also if it fails: not at each step
                 with self.writing("the output"):
                     layout = Layout(self.metadata, self.heads)
                     self._put_together(layout, Journal(self.folder, ours=True), complete=False)
-                self._published = (len(self.heads), time.monotonic())
 
     def _lighten(self, record: Path) -> None:
-        """Take from the record before the last what only the next step starts from."""
+        """Take from a record what only the next step starts from: the last two have it, one may be lost."""
         with self.writing("the journal"):
             about, before = read_step(record, companion=False, check=False)
             with self._replacing(record) as path:

@@ -187,8 +187,12 @@ def refuse_same(file: Path | None, spare: Sequence[Path]) -> None:
 
 def _may_be_a_log(file: Path) -> bool:
     """Test whether a file is empty or begins with a time."""
-    with file.open("rb") as there:
-        return re.match(rb"\d{4}-\d\d-\d\dT|$", there.read(20)) is not None
+    try:
+        with file.open("rb") as there:
+            return re.match(rb"\d{4}-\d\d-\d\dT|$", there.read(20)) is not None
+    except PermissionError as error:
+        unknown = "cannot be read, so that it may be no log to append to"
+        raise DeckError(f"--log-file {file}: {unknown}: {error.strerror}") from None
 
 
 def _opened(file: Path, spare: Sequence[Path]) -> _File:

@@ -26,6 +26,7 @@ from ..result.trials import TrialFolder
 from .events import Listener
 from .run import checked, listeners, metadata_of, run_into, write_stresses
 from .steps import check_step
+from .wear import lacks_ends
 
 
 @dataclass
@@ -41,7 +42,7 @@ class Restart:
     before : list of Step
         The finished steps: heads, the last one with all its fields.
     warning : str
-        Reason why the result may differ in its last bits from that of an uninterrupted run; may be empty.
+        Reason why the result may differ from that of an uninterrupted run; may be empty.
     """
 
     case: Problem
@@ -138,11 +139,18 @@ def reopened(
         raise
     with store:
         before = [] if last is None else [*store.heads[:-1], last]
-        warning = (
+        older = (
             f"the run was started by hexcontact {store.metadata.version} and is resumed by {__version__}; "
             "the result may differ from what either of them gives alone"
         )
-        yield Restart(case, store, before, warning if store.metadata.version != __version__ else "")
+        doubts = [older] * (store.metadata.version != __version__)
+        if last is not None and lacks_ends(last):
+            doubts.append(
+                f"step {last.number} has lost what the next cycle of wear starts from, which the last two "
+                "steps of a run keep; the further cycles are solved to the same tolerances after a new pair "
+                "of jumps, but are not those of an unbroken run"
+            )
+        yield Restart(case, store, before, "; ".join(doubts))
 
 
 def _output_of(path: Path) -> Path:

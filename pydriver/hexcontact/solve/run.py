@@ -165,6 +165,7 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
         else:
             for step in steps(case, before=before, listener=listener):
                 store.append(step)
+                store.publish()
                 _announce_finished(step, store, listener)
             store.finish()
     except Stopped as reason:

@@ -25,6 +25,7 @@ from ..result.store import Store, open_result
 from . import steps as solving
 from .log import Log
 from .run import metadata_of
+from .wear import without_ends
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -165,7 +166,8 @@ class Session:
         StopIteration
             If all loads of the case are done, or `advance` applied others.
         DeckError, ConvergenceError, ResourceError
-            As `hexcontact.Case.run`.
+            As `hexcontact.Case.run`. If an interim output cannot be written, the step is finished all the
+            same.
         """
         if self._whole:
             raise StopIteration
@@ -223,7 +225,8 @@ class Session:
         ConvergenceError
             If a step does not converge, or the bodies slide; the steps before it are done.
         ResourceError
-            If there is not enough memory or disk.
+            If there is not enough memory or disk. For an interim output (DeckError, too) the step is finished
+            all the same.
         TypeError
             If there is no such load; it names the nearest.
         """
@@ -306,10 +309,12 @@ class Session:
         except BaseException:
             self._solving = None
             raise
-        if self.case.deck.wear:  # a cycle only starts from the one before
-            self._steps[-1:] = [dataclasses.replace(before, companion={}) for before in self._steps[-1:]]
+        if self.case.deck.wear:  # a cycle only starts from the one before, after `back` as the first one
+            self._steps[-1:] = [without_ends(before) for before in self._steps[-1:]]
         self._steps.append(step)
         self._log.step(step)
+        if self._store is not None:
+            self._store.publish()
         return step
 
     # --- loads as entries of a deck -------------------------------------------------------------------------

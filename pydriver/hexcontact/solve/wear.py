@@ -132,11 +132,11 @@ class _Ends:
         """Read them from the record of a step; without them the next cycle starts as the first one."""
         ends = cls(step.lattice, count)
         if step.companion:
-            for place in range(count):
-                ends.fields[place] = step.companion[f"end_{place}"]
             ends.cycles, ends.numbers = (
                 np.array(step.control[f"end_{name}"]) for name in ("cycles", "numbers")
             )
+            for place in np.flatnonzero(ends.cycles >= 0.0):
+                ends.fields[place] = step.companion[f"end_{place}"]
         return ends
 
 
@@ -387,6 +387,17 @@ class WearPath(GivenPath):
             float(step.control["until"]),
             np.array(step.companion["ahead"]) if "ahead" in step.companion else None,
         )
+
+
+def without_ends(step: Step) -> Step:
+    """Return a cycle without what the next one starts from."""
+    control = {name: value for name, value in step.control.items() if name != "end_cycles"}
+    return dataclasses.replace(step, companion={}, control=control)
+
+
+def lacks_ends(step: Step) -> bool:
+    """Test whether a record has lost what the next cycle starts from, which the last two of a run keep."""
+    return max(step.control.get("end_cycles", [-1.0])) >= 0.0 and not step.companion
 
 
 def _motions(state: ContactState) -> Array:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from hexcontact.core.lattice import Lattice
+from hexcontact.result.journal import described, read_step
 from hexcontact.result.layout import Metadata
 from hexcontact.result.step import Step
 from hexcontact.result.store import Store
@@ -27,10 +28,16 @@ def made_step(index: int, lattice: Lattice = WINDOW) -> Step:
 
 def written(path: Path, count: int = 3, planned: int = 3, **metadata: object) -> Metadata:
     """Write `count` steps; finish if all are there."""
-    described = Metadata(title="a case", deck="deck = 1", planned_steps=planned, **metadata)  # type: ignore[arg-type]
-    with Store(path, described) as store:
+    about = Metadata(title="a case", deck="deck = 1", planned_steps=planned, **metadata)  # type: ignore[arg-type]
+    with Store(path, about) as store:
         for index in range(count):
             store.append(made_step(index))
+            store.publish()
         if count == planned:
             store.finish()
-    return described
+    return about
+
+
+def read_record(path: Path) -> tuple[Metadata, Step]:
+    """Read a record of a journal, and the metadata that it may refer to."""
+    return described(path).metadata, read_step(path)[1]

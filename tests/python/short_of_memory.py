@@ -1,4 +1,4 @@
-"""Solve with ever more address space: short_of_memory.py normal|friction|direct. Prints how each try ended.
+"""Solve with ever more address space: short_of_memory.py normal|friction|direct|wear. Prints how each ended.
 
 Each try is a process of its own, so that none finds memory that another one has left behind.
 """
@@ -6,12 +6,15 @@ Each try is a process of its own, so that none finds memory that another one has
 import os
 import resource
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 
 from hexcontact import FrictionalContact, Lattice, NormalContact, ResourceError
 from hexcontact.core import kernel_cache
-from hexcontact.core.contact import ElasticPair
+from hexcontact.core.contact import UNILATERAL, ElasticPair
+from hexcontact.core.friction import FrictionLaw
+from hexcontact.core.steps import energy_of_jump
 
 PAIR = ElasticPair(2e-12, -0.5e-12, 0.9e-12)
 SPACING = 2e-6
@@ -28,6 +31,15 @@ gap = (lattice.x**2 + lattice.y**2) / (400 * SPACING)
 def attempt(kind: str) -> None:
     """Set a problem up and solve it twice."""
     approach = (0.7 * half * SPACING) ** 2 / (200 * SPACING)
+    if kind == "wear":
+        pressure = np.maximum(1e8 - 1e18 * gap**2, 0.0)
+        slip = np.where(gap > 0.0, 1e-9, 0.0)
+        state = SimpleNamespace(pressure=pressure, gap=np.maximum(gap - approach, 0.0))
+        mask = np.full(lattice.shape, True)
+        friction = FrictionLaw(0.5)
+        cycle = 0.5 * slip * pressure, slip
+        energy_of_jump(lattice, PAIR, UNILATERAL, mask, friction, 1e-14, cycle, state, True, 100.0, 1e-4)
+        return
     if kind == "normal":
         contact = NormalContact(lattice, PAIR, gap)
         for share in (0.3, 1.0):
@@ -62,7 +74,7 @@ def limited(kind: str, spare: int) -> int:
 
 kernel_cache.configure(memory=0)
 np.linalg.norm(np.ones(3))
-step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB}[KIND]
+step = {"normal": MB // 2, "friction": 2 * MB, "direct": 10 * MB, "wear": MB // 2}[KIND]
 codes: list[int] = []
 while codes[-2:] != [0, 0] and len(codes) < 60:
     codes.append(limited(KIND, MB + step * len(codes)))

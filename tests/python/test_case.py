@@ -377,6 +377,21 @@ def test_the_deck_of_a_case_finds_a_given_window_again() -> None:
     assert Case.from_text(case.deck_text).lattice == lattice
 
 
+def test_a_function_may_change_the_array_that_it_returned() -> None:
+    kept = []
+
+    def gap(x: Any, y: Any) -> Any:
+        kept.append((x**2 + y**2) / 0.02)
+        return kept[-1]
+
+    case = sphere_on_flat(body_1=STEEL, gap=gap, nodes_across=11)
+    step, result = next(case.start()), case.run()
+    for values in kept:
+        values += 1.0
+    assert step.initial_gap.max() < 1.0
+    assert float(result.initial_gap.max()) < 1.0
+
+
 def test_a_gap_may_be_a_function_or_an_array() -> None:
     by_function = sphere_on_flat(body_1=STEEL, gap=bowl, nodes_across=31)
     assert not by_function.window_fixed

@@ -8,12 +8,12 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray
-from fuzz.file_made import WINDOW, made_step, written
+from fuzz.file_made import WINDOW, made_step, read_record, written
 
 from hexcontact import Case
 from hexcontact.errors import DeckError
 from hexcontact.result import check
-from hexcontact.result.journal import journal_of, read_record, write_record
+from hexcontact.result.journal import journal_of, write_record
 from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.store import Store, open_result
 from hexcontact.result.trials import Solution, TrialFolder

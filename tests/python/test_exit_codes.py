@@ -9,7 +9,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import commands
 import pytest
+from commands import ENVIRONMENT
 
 import hexcontact
 from hexcontact import Case
@@ -19,28 +21,7 @@ from hexcontact.result.netcdf import read_output
 from hexcontact.result.step import Step
 from hexcontact.result.store import open_result
 
-DECK = """
-title = "A sphere"
-[body.1]
-young_modulus = "432 GPa"
-poisson_ratio = 0.32
-surface = { shape = "sphere", radius = "1 mm" }
-[body.2]
-young_modulus = "72 GPa"
-poisson_ratio = 0.32
-[friction]
-coefficient = 0.2
-[grid]
-nodes_in_radius = 4
-[[load]]
-normal_load = "20 N"
-steps = 4
-"""
-PACKAGE = Path(hexcontact.__file__).parents[1]
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(filter(None, [str(PACKAGE), os.environ.get("PYTHONPATH", "")])),
-    "OMP_NUM_THREADS": "1",
-}
+DECK = commands.DECK.replace("steps = 2", "steps = 4")
 
 # --- signals after the last step --------------------------------------------------------------------------
 

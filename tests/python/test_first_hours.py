@@ -282,7 +282,8 @@ def test_a_line_is_cut_between_its_parts() -> None:
 
 def test_piped_tables_end_without_blanks(folder: Path) -> None:
     for words in (["check", "deck.toml"], ["run", "deck.toml"], ["info", "deck.nc"]):
-        lines = command(*words).stdout.splitlines()
+        program = [sys.executable, "-m", "hexcontact", *words]
+        lines = subprocess.run(program, cwd=folder, capture_output=True, text=True).stdout.splitlines()
         assert len(lines) > 10
         assert [line for line in lines if line != line.rstrip()] == []
 

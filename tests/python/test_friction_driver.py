@@ -1,10 +1,12 @@
 """Runs with friction: what a step holds, control and ramps, windows that grow, what stops a run."""
 
+import gc
 import html
 import io
 import itertools
 import math
 import re
+import weakref
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -19,13 +21,13 @@ from hexcontact.analytic import hertz_sphere
 from hexcontact.case import Case
 from hexcontact.cli import report, tables
 from hexcontact.cli.app import app
-from hexcontact.core import contact, friction, influence, memory
+from hexcontact.core import calls, contact, friction, influence, memory
 from hexcontact.core.contact import ElasticPair
 from hexcontact.core.estimators import area_radius
 from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.lattice import Lattice
 from hexcontact.deck.surfaces import Punch, Sphere
-from hexcontact.errors import ConvergenceError, DeckError, PathWarning, ResourceError
+from hexcontact.errors import ConvergenceError, DeckError, KernelFolderWarning, PathWarning, ResourceError
 from hexcontact.problem import overview
 from hexcontact.problem.loads import LoadStep, Target
 from hexcontact.result import history
@@ -625,6 +627,26 @@ def test_a_start_serves_every_solution_of_a_step() -> None:
     )
     assert after.converged
     assert after.traction_x == pytest.approx(alone.traction_x, abs=1e-5 * alone.pressure.max())
+
+
+def test_a_warning_that_is_an_error_does_not_leave_a_state_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fault() -> None:
+        raise KernelFolderWarning("the folder is full")
+
+    held: list[weakref.ref[calls.HeldState]] = []
+
+    class Counted(calls.HeldState):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            held.append(weakref.ref(self))
+
+    problem, load = sphere_of(ElasticPair.from_materials(None, None, 1e9, 0.1), 0.3)
+    monkeypatch.setattr(friction, "HeldState", Counted)
+    monkeypatch.setattr(calls.kernel_cache, "warn_of_faults", fault)
+    with pytest.raises(KernelFolderWarning):
+        problem.advance(problem.virgin(), ["force"] * 4, [load, 0.0, 0.0, 0.0])
+    gc.collect()
+    assert [state() for state in held] == [None, None]  # of the first state and of the end
 
 
 def test_displacements_without_friction_are_those_of_the_pressure() -> None:

@@ -97,6 +97,32 @@ def test_a_failure_to_write_leaves_no_reference_to_it(out: Path, monkeypatch: py
     assert len(open_result(out)) == 3
 
 
+@pytest.mark.parametrize("by_hand", [True, False])
+def test_a_failed_interim_output_leaves_the_step(
+    out: Path, monkeypatch: pytest.MonkeyPatch, by_hand: bool
+) -> None:
+    """It is recorded, and the session goes on from it."""
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    def advance(session: Any, load: float) -> None:
+        session.advance(normal_load=load) if by_hand else next(session)
+
+    with pressed(steps=2).start(out) as session:
+        with monkeypatch.context() as patched:
+            patched.setattr(store, "PUBLISH_INTERVAL", 0.0)
+            patched.setattr(store, "write", full)
+            with pytest.raises(ResourceError, match="cannot write the output"):
+                advance(session, 5.0)
+        assert session.step.normal_load == pytest.approx(5.0)
+        advance(session, 10.0)
+    result = open_result(out)
+    assert result.complete
+    assert result.normal_load.values == pytest.approx([5.0, 10.0])
+    assert Case.from_text(result.deck).load_steps[0].z.value == 5.0
+
+
 @pytest.mark.parametrize("after", [0, 1])
 def test_a_failure_to_write_the_last_step_of_several(
     out: Path, monkeypatch: pytest.MonkeyPatch, after: int

@@ -333,6 +333,26 @@ def test_a_log_that_cannot_be_is_refused_before_anything_runs(
     assert deck.read_text() == DECK
 
 
+def test_a_log_that_cannot_be_read_is_refused_by_that_reason(
+    deck: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As one of mode 0200, which the owner may write only."""
+    place, opened = deck.parent / "run.log", Path.open
+
+    def refused(path: Path, mode: str = "r", *more: Any) -> Any:
+        if path == place and mode == "rb":
+            raise PermissionError(13, "Permission denied")
+        return opened(path, mode, *more)
+
+    place.touch()
+    monkeypatch.setattr(Path, "open", refused)
+    code, _, error = command("run", deck, "-o", deck.parent / "a.nc", "--log-file", place)
+    assert code == 2
+    assert "cannot be read, so that it may be no log to append to: Permission denied" in " ".join(
+        error.split()
+    )
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_a_full_disk_under_the_log_does_not_stop_the_run(deck: Path) -> None:
     code, _, error = command("run", deck, "-o", deck.parent / "a.nc", "-q", "--log-file", "/dev/full")
@@ -384,3 +404,13 @@ def test_level_names_are_those_of_the_option() -> None:
     assert [level.value for level in LogLevel] == list(log.LEVELS)
     with pytest.raises(DeckError, match="cannot be written"), log.kept(Path("/no/folder/x"), None):
         pass
+
+
+def test_the_parser_leaves_it_to_the_command_whether_a_log_can_be_read(
+    deck: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Plain words, which it does not see, have the same answer; the superuser can read all files."""
+    place = deck.parent / "run.log"
+    place.touch()
+    monkeypatch.setattr(os, "access", lambda path, mode, **_: mode != os.R_OK)
+    assert command("run", deck, "-o", deck.parent / "a.nc", "-q", "--log-file", place) == (0, "", "")

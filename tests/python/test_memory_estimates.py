@@ -27,6 +27,7 @@ def check(text: str, bound: float) -> None:
         ("frictionless", 256, {"more": MOVED}),
         ("frictionless", 256, {"steps": 16}),
         ("frictionless", 64, {"more": DIRECT}),
+        ("frictionless", 99, {"more": DIRECT, "share": 0.7, "steps": 1}),
         ("frictionless", 256, {"more": BOX}),
         ("frictionless", 256, {"more": INTERFACE}),
         ("friction, alike", 128, {}),

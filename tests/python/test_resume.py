@@ -12,14 +12,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import commands
 import pytest
 import xarray
+from fuzz.file_made import read_record
 
 import hexcontact
 from hexcontact import Case, ConvergenceError, DeckError, ResourceError
 from hexcontact.core import contact
 from hexcontact.result import store as store_module
-from hexcontact.result.journal import Journal, journal_of, read_record, write_record
+from hexcontact.result.journal import Journal, journal_of, write_record
 from hexcontact.result.layout import Metadata
 from hexcontact.result.step import Step
 from hexcontact.result.store import Store, open_result
@@ -466,27 +468,15 @@ def test_runs_killed_at_random_moments_go_on(tmp_path: Path, seed: int, words: l
 
 # --- the command ------------------------------------------------------------------------------------
 
-DECK = """
-title = "A sphere"
-[body.1]
-young_modulus = "432 GPa"
-poisson_ratio = 0.32
-surface = { shape = "sphere", radius = "1 mm" }
-[body.2]
-young_modulus = "72 GPa"
-poisson_ratio = 0.32
-[friction]
-coefficient = 0.2
-[grid]
-nodes_in_radius = 5
-[[load]]
-normal_load = "20 N"
-steps = 2
+DECK = (
+    commands.DECK.replace("radius = 4", "radius = 5")
+    + """
 label = "press"
 [[load]]
 tangential_load_x = "1 N"
 steps = 2
 """
+)
 
 
 def hexcontact_(folder: Path, *arguments: str, limit: int = 0) -> subprocess.CompletedProcess[str]:

@@ -21,7 +21,7 @@ from typing import Any
 import netCDF4
 import pytest
 import xarray
-from fuzz.file_made import WINDOW, made_step, written
+from fuzz.file_made import WINDOW, made_step, read_record, written
 from numpy.testing import assert_array_equal
 
 from hexcontact import lock as lock_module
@@ -29,7 +29,7 @@ from hexcontact.errors import DeckError, ResourceError
 from hexcontact.lock import Lock
 from hexcontact.result import journal as journal_module
 from hexcontact.result import store as store_module
-from hexcontact.result.journal import Journal, journal_of, read_record
+from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.layout import Metadata, assemble
 from hexcontact.result.store import Store, open_result
 
@@ -175,6 +175,25 @@ def test_interim_outputs_cost_linear_time(out: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(journal_module, "read_step", counted)
     written(out, count=33, planned=34)
     assert reads == 1 + 2 + 4 + 8 + 16 + 32
+
+
+def test_a_failed_interim_output_is_not_tried_at_each_step(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(store_module, "PUBLISH_INTERVAL", 0.0)
+    monkeypatch.setattr(store_module, "write", full)
+    failed = []
+    with Store(out, Metadata(title="full", planned_steps=6)) as store:
+        for index in range(5):
+            store.append(made_step(index))
+            try:
+                store.publish()
+            except ResourceError:
+                failed.append(index + 1)
+    assert failed == [1, 2, 4]
 
 
 def test_no_interim_output_within_the_interval(out: Path) -> None:
@@ -458,6 +477,7 @@ WRITER = """
     with store.Store({out!r}, Metadata(title="killed", planned_steps=40), overwrite={overwrite!r}) as running:
         for index in range(40):
             running.append(made_step(index))
+            running.publish()
             print(index + 1, flush=True)
         running.finish()
         print("finished", flush=True)

@@ -8,32 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from commands import DECK, ENVIRONMENT
 
-import hexcontact
 from hexcontact.result.store import open_result
 
-DECK = """
-title = "A sphere"
-[body.1]
-young_modulus = "432 GPa"
-poisson_ratio = 0.32
-surface = { shape = "sphere", radius = "1 mm" }
-[body.2]
-young_modulus = "72 GPa"
-poisson_ratio = 0.32
-[friction]
-coefficient = 0.2
-[grid]
-nodes_in_radius = 4
-[[load]]
-normal_load = "20 N"
-steps = 2
-"""
-PACKAGE = Path(hexcontact.__file__).parents[1]
-ENVIRONMENT = os.environ | {
-    "PYTHONPATH": os.pathsep.join(filter(None, [str(PACKAGE), os.environ.get("PYTHONPATH", "")])),
-    "OMP_NUM_THREADS": "1",
-}
 COMMAND = f"{shlex.quote(sys.executable)} -m hexcontact"
 FULL = "No space left on device"
 

@@ -20,6 +20,7 @@ import numpy as np
 import psutil
 import pytest
 import xarray
+from commands import ENVIRONMENT
 from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
@@ -42,13 +43,7 @@ from hexcontact.study.job import Job, solve_case
 from hexcontact.study.study import Study, run_study
 from hexcontact.study.tables import StudyFile
 
-PACKAGE = Path(hexcontact.__file__).parents[1]
 CASES = Path(__file__).parents[2] / "cases"
-ENVIRONMENT = {
-    **{key: value for key, value in os.environ.items() if key not in ("HEXCONTACT_DEBUG", "COLUMNS")},
-    "PYTHONPATH": os.pathsep.join(filter(None, [str(PACKAGE), os.environ.get("PYTHONPATH", "")])),
-    "OMP_NUM_THREADS": "1",
-}
 
 DECK = """
 title = "A sphere"

@@ -11,6 +11,8 @@ import hexcontact
 from hexcontact import Case, DeckError, ElasticPair, NormalContact, plotting
 from hexcontact.deck.write import starter
 from hexcontact.result.history import step_rows
+from hexcontact.result.journal import Journal, journal_of
+from hexcontact.text import cycle_count
 
 MODULUS, RADIUS, CONTACT, MU, WEAR = 1e11, 1e-2, 1e-4, 0.5, 1e-14
 EFFECTIVE = MODULUS / 2  # E* of two bodies with nu = 0, and the same number for shear, 2 G / 2
@@ -113,6 +115,44 @@ def test_resumed_run_has_the_same_bits(tmp_path: Path, last: int) -> None:
         np.testing.assert_array_equal(whole.dataset[name], again.dataset[name], name)
 
 
+def test_run_with_a_damaged_last_record_has_the_same_bits(tmp_path: Path) -> None:
+    case = fretting(wear={"cycles": 40_000, "jump": 10_000})
+    whole = case.run()
+    for last in (15, 16):  # the first and the second of a pair of jumps
+        out = tmp_path / f"{last}.nc"
+        case.run(out, on_step=lambda step, last=last: step.number == last + 1)
+        records = Journal(journal_of(out)).records
+        records[-1].unlink()
+        again = hexcontact.resume(out)
+        for name in sorted(set(whole.dataset.variables) - {"seconds"}):
+            np.testing.assert_array_equal(whole.dataset[name], again.dataset[name], name)
+    case.run(out, overwrite=True, on_step=lambda step: step.number == 17)
+    for lost in Journal(journal_of(out)).records[-2:]:
+        lost.unlink()
+    with pytest.warns(UserWarning, match="step 15 has lost what the next cycle of wear starts from"):
+        again = hexcontact.resume(out)
+    for name in ("wear_cycles", "max_worn_depth"):
+        assert again[name].values == pytest.approx(whole[name].values, rel=0.05, nan_ok=True)
+
+
+def test_session_may_go_back() -> None:
+    session = fretting(wear={"cycles": 20_000, "jump": 10_000}).start()
+    depths = [step.history.get("max_worn_depth") for step in session]
+    session.back(2)
+    assert [step.history["max_worn_depth"] for step in session] == pytest.approx(depths[-2:], rel=1e-2)
+
+
+def test_broken_cycles_are_stated() -> None:
+    table = fretting(wear={"cycles": 3, "jump": 2}).run().history
+    stated = [dict(step_rows(row.to_dict())).get("cycles of wear") for _, row in table.iterrows()]
+    assert stated[-3:] == ["0", "1.5", "3"]
+    assert [cycle_count(cycles) for cycles in (12_000.0, 12_000.25, 0.03125)] == [
+        "12,000",
+        "12,000.2",
+        "0.031",
+    ]
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
@@ -166,7 +206,7 @@ def test_cycle_that_is_computed_afterwards_is_the_one_that_wears() -> None:
     last = worn(fretting(wear={"cycles": 1, "jump": 1}).run()).isel(step=-1)
     # that cycle is solved to 3e-4 only: what this leaves in the depth
     for name in ("worn_depth", "wear_volume"):
-        assert np.abs(found[name] - last[name]).max() < 1e-4 * np.abs(last[name]).max()
+        assert np.abs(found[name] - last[name]).max() < 2e-4 * np.abs(last[name]).max()
     # |q| = mu p, opposed to the slip
     assert np.abs(WEAR / MU * found["cycle_dissipation_density"] - found["worn_depth"]).max() < 1e-6 * float(
         found["worn_depth"].max()

@@ -1,0 +1,31 @@
+"""Decks of a sphere, and the environment in which tests run commands on them."""
+
+import os
+from pathlib import Path
+
+import hexcontact
+
+DECK = """
+title = "A sphere"
+[body.1]
+young_modulus = "432 GPa"
+poisson_ratio = 0.32
+surface = { shape = "sphere", radius = "1 mm" }
+[body.2]
+young_modulus = "72 GPa"
+poisson_ratio = 0.32
+[friction]
+coefficient = 0.2
+[grid]
+nodes_in_radius = 4
+[[load]]
+normal_load = "20 N"
+steps = 2
+"""
+_OURS = "HEXCONTACT_DEBUG", "COLUMNS"
+_PATHS = str(Path(hexcontact.__file__).parents[1]), os.environ.get("PYTHONPATH", "")
+ENVIRONMENT = {
+    **{key: value for key, value in os.environ.items() if key not in _OURS},
+    "PYTHONPATH": os.pathsep.join(filter(None, _PATHS)),
+    "OMP_NUM_THREADS": "1",
+}

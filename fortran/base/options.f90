@@ -32,7 +32,7 @@ module hc_options
     real(wp) :: load_rounding = 1.0e-6_wp
     !> Residual R_n above which the load that a pressure can carry is unknown
     real(wp) :: trusted_residual = 0.1_wp
-    !> Motions that are tried for the least load factor of (F13), and the relative gain below which no more are
+    !> Motions that are tried for the least load factor of (F14), and the relative gain below which no more are
     integer :: max_limit_motions = 100
     real(wp) :: least_limit_gain = 1.0e-9_wp
   end type contact_options_t
@@ -116,7 +116,7 @@ module hc_options
     !> the solution worse than two blocks do
     real(wp) :: coupled_residual = 0.6_wp
     integer :: coupled_delay = 4
-    !> Relaxation of the shear traction at a front (F17): nodes in contact from which on the products saved take longer than it
+    !> Relaxation of the shear traction at a front (F12): nodes in contact from which on the products saved take longer than it
     !> does; rings of nodes on each side, and passes; residual R_t below which there is none, since zones stand then; changes that
     !> are left out, over R_t and the largest traction
     integer :: front_nodes = 10000, front_rings = 3, front_passes = 4

@@ -20,7 +20,7 @@
 !> Passes over one row of nodes are written so that the compiler takes several nodes at a time: lengths of vectors are
 !> roots of sums of squares there, and pressures have to come in a unit of their own size.
 !>
-!> Equations: docs/theory/friction.md, (F3), (F6), (F15).
+!> Equations: docs/theory/friction.md, (F3), (F6), (F16).
 module hc_disc_law
   use hc_precision, only: wp
   use hc_friction_law, only: friction_law_t

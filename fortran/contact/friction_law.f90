@@ -13,7 +13,7 @@
 !> that differs from node to node finds its numbers by it.
 !>
 !> The tractions that a law allows are a disc, |q| <= b(p), or after a stretch A of the plane, |A^-1 q| <= b(p), an ellipse:
-!> (F15) of docs/theory/friction.md. The direction of a slipping node is the outward normal n of its boundary then, and the
+!> (F16) of docs/theory/friction.md. The direction of a slipping node is the outward normal n of its boundary then, and the
 !> traction is a b(p) n + c b(p) t + tau t with the point (a, c) of the boundary that has this normal.
 module hc_friction_law
   use hc_precision, only: wp

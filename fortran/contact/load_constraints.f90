@@ -5,7 +5,7 @@
 !> taken about the middle of the contact, as far as the tangential loads are
 !> known too: in a contact far from the origin a twist about the origin is nearly a shift.
 !>
-!> Equations: docs/theory/friction.md, (F4), (F13).
+!> Equations: docs/theory/friction.md, (F4), (F14).
 module hc_load_constraints
   use hc_precision, only: wp, pi
   use hc_lapack, only: eliminate
@@ -165,7 +165,7 @@ contains
   !>
   !>     factor <= sum of mu p |u| / (loads . motion)
   !>
-  !> with u the displacement of any motion that they drive (upper bound of limit analysis, (F13) of
+  !> with u the displacement of any motion that they drive (upper bound of limit analysis, (F14) of
   !> docs/theory/friction.md). For shifts alone the
   !> least is mu P/|Q|. With a torque, or without a prescribed P, it depends on the pressure: a gap that makes the
   !> residual R_n moves it by that share of its largest value where it acts on single nodes, by less where it is smooth.

@@ -4,7 +4,7 @@
 !>
 !>     b(p) = min(mu p^k, q_max),
 !>
-!> mu that of the node: (F14) of docs/theory/friction.md. Where mu p > q_max it is Tresca's law; a power other than one is that
+!> mu that of the node: (F15) of docs/theory/friction.md. Where mu p > q_max it is Tresca's law; a power other than one is that
 !> of an interface whose own limit c_t psi^m_t is not proportional to its pressure c_n psi^m_n (J. T. Oden and J. A. C. Martins,
 !> Comput. Methods Appl. Mech. Eng. 52, 1985; (11.20) of the dissertation): mu = c_t c_n^-k with k = m_t/m_n. The rest
 !> follows from the disc of this radius (hc_disc_law).

@@ -8,7 +8,7 @@
 !>
 !>     ds = -kappa (q_1/mu_1^2, q_2/mu_2^2),     kappa >= 0:
 !>
-!> the flow rule is associated, so that the slip dissipates most (R. Michalowski, Z. Mroz, Arch. Mech. 30, 1978, 259-276; (F15) of
+!> the flow rule is associated, so that the slip dissipates most (R. Michalowski, Z. Mroz, Arch. Mech. 30, 1978, 259-276; (F16) of
 !> docs/theory/friction.md). Slip and traction are parallel only along the axes.
 !>
 !> With A = diag(sqrt(mu_1/mu_2), sqrt(mu_2/mu_1)) in these axes, A^-1 q and A ds obey Coulomb's law with the coefficient

@@ -4,7 +4,7 @@
 !> these, each of which changes the displacements of its neighborhood alone, bring traction and front into place, without a
 !> product over the window.
 !>
-!> Equations: docs/theory/friction.md, (F17).
+!> Equations: docs/theory/friction.md, (F12).
 module hc_front_relaxation
   use, intrinsic :: iso_fortran_env, only: int8
   use hc_precision, only: wp
@@ -163,7 +163,7 @@ contains
     end do
   end subroutine describe
 
-  !> Make one pass of nonlinear Gauss-Seidel, (F17).
+  !> Make one pass of nonlinear Gauss-Seidel, (F12).
   pure subroutine relax(near, reach, node, backwards, compliance, least, bound, rest, q, u, changed)
     !> Nodes that a traction moves, in each direction
     integer, intent(in) :: reach

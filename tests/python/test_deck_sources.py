@@ -13,6 +13,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 import pytest
+from commands import ENVIRONMENT
 from typer.testing import CliRunner
 
 from hexcontact import Case
@@ -482,9 +483,8 @@ def test_the_time_is_estimated_to_its_order_of_magnitude(name: str, spacing: str
         case.run()
         print(seconds(case) / (time.process_time() - began))
     """
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
     words = [sys.executable, "-c", textwrap.dedent(program)]
-    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=True)
     assert 0.2 < float(done.stdout) < 5.0
 
 

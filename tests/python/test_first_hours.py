@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pint
 import pytest
+from commands import ENVIRONMENT
 from typer.testing import CliRunner, Result
 
 import hexcontact
@@ -223,15 +224,8 @@ def on_a_terminal(folder: Path, columns: int, *words: str) -> str:
     """Run the command on a terminal of some columns and return what it writes, without colors."""
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    there = str(Path(hexcontact.__file__).parents[1])
-    environment = {
-        key: value for key, value in os.environ.items() if key not in ("COLUMNS", "LINES", "NO_COLOR")
-    }
-    environment |= {
-        "TERM": "xterm",
-        "PYTHONPATH": os.pathsep.join([there, *sys.path]),
-        "OMP_NUM_THREADS": "1",
-    }
+    environment = {key: value for key, value in ENVIRONMENT.items() if key not in ("LINES", "NO_COLOR")}
+    environment |= {"TERM": "xterm"}
     process = subprocess.Popen(
         [sys.executable, "-m", "hexcontact", *words], cwd=folder, env=environment, stdin=slave, stdout=slave,
         stderr=slave,

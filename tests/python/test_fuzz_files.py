@@ -10,6 +10,7 @@ from pathlib import Path
 
 import fuzz
 import pytest
+from commands import ENVIRONMENT
 from fuzz.file_scan import scan
 
 from hexcontact import Case
@@ -65,11 +66,10 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def worker(sources: Path, first: int, last: int) -> subprocess.CompletedProcess[str]:
     """Try the files from `first` to `last` - 1 in a process of its own."""
-    path = os.pathsep.join([str(WORKER.parents[1]), *sys.path])
-    environment = os.environ | {"PYTHONPATH": path, "MPLBACKEND": "agg", "OMP_NUM_THREADS": "1"}
+    path = os.pathsep.join([str(WORKER.parents[1]), ENVIRONMENT["PYTHONPATH"]])
     return subprocess.run(
         [sys.executable, str(WORKER), str(sources), str(first), str(last)],
-        env=environment,
+        env=ENVIRONMENT | {"PYTHONPATH": path, "MPLBACKEND": "agg"},
         capture_output=True,
         text=True,
         timeout=LONGEST,

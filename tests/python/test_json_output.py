@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer.main
+from commands import ENVIRONMENT
 from typer.testing import CliRunner
 
 import hexcontact
@@ -310,11 +310,9 @@ def test_a_mistake_of_the_program_is_told_and_shown(folder: Path, monkeypatch: p
 
 def test_an_interruption_is_told(folder: Path) -> None:
     Path("deck.toml").write_text(DECK.replace("steps = 2", "steps = 5000"))
-    package = str(Path(hexcontact.__file__).parents[1])
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([package, *sys.path])}
     words = [sys.executable, "-m", "hexcontact", "run", "deck.toml", "--json"]
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    process = subprocess.Popen(words, env=environment, **pipes)
+    process = subprocess.Popen(words, env=ENVIRONMENT, **pipes)
     deadline = time.monotonic() + 120
     while len(list(folder.glob("deck.nc.d/*.npz"))) < 3 and time.monotonic() < deadline:
         time.sleep(0.02)

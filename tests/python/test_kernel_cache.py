@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import ENVIRONMENT
 from numpy.testing import assert_array_equal
 
 from hexcontact import DeckError, FlexibilityOperator, KernelFolderWarning, Lattice
@@ -476,7 +477,7 @@ import sys; sys.path[:0] = [{str(Path(__file__).parent)!r}]
 import test_kernel_cache as t
 print(t.quietly().tobytes().hex())
 """
-    env = os.environ | {kernel_cache.FOLDER: str(tmp_path), "OMP_NUM_THREADS": "1"}
+    env = ENVIRONMENT | {kernel_cache.FOLDER: str(tmp_path)}
     run = [subprocess.Popen([sys.executable, "-c", code], env=env, stdout=subprocess.PIPE) for _ in range(3)]
     answers = {process.communicate()[0] for process in run}
     assert [process.returncode for process in run] == [0, 0, 0]

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commands import ENVIRONMENT
 from typer.testing import CliRunner
 
-import hexcontact
 from hexcontact import Case, ConvergenceError, FrictionalContact, NormalContact
 from hexcontact.cli.app import app
 from hexcontact.errors import DeckError
@@ -168,15 +168,8 @@ def test_nobody_hears_it_who_does_not_listen(tmp_path: Path) -> None:
         "from hexcontact.solve import log\n"
         "log.logger.error('an error')\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment())
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=ENVIRONMENT)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
-def environment() -> dict[str, str]:
-    package = str(Path(hexcontact.__file__).parents[1])
-    return os.environ | {
-        "PYTHONPATH": os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH", "")]))
-    }
 
 
 def test_values_are_written_so_that_they_can_be_read_again() -> None:
@@ -365,7 +358,7 @@ def test_an_interrupted_run_says_so_in_its_log(deck: Path) -> None:
     place = deck.parent / "run.log"
     words_ = [sys.executable, "-m", "hexcontact", "run", deck.name, "-q", "--log-file", place.name]
     deck.write_text(DECK.replace("steps = 4", "steps = 4000"))
-    process = subprocess.Popen(words_, cwd=deck.parent, env=environment(), stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(words_, cwd=deck.parent, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 120
     while not (place.exists() and place.read_text().count("step=") > 3) and time.monotonic() < deadline:
         time.sleep(0.02)

@@ -15,6 +15,7 @@ from typing import Any
 import commands
 import pytest
 import xarray
+from commands import ENVIRONMENT
 from fuzz.file_made import read_record
 
 import hexcontact
@@ -455,7 +456,7 @@ def test_runs_killed_at_random_moments_go_on(tmp_path: Path, seed: int, words: l
         str(seed),
         *words,
     ]
-    environ = {**environment(), "OPENBLAS_NUM_THREADS": "1"}
+    environ = ENVIRONMENT | {"OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(command, capture_output=True, text=True, env=environ, timeout=1800)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     *runs, kills = done.stdout.splitlines()
@@ -484,11 +485,7 @@ def hexcontact_(folder: Path, *arguments: str, limit: int = 0) -> subprocess.Com
     command = [sys.executable, "-m", "hexcontact", *arguments]
     if limit:
         command = ["bash", "-c", f'ulimit -f {limit}; exec "$@"', "bash", *command]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, env=environment())
-
-
-def environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OMP_NUM_THREADS": "1"}
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, env=ENVIRONMENT)
 
 
 @pytest.mark.parametrize(
@@ -500,7 +497,7 @@ def test_a_signal_ends_the_run_and_resume_goes_on(tmp_path: Path, sent: signal.S
     assert (whole.returncode, whole.stderr) == (0, "")
     command = [sys.executable, "-m", "hexcontact", "run", "a sphere.toml"]
     with subprocess.Popen(
-        command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=environment()
+        command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
     ) as process:
         assert process.stderr
         assert any(re.match("step +3/", line) for line in process.stderr)  # after title and doubts

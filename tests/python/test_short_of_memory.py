@@ -1,12 +1,12 @@
 """Memory that is not there: an error with a sentence, no end of the process; finished steps are kept."""
 
-import os
 import resource
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from commands import ENVIRONMENT
 from numpy.testing import assert_array_equal
 
 from hexcontact import open_result
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(
     not Path("/proc/self/statm").exists(), reason="limits and sizes are those of Linux"
 )
 
-ENV = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+ENV = ENVIRONMENT | {"OPENBLAS_NUM_THREADS": "1"}
 MB = 1_000_000
 DECK = """
 [body.1]

@@ -21,6 +21,7 @@ from typing import Any
 import netCDF4
 import pytest
 import xarray
+from commands import ENVIRONMENT
 from fuzz.file_made import WINDOW, made_step, read_record, written
 from numpy.testing import assert_array_equal
 
@@ -121,7 +122,7 @@ def test_a_file_can_be_open_many_times(out: Path) -> None:
             if len(held) > 6:
                 held.pop(random.randrange(7)).close()
     """
-    environment = {**os.environ, "MALLOC_PERTURB_": "165"}  # makes use of freed memory show
+    environment = ENVIRONMENT | {"MALLOC_PERTURB_": "165"}  # makes use of freed memory show
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(program)], env=environment, capture_output=True
     )

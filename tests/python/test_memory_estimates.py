@@ -70,6 +70,7 @@ def test_the_estimate_of_fatigue_parameters(side: int) -> None:
     [
         ("friction, alike", 44, 0.8),
         ("friction, unlike", 44, 0.8),
+        ("friction, unlike", 60, 0.8),
         ("friction, unlike", 80, 0.8),
         ("friction, alike", 121, 0.15),
     ],

@@ -133,15 +133,19 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
         arrays += _WEAR_ARRAYS + _END_ARRAYS * (1 + len(case.cycle))
     if case.deck.interface:
         arrays += _INTERFACE_ARRAYS[case.frictional]
-    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size + kept
+    solver = case.memory_needed(lattice)
+    needed = solver + arrays * _ITEM * lattice.size + kept
     if case.deck.wear:
         needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
-    if not case.frictional and case.method_for(lattice) == "fft":
+    method = case.method_for(lattice)
+    if not case.frictional and method == "fft":
         needed += min(needed // 2, _HOLES)
-    return _LOADED + max(needed, int(_LEFT[case.frictional] * needed) + _WRITING)
+    # matrices with friction are of one load step
+    remaining = needed - (solver if case.frictional and method != "fft" else 0)
+    return _LOADED + max(needed, int(_LEFT[case.frictional] * remaining) + _WRITING)
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:

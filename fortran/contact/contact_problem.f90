@@ -18,7 +18,7 @@ module hc_contact_problem
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: flexibility_t
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
-    normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement_row, force_control, within_tolerance, sweeps_used_up, &
+    normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, sweeps_used_up, &
     loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_compliances, normal_residual, &
     tangential_residual, force_residual, least_traction
@@ -237,19 +237,31 @@ contains
     end do
   end function rigid_displacement
 
-  !> Compute it at the nodes of a row.
-  pure subroutine rigid_displacement_row(self, motion, row, along, across)
+  !> Compute it at nodes of a row, along which it changes evenly.
+  pure subroutine rigid_displacement_row(self, motion, row, along, across, from)
     class(friction_problem_t), intent(in) :: self
     !> Motions
     real(wp), intent(in) :: motion(n_motion)
     !> Row of the window, from 1 on
     integer, intent(in) :: row
-    !> Components along x and y (n_col) [m]
+    !> Components along x and y (number of nodes) [m]
     real(wp), intent(out), contiguous :: along(:), across(:)
-    real(wp), dimension(self%lattice%extent(1)) :: x, y
+    !> Column of the first node; absent: 1
+    integer, intent(in), optional :: from
+    real(wp) :: first(2), step(2), x(1), y(1), no_shift(n_motion)
+    integer :: i, col
 
     call self%lattice%row_coordinates(row, x, y)
-    call remote_displacement_row(motion, x, y, along, across)
+    first = remote_displacement(motion, x(1), y(1))
+    no_shift = motion
+    no_shift([along_x, along_y]) = 0.0_wp
+    step = remote_displacement(no_shift, self%lattice%basis(1, 1), self%lattice%basis(2, 1))
+    col = 1
+    if (present(from)) col = from
+    do i = 1, size(along)
+      along(i) = first(1) + (col + i - 2)*step(1)
+      across(i) = first(2) + (col + i - 2)*step(2)
+    end do
   end subroutine rigid_displacement_row
 
   !> Compute normal load, tangential loads [N] and torque [N m] of given tractions.

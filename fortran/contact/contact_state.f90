@@ -17,7 +17,7 @@ module hc_contact_state
   public :: separated, stick, slip
   public :: load_target_t, force_control, displacement_control
   public :: normal, along_x, along_y, about_z, strain_xx, strain_yy, strain_xy, n_load, n_motion
-  public :: remote_displacement, remote_displacement_row
+  public :: remote_displacement
 
   !> Zone of a node; without friction every node in contact slips.
   integer, parameter :: separated = 0, stick = 1, slip = 2
@@ -211,24 +211,9 @@ contains
     real(wp), intent(in) :: x, y
     real(wp) :: displacement(2)
 
-    call remote_displacement_row(motion, [x], [y], displacement(:1), displacement(2:))
+    displacement(1) = motion(along_x) - motion(about_z)*y - (motion(strain_xx)*x + motion(strain_xy)*y)
+    displacement(2) = motion(along_y) + motion(about_z)*x - (motion(strain_xy)*x + motion(strain_yy)*y)
   end function remote_displacement
-
-  !> Compute it at the points of a row; a call for each point would take longer than what it computes.
-  pure subroutine remote_displacement_row(motion, x, y, along, across)
-    !> Motions
-    real(wp), intent(in) :: motion(n_motion)
-    !> Points (n_col) [m]
-    real(wp), intent(in), contiguous :: x(:), y(:)
-    !> Components along x and y (n_col) [m]
-    real(wp), intent(out), contiguous :: along(:), across(:)
-    integer :: col
-
-    do col = 1, size(x)
-      along(col) = motion(along_x) - motion(about_z)*y(col) - (motion(strain_xx)*x(col) + motion(strain_xy)*y(col))
-      across(col) = motion(along_y) + motion(about_z)*x(col) - (motion(strain_xy)*x(col) + motion(strain_yy)*y(col))
-    end do
-  end subroutine remote_displacement_row
 
   !> Return whether there is contact at the rim of the window.
   pure logical function touches_rim(state)

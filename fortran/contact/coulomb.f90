@@ -96,8 +96,16 @@ contains
     real(wp), intent(in), contiguous :: p(:)
     real(wp), intent(out), contiguous :: bound(:)
 
+    integer :: i
+
     associate (same_everywhere => first)
-      bound = self%bound(p)
+      if (self%no_slip) then
+        bound = huge(1.0_wp)
+      else
+        do i = 1, size(p)
+          bound(i) = self%coefficient*max(p(i), 0.0_wp)
+        end do
+      end if
     end associate
   end subroutine find_bounds
 

@@ -32,6 +32,8 @@ module hc_disc_law
 
   !> Squares below this count as nothing
   real(wp), parameter :: nothing = 1.0e-200_wp
+  !> Length below which a traction is nothing, and radius that stands for no bound, in the unit of pressure
+  real(wp), parameter :: smallest_length = 1.0e-100_wp, widest = 1.0e100_wp
   !> Smallest bound of the traction that counts in D, relative to the largest
   real(wp), parameter :: smallest_bound = 1.0e-12_wp
 
@@ -175,22 +177,24 @@ contains
     real(wp), intent(in), contiguous :: p(:), qx(:), qy(:), dsx(:), dsy(:)
     integer, intent(out), contiguous :: zone(:)
     real(wp), intent(out), contiguous :: direction(:, :), compliance(:)
-    real(wp) :: bound(size(p)), squares(2), largest, length
+    real(wp) :: bound(size(p)), squares(2), largest, length, unit
     real(wp), allocatable :: normal(:, :)
     integer :: i
 
     call self%find_bounds(first, p, bound)
     largest = huge(1.0_wp)
     if (self%is_bounded()) largest = self%strength_of_disc(p_max)*max(p_max, 0.0_wp)
+    unit = 1.0_wp
+    if (p_max > 0.0_wp) unit = 1.0_wp/p_max
     if (self%is_isotropic()) then
-      call linearize_disc(bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
+      call linearize_disc(size(p), unit, bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
       return
     end if
     squares = self%stretches()
     associate (a => self%stretch())
       associate (q => squeezed(a, qx, qy), ds => stretched(a, dsx, dsy))
         ! r A^2 is nowhere above r, or the classification would be no contraction
-        call linearize_disc(bound, largest, r*squares(1), in_contact, q(:, 1), q(:, 2), ds(:, 1), ds(:, 2), &
+        call linearize_disc(size(p), unit, bound, largest, r*squares(1), in_contact, q(:, 1), q(:, 2), ds(:, 1), ds(:, 2), &
                             zone, direction, compliance)
       end associate
       normal = squeezed(a, direction(1, :), direction(2, :))
@@ -204,27 +208,36 @@ contains
   end subroutine linearize_row
 
   !> Linearise the law of the disc at the nodes of a row.
-  pure subroutine linearize_disc(bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
-    !> Radius of each node, and the largest of all nodes [Pa]; parameter r [Pa/m]
-    real(wp), intent(in) :: bound(:), largest, r
+  pure subroutine linearize_disc(n, unit, bound, largest, r, in_contact, qx, qy, dsx, dsy, zone, direction, compliance)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of pressure; radius of each node, and the largest of all nodes [Pa]; parameter r [Pa/m]
+    real(wp), intent(in) :: unit, bound(n), largest, r
     !> Nodes in contact; the others are separated
-    logical, intent(in) :: in_contact(:)
+    logical, intent(in) :: in_contact(n)
     !> Traction and slip of the step
-    real(wp), intent(in) :: qx(:), qy(:), dsx(:), dsy(:)
+    real(wp), intent(in) :: qx(n), qy(n), dsx(n), dsy(n)
     !> separated, stick or slip
-    integer, intent(out) :: zone(:)
+    integer, intent(out) :: zone(n)
     !> Direction e (2, n) and compliance D (n) of the nodes that slip
-    real(wp), intent(out) :: direction(:, :), compliance(:)
+    real(wp), intent(out) :: direction(2, n), compliance(n)
+    real(wp) :: x, y, length, radius, least
+    logical :: slips
     integer :: i
 
-    do i = 1, size(bound)
-      if (in_contact(i)) then
-        call linearize([qx(i), qy(i)], [dsx(i), dsy(i)], bound(i), largest, r, zone(i), direction(:, i), compliance(i))
-      else
-        zone(i) = separated
-        direction(:, i) = [1.0_wp, 0.0_wp]
-        compliance(i) = 0.0_wp
-      end if
+    !$omp simd private(x, y, length, radius, least, slips)
+    do i = 1, n
+      x = unit*(qx(i) - r*dsx(i))
+      y = unit*(qy(i) - r*dsy(i))
+      length = sqrt(max(x**2 + y**2, nothing))
+      radius = unit*min(bound(i), widest/unit)
+      ! without any pressure the traction itself is the scale
+      least = smallest_bound*merge(unit*min(largest, widest/unit), length, largest > 0.0_wp)
+      slips = in_contact(i) .and. length > max(radius, smallest_length)
+      zone(i) = merge(slip, merge(stick, separated, in_contact(i)), slips)
+      direction(1, i) = merge(x/length, 1.0_wp, slips)
+      direction(2, i) = merge(y/length, 0.0_wp, slips)
+      compliance(i) = merge((length - radius)/(r*max(radius, least)), 0.0_wp, slips)
     end do
   end subroutine linearize_disc
 
@@ -242,21 +255,15 @@ contains
     real(wp), intent(out) :: direction(2)
     !> Compliance D across that direction [m/Pa]; 0 in stick
     real(wp), intent(out) :: compliance
-    real(wp) :: d(2), length, least
+    real(wp) :: unit, d(1)
+    integer :: found(1)
 
-    d = traction - r*slip_increment
-    length = magnitude(d)
-    least = smallest_bound*largest_bound
-    if (least <= 0.0_wp) least = smallest_bound*length  ! no pressure at all
-    if (length <= bound) then
-      zone = stick
-      direction = [1.0_wp, 0.0_wp]
-      compliance = 0.0_wp
-    else
-      zone = slip
-      direction = d/length
-      compliance = (length - bound)/(r*max(bound, least))
-    end if
+    unit = 1.0_wp
+    if (largest_bound > 0.0_wp) unit = 1.0_wp/min(largest_bound, widest**2)
+    call linearize_disc(1, unit, [bound], largest_bound, r, [.true.], traction(1:1), traction(2:2), slip_increment(1:1), &
+                        slip_increment(2:2), found, direction, d)
+    zone = found(1)
+    compliance = d(1)
   end subroutine linearize
 
   !> Project a traction on the disc of radius b(p).

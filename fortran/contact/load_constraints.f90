@@ -46,23 +46,31 @@ contains
     type(load_target_t), intent(in) :: target
     !> Nodes in contact (n_col, n_row)
     logical, intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
-    real(wp), dimension(size(contact, 1)) :: x, y
-    real(wp) :: part(2, size(contact, 2))
-    integer :: n_contact, row
+    real(wp), dimension(size(contact, 2)) :: nodes, columns
+    real(wp) :: middle(2)
+    integer :: n_contact, row, col
 
-    associate (control => target%control, space => problem%space)
-      n_contact = max(space%count(contact), 1)
+    associate (control => target%control, space => problem%space, lattice => problem%lattice)
+      !$omp parallel do schedule(static) num_threads(space%threads) private(col)
+      do row = 1, size(contact, 2)
+        nodes(row) = 0.0_wp
+        columns(row) = 0.0_wp
+        do col = 1, size(contact, 1)
+          nodes(row) = nodes(row) + merge(1.0_wp, 0.0_wp, contact(col, row))
+          columns(row) = columns(row) + merge(real(col, wp), 0.0_wp, contact(col, row))
+        end do
+      end do
+      !$omp end parallel do
+      n_contact = max(nint(sum(nodes)), 1)
       ! nothing turns a single node
       self%motion = pack([along_x, along_y, about_z], control(along_x:) == force_control .and. &
                          [.true., .true., n_contact > 1])
-      !$omp parallel do schedule(static) num_threads(space%threads) private(x, y)
-      do row = 1, size(contact, 2)
-        call problem%lattice%row_coordinates(row, x, y)
-        part(:, row) = [sum(x, mask=contact(:, row)), sum(y, mask=contact(:, row))]
-      end do
-      !$omp end parallel do
-      if (control(along_y) == force_control) self%center(1) = sum(part(1, :))/n_contact
-      if (control(along_x) == force_control) self%center(2) = sum(part(2, :))/n_contact
+      if (sum(nodes) > 0.0_wp) then
+        middle = [sum(columns), dot_product(nodes, [(real(row, wp), row=1, size(nodes))])]/n_contact + lattice%first - 1
+        middle = lattice%origin + matmul(lattice%basis, middle)
+        if (control(along_y) == force_control) self%center(1) = middle(1)
+        if (control(along_x) == force_control) self%center(2) = middle(2)
+      end if
     end associate
     self%arm = sqrt(problem%lattice%cell_area()*n_contact/pi)
   end subroutine new_driven_motions
@@ -80,22 +88,24 @@ contains
     allocate (direction(problem%lattice%extent(1), problem%lattice%extent(2), 2))
     !$omp parallel do schedule(static) num_threads(problem%space%threads)
     do row = 1, size(direction, 2)
-      call self%direction_row(k, problem, row, direction(:, row, 1), direction(:, row, 2))
+      call self%direction_row(k, problem, (row - 1)*size(direction, 1) + 1, direction(:, row, 1), direction(:, row, 2))
     end do
     !$omp end parallel do
   end function direction
 
-  !> Compute the tangential displacement of a unit motion along one row of nodes.
-  pure subroutine direction_row(self, k, problem, row, ux, uy)
+  !> Compute the tangential displacement of a unit motion at nodes that follow each other in a row.
+  pure subroutine direction_row(self, k, problem, first, ux, uy)
     class(driven_motions_t), intent(in) :: self
     !> Which of the driven motions
     integer, intent(in) :: k
     !> The problem
     type(friction_problem_t), intent(in) :: problem
-    integer, intent(in) :: row
-    !> Components along x and y (n_col)
+    !> Number of the first node
+    integer, intent(in) :: first
+    !> Components along x and y (number of nodes)
     real(wp), intent(out), contiguous :: ux(:), uy(:)
-    real(wp), dimension(size(ux)) :: x, y
+    real(wp) :: start(2)
+    integer :: i, index(2)
 
     ux = 0.0_wp
     uy = 0.0_wp
@@ -105,9 +115,14 @@ contains
     case (along_y)
       uy = 1.0_wp
     case default
-      call problem%lattice%row_coordinates(row, x, y)
-      ux = -(y - self%center(2))/self%arm
-      uy = (x - self%center(1))/self%arm
+      associate (lattice => problem%lattice)
+        index = [modulo(first - 1, lattice%extent(1)), (first - 1)/lattice%extent(1)]
+        start = lattice%origin + matmul(lattice%basis, real(lattice%first + index, wp)) - self%center
+        do i = 1, size(ux)
+          ux(i) = -(start(2) + (i - 1)*lattice%basis(2, 1))/self%arm
+          uy(i) = (start(1) + (i - 1)*lattice%basis(1, 1))/self%arm
+        end do
+      end associate
     end select
   end subroutine direction_row
 

@@ -4,8 +4,8 @@
 module hc_active_zones
   use hc_precision, only: wp
   use hc_contact_state, only: separated, stick, slip, about_z, n_motion, force_control
-  use hc_disc_law, only: normal_to
-  use hc_active_set, only: active_set_t
+  use hc_active_set, only: active_set_t, find_span
+  use hc_frame_rows, only: plane_row
   use hc_friction_iterate, only: friction_iterate_t
   use hc_load_constraints, only: driven_motions_t, new_driven_motions, fix_in_stick
   implicit none
@@ -89,56 +89,101 @@ contains
     !> Components in the frames that carry unknowns (2 n): both in stick, that along t in slip
     logical, allocatable, intent(out) :: active(:)
     integer, allocatable :: zone(:)
-    real(wp) :: ds(now%problem%lattice%extent(1), 2), r, p_max, across, e(2)
-    real(wp), dimension(now%problem%lattice%extent(1)) :: bound, ahead, aside
-    integer :: n, row, col, i, from, to
+    real(wp), dimension(now%problem%lattice%extent(1)) :: dsx, dsy, bound, ahead, aside
+    real(wp) :: r, p_max, soft
+    integer :: n, n_col, row, i, from, to, low, high
 
     n = size(now%p)
+    n_col = now%problem%lattice%extent(1)
     allocate (zone(n), active(2*n))
     r = shear_parameter(now)
-    associate (friction => now%problem%friction, soft => now%problem%options%preconditioner%soft_spring)
+    soft = now%problem%options%preconditioner%soft_spring*now%shear%elastic_compliance
+    associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
       p_max = now%operators%space%max(now%p)
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, i, from, to)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(dsx, dsy, i, from, to, low, high)
       do row = 1, now%problem%lattice%extent(2)
-        to = row*size(ds, 1)
-        from = to - size(ds, 1) + 1
-        call now%slip_row(row, ds(:, 1), ds(:, 2))
-        call friction%linearize(from, p_max, r, now%contact(from:to), now%p(from:to), now%q(from:to), now%q(n + from:n + to), &
-                                ds(:, 1), ds(:, 2), zone(from:to), now%shear%direction(:, from:to), &
-                                now%shear%compliance(from:to))
+        to = row*n_col
+        from = to - n_col + 1
         do i = from, to
-          if (.not. now%contact(i)) now%q([i, n + i]) = 0.0_wp
+          now%q(i) = merge(now%q(i), 0.0_wp, now%contact(i))
+          now%q(n + i) = merge(now%q(n + i), 0.0_wp, now%contact(i))
         end do
+        call find_span(now%contact(from:to), low, high)
+        call leave(from, from + low - 2)
+        call leave(from + high, to)
+        if (high < low) cycle
+        to = from + high - 1
+        from = from + low - 1
+        associate (m => to - from + 1)
+          call now%slip_row(row, low, dsx(:m), dsy(:m))
+          call friction%linearize(from, p_max, r, now%contact(from:to), now%p(from:to), now%q(from:to), now%q(n + from:n + to), &
+                                  dsx(:m), dsy(:m), zone(from:to), direction(:, from:to), compliance(from:to))
+        end associate
       end do
       !$omp end parallel do
       now%fixed = fixing
-      if (now%fixed) call fix_in_stick(now%operators%space, now%problem%options%contact%fixed_share, now%shear%compliance, zone)
+      if (now%fixed) call fix_in_stick(now%operators%space, now%problem%options%contact%fixed_share, compliance, zone)
 
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) &
-      !$omp& private(bound, ahead, aside, across, e, col, i, from, to)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(bound, ahead, aside, i, from, to)
       do row = 1, now%problem%lattice%extent(2)
-        to = row*size(bound)
-        from = to - size(bound) + 1
-        call friction%find_bounds(from, now%p(from:to), bound)
-        call friction%find_boundary(now%shear%direction(:, from:to), ahead, aside)
-        if (allocated(now%shear%rest)) now%shear%rest(from:to) = bound*aside
-        do col = 1, size(bound)
-          i = from + col - 1
+        to = row*n_col
+        from = to - n_col + 1
+        do i = from, to
           active(i) = zone(i) /= separated
           active(n + i) = zone(i) == stick
-          if (zone(i) /= slip) cycle
-          e = now%shear%direction(:, i)
-          across = bound(col)*aside(col)
-          if (now%shear%compliance(i) < soft*now%shear%elastic_compliance) then
-            across = dot_product(normal_to(e), [now%q(i), now%q(n + i)])
-          end if
-          now%q([i, n + i]) = bound(col)*ahead(col)*e + across*normal_to(e)
         end do
+        if (.not. any(active(from:to))) then
+          if (allocated(now%shear%rest)) now%shear%rest(from:to) = 0.0_wp
+          cycle
+        end if
+        call friction%find_bounds(from, now%p(from:to), bound)
+        call friction%find_boundary(direction(:, from:to), ahead, aside)
+        if (allocated(now%shear%rest)) now%shear%rest(from:to) = bound*aside
+        call put_on_boundary(n_col, zone(from:to), direction(:, from:to), bound*ahead, bound*aside, &
+                             compliance(from:to) < soft, now%q(from:to), now%q(n + from:n + to))
       end do
       !$omp end parallel do
     end associate
     call now%shear%set_contact(now%contact)
+
+  contains
+
+    !> Set nodes off the contact.
+    subroutine leave(first, last)
+      !> The first and the last of them
+      integer, intent(in) :: first, last
+      integer :: k
+
+      do k = first, last
+        zone(k) = separated
+        now%shear%direction(1, k) = 1.0_wp
+        now%shear%direction(2, k) = 0.0_wp
+        now%shear%compliance(k) = 0.0_wp
+      end do
+    end subroutine leave
+
   end subroutine classify
+
+  !> Put the tractions of the slipping nodes of a row on the boundary of what the law allows, with a start across.
+  pure subroutine put_on_boundary(n, zone, direction, ahead, aside, stiff, qx, qy)
+    !> Number of nodes, and their zones
+    integer, intent(in) :: n, zone(n)
+    !> Directions e; components of the boundary along e and across [Pa]
+    real(wp), intent(in) :: direction(2, n), ahead(n), aside(n)
+    !> The spring of a node is stiff: its component across is left as a start
+    logical, intent(in) :: stiff(n)
+    !> Traction along x and y [Pa]
+    real(wp), intent(inout) :: qx(n), qy(n)
+    real(wp) :: across
+    integer :: i
+
+    !$omp simd private(across)
+    do i = 1, n
+      across = merge(-direction(2, i)*qx(i) + direction(1, i)*qy(i), aside(i), stiff(i))
+      qx(i) = merge(ahead(i)*direction(1, i) - across*direction(2, i), qx(i), zone(i) == slip)
+      qy(i) = merge(ahead(i)*direction(2, i) + across*direction(1, i), qy(i), zone(i) == slip)
+    end do
+  end subroutine put_on_boundary
 
   !> Find the loads that are prescribed as constraints on the unknowns.
   subroutine find_constraints(now, nodes, driven, constraint, missing)
@@ -152,28 +197,37 @@ contains
     real(wp), allocatable, intent(out) :: constraint(:, :)
     !> What the present traction lacks of the loads, over the cell area
     real(wp), allocatable, intent(out) :: missing(:)
-    real(wp) :: part(now%problem%lattice%extent(2)), unit(now%problem%lattice%extent(1), 2)
-    real(wp), allocatable :: frame(:)
-    integer :: n, k, row, col, i
+    real(wp), dimension(now%problem%lattice%extent(1)) :: ux, uy, across
+    real(wp) :: part(size(nodes%pairs%first))
+    integer :: n, n_t, n_col, k, run, from, to, m, at
 
     n = size(now%p)
+    n_t = nodes%pairs%n_first
+    n_col = now%problem%lattice%extent(1)
     call new_driven_motions(driven, now%problem, now%target, now%contact)
     allocate (constraint(nodes%n_active, size(driven%motion)), missing(size(driven%motion)))
-    if (size(missing) > 0) allocate (frame(2*n))
     do k = 1, size(driven%motion)
-      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(unit, col, i)
-      do row = 1, size(part)
-        call driven%direction_row(k, now%problem, row, unit(:, 1), unit(:, 2))
-        part(row) = 0.0_wp
-        do col = 1, size(unit, 1)
-          i = (row - 1)*size(unit, 1) + col
-          part(row) = part(row) + unit(col, 1)*now%q(i) + unit(col, 2)*now%q(n + i)
-          frame(i) = -now%shear%direction(2, i)*unit(col, 1) + now%shear%direction(1, i)*unit(col, 2)
-          frame(n + i) = now%shear%direction(1, i)*unit(col, 1) + now%shear%direction(2, i)*unit(col, 2)
+      !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ux, uy, across, from, to, m, at)
+      do run = 1, size(part)
+        part(run) = 0.0_wp
+        from = nodes%pairs%first(run)
+        ! a run goes on in the next row where the contact reaches the rim
+        do while (from <= nodes%pairs%last(run))
+          to = min(nodes%pairs%last(run), from + n_col - 1 - modulo(from - 1, n_col))
+          m = to - from + 1
+          call driven%direction_row(k, now%problem, from, ux(:m), uy(:m))
+          part(run) = part(run) + dot_product(ux(:m), now%q(from:to)) + dot_product(uy(:m), now%q(n + from:n + to))
+          at = nodes%pairs%place(run) + from - nodes%pairs%first(run)
+          ! into the frames, which takes the same reflection as out of them
+          call plane_row(m, now%shear%direction(:, from:to), ux, uy, constraint(at:at + m - 1, k), across)
+          if (nodes%pairs%second(run) > 0) then
+            at = n_t + nodes%pairs%second(run) + from - nodes%pairs%first(run)
+            constraint(at:at + m - 1, k) = across(:m)
+          end if
+          from = to + 1
         end do
       end do
       !$omp end parallel do
-      call nodes%pack(frame, constraint(:, k))
       missing(k) = driven%load(k, now%problem, now%target) - sum(part)
     end do
   end subroutine find_constraints
@@ -183,23 +237,29 @@ contains
   subroutine find_prescribed_displacement(now, frame)
     !> Iterate
     type(friction_iterate_t), intent(in) :: now
-    !> In the frames (2 n)
-    real(wp), intent(out), contiguous :: frame(:)
-    real(wp) :: motion(n_motion), remote(now%problem%lattice%extent(1), 2), along, across
-    integer :: n, row, col, i
+    !> In the frames; on the nodes in contact (2 n)
+    real(wp), intent(inout), contiguous :: frame(:)
+    real(wp), dimension(now%problem%lattice%extent(1)) :: along, across
+    real(wp) :: motion(n_motion)
+    integer :: n, n_col, row, from, to, low, high, i, m
 
     n = size(now%p)
+    n_col = now%problem%lattice%extent(1)
     motion = merge(now%motion, 0.0_wp, now%target%control /= force_control)
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(remote, along, across, col, i)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(along, across, from, to, low, high, i, m)
     do row = 1, now%problem%lattice%extent(2)
-      call now%problem%rigid_displacement_row(motion, row, remote(:, 1), remote(:, 2))
-      do col = 1, now%problem%lattice%extent(1)
-        i = (row - 1)*now%problem%lattice%extent(1) + col
-        along = now%origin(i) + remote(col, 1)
-        across = now%origin(n + i) + remote(col, 2)
-        frame(i) = -now%shear%direction(2, i)*along + now%shear%direction(1, i)*across
-        frame(n + i) = now%shear%direction(1, i)*along + now%shear%direction(2, i)*across
+      from = (row - 1)*n_col
+      call find_span(now%contact(from + 1:from + n_col), low, high)
+      to = from + high
+      from = from + low
+      m = high - low + 1
+      if (m <= 0) cycle
+      call now%problem%rigid_displacement_row(motion, row, along(:m), across(:m), low)
+      do i = 1, m
+        along(i) = along(i) + now%origin(from + i - 1)
+        across(i) = across(i) + now%origin(n + from + i - 1)
       end do
+      call plane_row(m, now%shear%direction(:, from:to), along, across, frame(from:to), frame(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine find_prescribed_displacement

@@ -52,11 +52,11 @@ contains
     real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:), b(:, :), m_b(:, :), c(:, :)
     real(wp), allocatable :: gap(:), ahead(:), aside(:)
     logical, allocatable :: active(:), shear_active(:), contact(:)
-    type(active_set_t) :: nodes, sheared, pressed
+    type(active_set_t), target :: nodes, sheared, pressed
     real(wp), allocatable :: shear_missing(:)
     type(driven_motions_t) :: driven
     type(newton_options_t) :: options
-    real(wp) :: missing(4), multiplier(4), weight(2), goal, residual, drift
+    real(wp) :: missing(4), multiplier(4), weight(2), goal, residual, drift, rounding
     integer :: n, m, k, n_shear, iterations
     logical :: independent, sticks
 
@@ -92,7 +92,8 @@ contains
       system%slope = ahead*system%slope
     end if
     x(:n) = now%p
-    call now%shear%to_frame(now%q, x(n + 1:))
+    x(n + 1:) = now%q
+    call now%shear%turn(x(n + 1:))
     ! what p carries along is not counted twice
     x(2*n + 1:) = x(2*n + 1:) - system%slope*now%p
     where (.not. shear_active) x(n + 1:) = 0.0_wp
@@ -106,7 +107,10 @@ contains
     ! 3.
     call new_active_set(nodes, active, system%space)
     call new_active_set(sheared, shear_active, system%space)
+    call sheared%pair(2*n)
     call new_active_set(pressed, now%contact, system%space)
+    system%pressed => pressed
+    system%sheared => sheared
     sticks = any(shear_active(n + 1:))
     deallocate (active, shear_active)
     call find_constraints(now, sheared, driven, shear_columns, shear_missing)
@@ -201,18 +205,17 @@ contains
     if (m > n_shear) now%motion(normal) = multiplier(m)
     now%p = x(:n)
     x(2*n + 1:) = x(2*n + 1:) + system%slope*now%p
-    call now%shear%to_plane(x(n + 1:), now%q)
-    allocate (now%closing(n), now%u(2*n))
+    allocate (now%closing(n))
     now%w = ax(:n)
     call now%pressure%stretch(-1.0_wp, now%p, now%w)
     now%closing = 0.0_wp
     now%cut = .false.
     now%joint = .true.
-    ax(n + 1:2*n) = ax(n + 1:2*n) - now%shear%compliance*x(n + 1:2*n)
     if (allocated(system%tilt)) ax(n + 1:2*n) = ax(n + 1:2*n) + now%shear%compliance*system%tilt*now%p
-    call now%shear%to_plane(ax(n + 1:), now%u)
-    if (now%shear%spring_rounding(x(n + 1:)) > options%displacement_rounding*now%problem%tangential_compliance &
-        *now%traction_scale()) then
+    call now%shear%leave_frames(x(n + 1:), ax(n + 1:), rounding)
+    now%q = x(n + 1:)
+    now%u = ax(n + 1:)
+    if (rounding > options%displacement_rounding*now%problem%tangential_compliance*now%traction_scale()) then
       call now%refresh(error)
       if (allocated(error)) return
     end if

@@ -6,7 +6,7 @@ module hc_coupled_system
   use hc_elastic_operators, only: operators_t
   use hc_shear_system, only: shear_system_t
   use hc_linear_system, only: linear_system_t
-  use hc_active_set, only: active_set_t, paired_runs_t, pair_runs
+  use hc_active_set, only: active_set_t
   implicit none
   private
 
@@ -20,6 +20,8 @@ module hc_coupled_system
     type(operators_t), pointer :: operators => null()
     !> Frames and compliances of the nodes
     type(shear_system_t), pointer :: shear => null()
+    !> Nodes in contact, and unknowns of the shear traction (of 2 n)
+    type(active_set_t), pointer :: pressed => null(), sheared => null()
     !> Compliance of the springs of a compliant law of contact; not there without [m/Pa]
     real(wp), allocatable :: compliance(:)
     !> mu at slipping nodes, 0 elsewhere; traction across at rest over the pressure, not there if all are 0
@@ -79,8 +81,6 @@ contains
     real(wp), intent(in), contiguous :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    type(active_set_t) :: contact, along_t
-    type(paired_runs_t) :: runs
     real(wp) :: e
     integer :: n, k, i, at
 
@@ -89,10 +89,8 @@ contains
       allocate (self%traction(3*n))
       call self%space%fill(self%traction, 0.0_wp)
     end if
-    contact = nodes%slice(1, n)
-    along_t = nodes%slice(n + 1, 2*n)
-    call pair_runs(along_t, nodes%slice(2*n + 1, 3*n), runs)
-    associate (n_p => contact%n_active, n_t => along_t%n_active, direction => self%shear%direction)
+    associate (contact => self%pressed, runs => self%sheared%pairs, n_p => self%pressed%n_active, &
+               n_t => self%sheared%pairs%n_first, direction => self%shear%direction, given => nodes)
       call self%shear%put_in_plane(runs, x(n_p + 1:n_p + n_t), x(n_p + n_t + 1:), self%traction(n + 1:))
       !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, e)
       do k = 1, size(contact%first)
@@ -120,11 +118,13 @@ contains
     end associate
   end subroutine coupled_product_packed
 
-  !> Free the tractions.
+  !> Free the tractions, and what the preconditioners keep.
   subroutine release_coupled(self)
     class(coupled_system_t), intent(inout) :: self
 
     if (allocated(self%traction)) deallocate (self%traction)
+    call self%operators%normal%release()
+    call self%operators%tangential%release()
   end subroutine release_coupled
 
   !> Precondition the values at the active nodes.
@@ -135,15 +135,13 @@ contains
     real(wp), intent(in), contiguous :: r(:)
     real(wp), intent(inout), contiguous :: z(:)
     type(error_t), allocatable, intent(out) :: error
-    type(active_set_t) :: contact
     real(wp), allocatable :: shear(:)
     integer :: k, i, at
 
-    contact = nodes%slice(1, n/3)
-    associate (n_p => contact%n_active, operators => self%operators)
+    associate (contact => self%pressed, n_p => self%pressed%n_active, operators => self%operators, given => nodes)
       call operators%normal%apply_packed(contact, n/3, r(:n_p), z(:n_p), operators%preconditioning)
       if (.not. allocated(self%tilt)) then
-        call self%shear%precondition_packed(nodes%slice(n/3 + 1, n), 2*n/3, r(n_p + 1:), z(n_p + 1:), error)
+        call self%shear%precondition_packed(self%sheared, 2*n/3, r(n_p + 1:), z(n_p + 1:), error)
         return
       end if
       shear = r(n_p + 1:)
@@ -153,7 +151,7 @@ contains
           shear(at) = shear(at) + self%shear%compliance(i)*self%tilt(i)*z(at)
         end do
       end do
-      call self%shear%precondition_packed(nodes%slice(n/3 + 1, n), 2*n/3, shear, z(n_p + 1:), error)
+      call self%shear%precondition_packed(self%sheared, 2*n/3, shear, z(n_p + 1:), error)
     end associate
   end subroutine coupled_precondition_packed
 

@@ -18,6 +18,7 @@ module hc_friction_iterate
   use hc_pressure_system, only: pressure_system_t
   use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_linear_system, only: solution_accurate
+  use hc_active_set, only: find_span
   use hc_field_space, only: field_space_t
   implicit none
   private
@@ -262,24 +263,22 @@ contains
     !$omp end parallel do
   end subroutine find_gap
 
-  !> Compute ds of the present tractions and motions at the nodes of a row in contact, zero elsewhere.
-  pure subroutine slip_row(self, row, dsx, dsy)
+  !> Compute ds of the present tractions and motions at nodes of a row, from a column on; zero off the contact.
+  pure subroutine slip_row(self, row, col, dsx, dsy)
     class(friction_iterate_t), intent(in) :: self
-    integer, intent(in) :: row
-    !> Components along x and y (n_col)
+    integer, intent(in) :: row, col
+    !> Components along x and y (number of nodes)
     real(wp), intent(out), contiguous :: dsx(:), dsy(:)
-    integer :: i, n, col
+    integer :: i, n, at
     logical :: touches
 
     n = size(self%p)
-    call self%problem%rigid_displacement_row(self%motion, row, dsx, dsy)
-    do col = 1, size(dsx)
-      i = (row - 1)*size(dsx) + col
-      touches = self%contact(i) .or. self%p(i) > 0.0_wp
-      dsx(col) = self%u(i) - self%origin(i) - dsx(col)
-      dsy(col) = self%u(n + i) - self%origin(n + i) - dsy(col)
-      dsx(col) = merge(dsx(col), 0.0_wp, touches)
-      dsy(col) = merge(dsy(col), 0.0_wp, touches)
+    call self%problem%rigid_displacement_row(self%motion, row, dsx, dsy, col)
+    at = (row - 1)*self%problem%lattice%extent(1) + col - 1
+    do i = 1, size(dsx)
+      touches = self%contact(at + i) .or. self%p(at + i) > 0.0_wp
+      dsx(i) = merge(self%u(at + i) - self%origin(at + i) - dsx(i), 0.0_wp, touches)
+      dsy(i) = merge(self%u(n + at + i) - self%origin(n + at + i) - dsy(i), 0.0_wp, touches)
     end do
   end subroutine slip_row
 
@@ -346,8 +345,9 @@ contains
   !> Compute R_t alone.
   subroutine find_tangential_residual(self)
     class(friction_iterate_t), intent(inout) :: self
-    real(wp) :: ds(self%problem%lattice%extent(1), 2), unit, largest, worst
-    integer :: n, row, from, to
+    real(wp), dimension(self%problem%lattice%extent(1)) :: dsx, dsy
+    real(wp) :: unit, largest, worst
+    integer :: n, n_col, row, from, to, low, high
 
     n = size(self%p)
     self%residual_tangential = 0.0_wp
@@ -355,14 +355,16 @@ contains
     if (.not. (unit > 0.0_wp .and. self%problem%friction%resists())) return
     largest = 0.0_wp
     worst = 0.0_wp
-    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(ds, from, to) &
+    n_col = size(dsx)
+    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(dsx, dsy, from, to, low, high) &
     !$omp& reduction(max: largest, worst)
-    do row = 1, self%problem%lattice%extent(2)
-      from = (row - 1)*size(ds, 1) + 1
-      to = row*size(ds, 1)
-      call self%slip_row(row, ds(:, 1), ds(:, 2))
+    do row = 1, n/n_col
+      call find_span(self%p((row - 1)*n_col + 1:row*n_col), low, high)
+      from = (row - 1)*n_col + low
+      to = (row - 1)*n_col + high
+      call self%slip_row(row, low, dsx(low:high), dsy(low:high))
       call self%problem%friction%violation(from, unit, 1.0_wp/self%problem%tangential_compliance, self%p(from:to), &
-                                           self%q(from:to), self%q(n + from:n + to), ds(:, 1), ds(:, 2), largest, worst)
+                                           self%q(from:to), self%q(n + from:n + to), dsx(low:high), dsy(low:high), largest, worst)
     end do
     !$omp end parallel do
     self%residual_tangential = sqrt(worst)/tangential_scale(self%problem%friction, 1.0_wp/unit, largest)

@@ -12,6 +12,7 @@ module hc_front_relaxation
   use hc_options, only: newton_options_t
   use hc_contact_problem, only: near_reach
   use hc_friction_iterate, only: friction_iterate_t
+  use hc_active_set, only: find_span
   use hc_active_zones, only: shear_parameter
   implicit none
   private
@@ -115,19 +116,20 @@ contains
     !> Marks (n_col, n_row)
     integer(int8), intent(out) :: mark(:, :)
     real(wp) :: ds(size(mark, 1), 2), bound(size(mark, 1)), r
-    integer :: row, col, n, i
+    integer :: row, col, n, i, low, high
 
     n = size(now%p)
     r = shear_parameter(now)
-    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, bound, col, i)
+    !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(ds, bound, col, i, low, high)
     do row = 1, size(mark, 2)
       mark(:, row) = is_off
       i = (row - 1)*size(bound)
       if (row == 1 .or. row == size(mark, 2)) cycle
-      if (.not. any(now%contact(i + 1:i + size(bound)))) cycle
-      call now%problem%friction%find_bounds(i + 1, now%p(i + 1:i + size(bound)), bound)
-      call now%slip_row(row, ds(:, 1), ds(:, 2))
-      do col = 2, size(bound) - 1
+      call find_span(now%contact(i + 1:i + size(bound)), low, high)
+      if (high < low) cycle
+      call now%problem%friction%find_bounds(i + low, now%p(i + low:i + high), bound(low:high))
+      call now%slip_row(row, low, ds(low:high, 1), ds(low:high, 2))
+      do col = max(low, 2), min(high, size(bound) - 1)
         if (.not. (now%contact(i + col) .and. bound(col) > 0.0_wp)) cycle
         mark(col, row) = merge(slips, sticks, (now%q(i + col) - r*ds(col, 1))**2 + (now%q(n + i + col) - r*ds(col, 2))**2 &
                                > bound(col)**2)

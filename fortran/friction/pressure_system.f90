@@ -23,6 +23,7 @@ module hc_pressure_system
     procedure :: product => pressure_product
     procedure :: precondition => pressure_precondition
     procedure :: precondition_packed => pressure_precondition_packed
+    procedure :: release => release_pressure
   end type pressure_system_t
 
 contains
@@ -81,5 +82,12 @@ contains
       call operators%normal%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine pressure_precondition_packed
+
+  !> Free what the preconditioner keeps.
+  subroutine release_pressure(self)
+    class(pressure_system_t), intent(inout) :: self
+
+    call self%operators%normal%release()
+  end subroutine release_pressure
 
 end module hc_pressure_system

@@ -16,15 +16,14 @@ module hc_shear_system
   use hc_flexibility, only: along_x, along_y
   use hc_inverse_symbol, only: node_compliance
   use hc_elastic_operators, only: operators_t
+  use hc_frame_rows, only: turn_row, plane_row, add_springs_row, take_off_row, slip_compliance_row
   use hc_linear_system, only: linear_system_t
-  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t, pair_runs
+  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
   implicit none
   private
 
-  public :: shear_system_t, new_shear_system, slip_compliance_row
+  public :: shear_system_t, new_shear_system
 
-  !> Squares below this count as nothing.
-  real(wp), parameter :: nothing = 1.0e-200_wp
   !> Components of the shear traction
   integer, parameter :: shear(2) = [along_x, along_y]
   !> Nodes of a run that are treated at a time
@@ -51,20 +50,20 @@ module hc_shear_system
     procedure :: product_packed => shear_product_packed
     procedure :: precondition_packed => shear_precondition_packed
     procedure :: release => release_shear
-    !> Components along x and y from those in the frames, and back; either in place
-    procedure :: to_plane, to_frame, turn
+    !> Turn components along x and y into the frames, or back
+    procedure :: turn
     !> Set the nodes in contact, with their frames and compliances
     procedure :: set_contact
     !> Add what springs at rest are stretched by
     procedure :: add_rest
     !> Reduce the traction of slipping nodes by their compliance
     procedure :: apply_slip_compliance
-    !> Put displacements into the frames and add the stretch of the springs; take it off
-    procedure :: add_springs, add_springs_packed, subtract_springs
+    !> Turn displacements into the frames and add the stretch of the springs
+    procedure :: add_springs, add_springs_packed
+    !> Take it off, and turn tractions and displacements out of the frames
+    procedure :: leave_frames
     !> Components along x and y from packed ones in the frames
     procedure :: put_in_plane
-    !> Rounding error of this subtraction
-    procedure :: spring_rounding
   end type shear_system_t
 
 contains
@@ -142,22 +141,22 @@ contains
     !$omp end parallel do
   end subroutine apply_slip_compliance
 
-  !> Add the stretch of the springs to displacements along x and y, in the frames.
+  !> Turn displacements along x and y into the frames of the nodes in contact, and add the stretch of the springs.
   subroutine add_springs(self, traction, displacement)
     class(shear_system_t), intent(in) :: self
     !> Traction in the frames (2 n)
     real(wp), intent(in), contiguous :: traction(:)
     !> Components along x and y; then in the frames (2 n)
     real(wp), intent(inout), contiguous :: displacement(:)
-    real(wp) :: u(2)
-    integer :: n, i
+    integer :: n, k, from, to
 
     n = size(self%compliance)
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(u)
-    do i = 1, n
-      u = [displacement(i), displacement(n + i)]
-      displacement(i) = -self%direction(2, i)*u(1) + self%direction(1, i)*u(2) + self%compliance(i)*traction(i)
-      displacement(n + i) = self%direction(1, i)*u(1) + self%direction(2, i)*u(2)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
+    do k = 1, size(self%nodes%first)
+      from = self%nodes%first(k)
+      to = self%nodes%last(k)
+      call add_springs_row(to - from + 1, self%direction(:, from:to), self%compliance(from:to), traction(from:to), &
+                           displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine add_springs
@@ -167,95 +166,57 @@ contains
     class(shear_system_t), intent(in) :: self
     !> In the frames (2 n)
     real(wp), intent(inout) :: displacement(:)
-    integer :: i
+    integer :: k, i
 
     if (.not. allocated(self%rest)) return
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, size(self%rest)
-      displacement(i) = displacement(i) + self%compliance(i)*self%rest(i)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
+    do k = 1, size(self%nodes%first)
+      do i = self%nodes%first(k), self%nodes%last(k)
+        displacement(i) = displacement(i) + self%compliance(i)*self%rest(i)
+      end do
     end do
     !$omp end parallel do
   end subroutine add_rest
 
-  !> Subtract the stretch of their springs from the displacements of the nodes.
-  subroutine subtract_springs(self, traction, displacement)
+  !> Take the stretch of the springs off the displacements of the nodes in contact, and turn tractions and displacements out
+  !> of the frames.
+  subroutine leave_frames(self, traction, displacement, rounding)
     class(shear_system_t), intent(in) :: self
-    !> Traction, and displacement with the springs, in the frames (2 n)
-    real(wp), intent(in) :: traction(:)
-    real(wp), intent(inout) :: displacement(:)
-    integer :: i
+    !> Traction, and displacement with the springs, in the frames; then along x and y (2 n)
+    real(wp), intent(inout), contiguous :: traction(:), displacement(:)
+    !> Rounding error of the displacements [m]: very soft springs stretch by so much that the displacements of the nodes are
+    !> lost in it
+    real(wp), intent(out) :: rounding
+    integer :: n, k, from, to
 
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, size(self%compliance)
-      displacement(i) = displacement(i) - self%compliance(i)*traction(i)
+    n = size(self%compliance)
+    rounding = 0.0_wp
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to) reduction(max: rounding)
+    do k = 1, size(self%nodes%first)
+      from = self%nodes%first(k)
+      to = self%nodes%last(k)
+      call take_off_row(to - from + 1, self%compliance(from:to), traction(from:to), displacement(from:to), rounding)
+      call turn_row(to - from + 1, self%direction(:, from:to), traction(from:to), traction(n + from:n + to))
+      call turn_row(to - from + 1, self%direction(:, from:to), displacement(from:to), displacement(n + from:n + to))
     end do
     !$omp end parallel do
-  end subroutine subtract_springs
+    rounding = epsilon(1.0_wp)*rounding
+  end subroutine leave_frames
 
-  !> Compute the rounding error of displacements that springs were taken off [m]: very soft ones stretch by so much that the
-  !> displacements of the nodes are lost in it.
-  pure real(wp) function spring_rounding(self, traction)
-    class(shear_system_t), intent(in) :: self
-    !> Traction in the frames (2 n)
-    real(wp), intent(in) :: traction(:)
-    integer :: i
-
-    spring_rounding = 0.0_wp
-    do i = 1, size(self%compliance)
-      spring_rounding = max(spring_rounding, epsilon(1.0_wp)*abs(self%compliance(i)*traction(i)))
-    end do
-  end function spring_rounding
-
-  !> Compute the components along x and y from those along t and e.
-  subroutine to_plane(self, frame, plane)
-    class(shear_system_t), intent(in) :: self
-    !> Components along t and e (2 n)
-    real(wp), intent(in) :: frame(:)
-    !> Components along x and y (2 n)
-    real(wp), intent(out) :: plane(:)
-    integer :: i, n
-
-    n = size(frame)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, n
-      plane(i) = -self%direction(2, i)*frame(i) + self%direction(1, i)*frame(n + i)
-      plane(n + i) = self%direction(1, i)*frame(i) + self%direction(2, i)*frame(n + i)
-    end do
-    !$omp end parallel do
-  end subroutine to_plane
-
-  !> Compute the components along t and e from those along x and y.
-  subroutine to_frame(self, plane, frame)
-    class(shear_system_t), intent(in) :: self
-    !> Components along x and y (2 n)
-    real(wp), intent(in) :: plane(:)
-    !> Components along t and e (2 n)
-    real(wp), intent(out) :: frame(:)
-    integer :: i, n
-
-    n = size(plane)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do i = 1, n
-      frame(i) = -self%direction(2, i)*plane(i) + self%direction(1, i)*plane(n + i)
-      frame(n + i) = self%direction(1, i)*plane(i) + self%direction(2, i)*plane(n + i)
-    end do
-    !$omp end parallel do
-  end subroutine to_frame
-
-  !> Turn components along x and y to those along t and e, or back: a reflection, which is its own inverse.
+  !> Turn components along x and y to those along t and e, or back, at the nodes in contact: a reflection, which is its own
+  !> inverse.
   subroutine turn(self, values)
     class(shear_system_t), intent(in) :: self
     !> The components (2 n)
     real(wp), intent(inout), contiguous :: values(:)
-    real(wp) :: v(2)
-    integer :: i, n
+    integer :: n, k, from, to
 
     n = size(values)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(v)
-    do i = 1, n
-      v = [values(i), values(n + i)]
-      values(i) = -self%direction(2, i)*v(1) + self%direction(1, i)*v(2)
-      values(n + i) = self%direction(1, i)*v(1) + self%direction(2, i)*v(2)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
+    do k = 1, size(self%nodes%first)
+      from = self%nodes%first(k)
+      to = self%nodes%last(k)
+      call turn_row(to - from + 1, self%direction(:, from:to), values(from:to), values(n + from:n + to))
     end do
     !$omp end parallel do
   end subroutine turn
@@ -266,16 +227,16 @@ contains
     real(wp), intent(in), contiguous, target :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: n, k, i
+    integer :: n, k, from, to
 
     n = size(self%compliance)
     call take_from(self)
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
     do k = 1, size(self%nodes%first)
-      do i = self%nodes%first(k), self%nodes%last(k)
-        self%from(i) = -self%direction(2, i)*x(i) + self%direction(1, i)*x(n + i)
-        self%from(n + i) = self%direction(1, i)*x(i) + self%direction(2, i)*x(n + i)
-      end do
+      from = self%nodes%first(k)
+      to = self%nodes%last(k)
+      call plane_row(to - from + 1, self%direction(:, from:to), x(from:to), x(n + from:n + to), self%from(from:to), &
+                     self%from(n + from:n + to))
     end do
     !$omp end parallel do
     call self%operators%apply(shear, self%from, shear, y, error)
@@ -293,11 +254,12 @@ contains
     call self%space%fill(self%from, 0.0_wp)
   end subroutine take_from
 
-  !> Free it.
+  !> Free it, and what the preconditioner keeps.
   subroutine release_shear(self)
     class(shear_system_t), intent(inout) :: self
 
     if (allocated(self%from)) deallocate (self%from)
+    call self%operators%tangential%release()
   end subroutine release_shear
 
   !> Multiply values at the active nodes: the component along t of all nodes in contact, that along e of some.
@@ -307,17 +269,13 @@ contains
     real(wp), intent(in), contiguous :: x(:)
     real(wp), intent(out), contiguous, target :: y(:)
     type(error_t), allocatable, intent(out) :: error
-    type(active_set_t) :: along_t
-    type(paired_runs_t) :: runs
 
     call take_from(self)
-    along_t = nodes%slice(1, size(y)/2)
-    call pair_runs(along_t, nodes%slice(size(y)/2 + 1, size(y)), runs)
-    associate (n_t => along_t%n_active)
-      call self%put_in_plane(runs, x(:n_t), x(n_t + 1:), self%from)
+    associate (n_t => nodes%pairs%n_first)
+      call self%put_in_plane(nodes%pairs, x(:n_t), x(n_t + 1:), self%from)
       call self%operators%apply(shear, self%from, shear, y, error)
       if (allocated(error)) return
-      call self%add_springs_packed(runs, x(:n_t), y)
+      call self%add_springs_packed(nodes%pairs, x(:n_t), y)
     end associate
   end subroutine shear_product_packed
 
@@ -330,31 +288,28 @@ contains
     real(wp), intent(in), contiguous :: along_t(:), along_e(:)
     !> Components along x and y (2 n)
     real(wp), intent(inout), contiguous :: plane(:)
-    real(wp) :: t, e
-    integer :: n, k, i
+    integer :: n, k, from, to, at, i
 
     n = size(plane)/2
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, t, e)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to, at, i)
     do k = 1, size(runs%first)
+      from = runs%first(k)
+      to = runs%last(k)
+      at = runs%place(k)
       if (runs%second(k) == 0) then
-        do i = runs%first(k), runs%last(k)
-          t = along_t(runs%place(k) + i - runs%first(k))
-          plane(i) = -self%direction(2, i)*t
-          plane(n + i) = self%direction(1, i)*t
+        do i = from, to
+          plane(i) = -self%direction(2, i)*along_t(at + i - from)
+          plane(n + i) = self%direction(1, i)*along_t(at + i - from)
         end do
       else
-        do i = runs%first(k), runs%last(k)
-          t = along_t(runs%place(k) + i - runs%first(k))
-          e = along_e(runs%second(k) + i - runs%first(k))
-          plane(i) = -self%direction(2, i)*t + self%direction(1, i)*e
-          plane(n + i) = self%direction(1, i)*t + self%direction(2, i)*e
-        end do
+        call plane_row(to - from + 1, self%direction(:, from:to), along_t(at:at + to - from), &
+                       along_e(runs%second(k):runs%second(k) + to - from), plane(from:to), plane(n + from:n + to))
       end if
     end do
     !$omp end parallel do
   end subroutine put_in_plane
 
-  !> Put displacements along x and y into the frames, and add the stretch of the springs.
+  !> Turn displacements into the frames and add the stretch of the springs, under packed tractions.
   subroutine add_springs_packed(self, runs, along_t, displacement)
     class(shear_system_t), intent(in) :: self
     !> Nodes in contact
@@ -363,26 +318,18 @@ contains
     real(wp), intent(in), contiguous :: along_t(:)
     !> Components along x and y; then in the frames (2 n)
     real(wp), intent(inout), contiguous :: displacement(:)
-    real(wp) :: u(2)
-    integer :: n, k, i
+    integer :: n, k, from, to
 
     n = size(self%compliance)
-    !$omp parallel num_threads(self%space%threads) private(i, u)
-    !$omp do schedule(static)
-    do i = 1, n
-      u = [displacement(i), displacement(n + i)]
-      displacement(i) = -self%direction(2, i)*u(1) + self%direction(1, i)*u(2)
-      displacement(n + i) = self%direction(1, i)*u(1) + self%direction(2, i)*u(2)
-    end do
-    !$omp end do
-    !$omp do schedule(static)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
     do k = 1, size(runs%first)
-      do i = runs%first(k), runs%last(k)
-        displacement(i) = displacement(i) + self%compliance(i)*along_t(runs%place(k) + i - runs%first(k))
-      end do
+      from = runs%first(k)
+      to = runs%last(k)
+      call add_springs_row(to - from + 1, self%direction(:, from:to), self%compliance(from:to), &
+                           along_t(runs%place(k):runs%place(k) + to - from), displacement(from:to), &
+                           displacement(n + from:n + to))
     end do
-    !$omp end do
-    !$omp end parallel
+    !$omp end parallel do
   end subroutine add_springs_packed
 
   !> Apply the preconditioner of the shear traction.
@@ -410,27 +357,5 @@ contains
       call operators%tangential%apply_packed(nodes, n, r, z, operators%preconditioning)
     end associate
   end subroutine shear_precondition_packed
-
-  !> Reduce the tractions of a row by springs in series with the stiffness that each node was found to have in stick.
-  pure subroutine slip_compliance_row(n, compliance, ux, uy, qx, qy)
-    !> Number of nodes
-    integer, intent(in) :: n
-    !> Compliance of the springs, and displacements
-    real(wp), intent(in) :: compliance(n), ux(n), uy(n)
-    !> Tractions if all nodes stuck, and what is left of them
-    real(wp), intent(inout) :: qx(n), qy(n)
-    real(wp) :: moved, stretch, left
-    integer :: i
-
-    !$omp simd private(moved, stretch, left)
-    do i = 1, n
-      ! what the spring gives way under that traction
-      stretch = compliance(i)*sqrt(qx(i)**2 + qy(i)**2)
-      moved = sqrt(ux(i)**2 + uy(i)**2)
-      left = merge(moved/max(moved + stretch, nothing), 1.0_wp, stretch > 0.0_wp)
-      qx(i) = left*qx(i)
-      qy(i) = left*qy(i)
-    end do
-  end subroutine slip_compliance_row
 
 end module hc_shear_system

@@ -30,7 +30,7 @@ module hc_staggered_newton
   use hc_active_zones, only: find_contact, linearize_law, classify, find_constraints, find_prescribed_displacement
   use hc_friction_iterate, only: friction_iterate_t
   use hc_front_relaxation, only: relax_fronts
-  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t, pair_runs
+  use hc_active_set, only: active_set_t, new_active_set
   use hc_linear_system, only: precondition_constraints, satisfy_constraints, step_ahead, solution_accurate
   use hc_projected_cg, only: projected_cg
   implicit none
@@ -214,6 +214,7 @@ contains
     do
       call classify(now, fixing, active)
       call new_active_set(nodes, active, now%shear%space)
+      call nodes%pair(2*n)
       sticks = any(active(n + 1:))
       deallocate (active)
       call find_constraints(now, nodes, driven, constraint, missing)
@@ -309,10 +310,7 @@ contains
       !> Traction, and displacement with the springs, in the frames (2 n)
       real(wp), allocatable, intent(inout) :: traction(:), displacement(:)
 
-      rounding = now%shear%spring_rounding(traction)
-      call now%shear%subtract_springs(traction, displacement)
-      call now%shear%turn(traction)
-      call now%shear%turn(displacement)
+      call now%shear%leave_frames(traction, displacement, rounding)
       call move_alloc(traction, now%q)
       call move_alloc(displacement, now%u)
     end subroutine take
@@ -339,7 +337,8 @@ contains
     n = size(now%p)
     allocate (traction(3*n))
     call now%shear%space%copy(now%p, traction(:n))
-    call now%shear%to_plane(x, traction(n + 1:))
+    call now%shear%space%copy(x, traction(n + 1:))
+    call now%shear%turn(traction(n + 1:))
     call now%operators%apply([normal, along_x, along_y], traction, [along_x, along_y], ax, error)
     if (allocated(error)) return
     call now%shear%add_springs(x, ax)
@@ -393,23 +392,18 @@ contains
     real(wp), allocatable, intent(out) :: mb(:, :)
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    type(active_set_t) :: along_t
-    type(paired_runs_t) :: runs
     real(wp), allocatable :: plane(:)
     integer :: n, k, n_t
     logical :: known
 
     n = size(now%p)
-    along_t = nodes%slice(1, n)
-    n_t = along_t%n_active
-    call pair_runs(along_t, nodes%slice(n + 1, 2*n), runs)
-
+    n_t = nodes%pairs%n_first
     known = allocated(now%rigid_traction) .and. .not. afresh
     if (known) known = size(now%rigid_traction, 2) == size(constraint, 2)
     if (known) then
       allocate (mb, mold=constraint)
       do k = 1, size(mb, 2)
-        call now%shear%apply_slip_compliance(runs, constraint(:n_t, k), constraint(n_t + 1:, k), now%rigid_traction(:, k), &
+        call now%shear%apply_slip_compliance(nodes%pairs, constraint(:n_t, k), constraint(n_t + 1:, k), now%rigid_traction(:, k), &
                                              mb(:n_t, k), mb(n_t + 1:, k))
       end do
     else
@@ -420,7 +414,7 @@ contains
       if (size(mb, 2) > 0) allocate (plane(2*n))
       do k = 1, size(mb, 2)
         call now%shear%space%fill(plane, 0.0_wp)
-        call now%shear%put_in_plane(runs, mb(:n_t, k), mb(n_t + 1:, k), plane)
+        call now%shear%put_in_plane(nodes%pairs, mb(:n_t, k), mb(n_t + 1:, k), plane)
         now%rigid_traction(:, k) = real(plane, sp)
       end do
     end if

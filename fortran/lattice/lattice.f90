@@ -19,7 +19,7 @@ module hc_lattice
   implicit none
   private
 
-  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, edge_directions, neighbors
+  public :: lattice_t, new_lattice, check_lattice, equilateral_basis, edge_directions, neighbors, floor_half
 
   !> Steps in column and row to the six neighbors of a node, along the edges of the triangulation.
   integer, parameter :: neighbors(2, 6) = reshape([1, 0, 0, 1, -1, 1, -1, 0, 0, -1, 1, -1], [2, 6])
@@ -152,18 +152,18 @@ contains
     end do
   end subroutine coordinates
 
-  !> Compute the coordinates of the nodes of a row: faster than to read them.
+  !> Compute the coordinates of the first nodes of a row: faster than to read them.
   pure subroutine row_coordinates(self, row, x, y)
     class(lattice_t), intent(in) :: self
     !> Row of the window, from 1 on
     integer, intent(in) :: row
-    !> Coordinates of the nodes (n_col) [m]
+    !> Coordinates of the nodes (n_col, or less) [m]
     real(wp), intent(out) :: x(:), y(:)
     integer :: col
     real(wp) :: i, j
 
     j = real(self%first(2) + row - 1, wp)
-    do col = 1, self%extent(1)
+    do col = 1, size(x)
       i = real(self%first(1) + col - 1, wp)
       x(col) = self%origin(1) + i*self%basis(1, 1) + j*self%basis(1, 2)
       y(col) = self%origin(2) + i*self%basis(2, 1) + j*self%basis(2, 2)

@@ -7,7 +7,7 @@
 !> Theory: docs/theory/multilevel.md.
 module hc_transfer
   use hc_precision, only: wp
-  use hc_lattice, only: lattice_t, neighbors
+  use hc_lattice, only: lattice_t, neighbors, floor_half
   use hc_field_space, only: field_space_t
   implicit none
   private
@@ -30,44 +30,58 @@ contains
     type(field_space_t), intent(in) :: space
     !> Beyond the coarse window there are the values at its rim; default: zero
     logical, intent(in), optional :: beyond
-    integer :: col, row, i, j
+    !> Coarse values below and above a row of fine nodes, in a coarse row the same
+    real(wp), dimension(floor_half(fine_lattice%first(1)):floor_half(fine_lattice%first(1) + size(fine, 1))) :: below, above
+    integer :: row, i, j, c, last
     logical :: held
 
     held = .false.
     if (present(beyond)) held = beyond
-    !$omp parallel do schedule(static) private(col, i, j) num_threads(space%threads_for(size(fine)))
+    i = fine_lattice%first(1)
+    last = i + size(fine, 1) - 1
+    !$omp parallel do schedule(static) private(j, c, below, above) num_threads(space%threads_for(size(fine)))
     do row = 1, size(fine, 2)
       j = fine_lattice%first(2) + row - 1
-      do col = 1, size(fine, 1)
-        i = fine_lattice%first(1) + col - 1
-        if (modulo(i, 2) == 0 .and. modulo(j, 2) == 0) then
-          fine(col, row) = at(i, j)
-        else if (modulo(j, 2) == 0) then
-          fine(col, row) = 0.5_wp*(at(i - 1, j) + at(i + 1, j))
-        else if (modulo(i, 2) == 0) then
-          fine(col, row) = 0.5_wp*(at(i, j - 1) + at(i, j + 1))
-        else
-          fine(col, row) = 0.5_wp*(at(i + 1, j - 1) + at(i - 1, j + 1))
-        end if
+      call take_row(coarse_lattice, coarse, floor_half(j), held, lbound(below, 1), below)
+      call take_row(coarse_lattice, coarse, floor_half(j + 1), held, lbound(above, 1), above)
+      do c = floor_half(i + 1), floor_half(last)
+        fine(2*c - i + 1, row) = 0.5_wp*(below(c) + above(c))
+      end do
+      do c = floor_half(i), floor_half(last - 1)
+        fine(2*c - i + 2, row) = 0.5_wp*(below(c + 1) + above(c))
       end do
     end do
     !$omp end parallel do
-
-  contains
-
-    !> Return the coarse value at an even fine node
-    pure real(wp) function at(fine_col, fine_row)
-      !> Absolute indices of the fine node
-      integer, intent(in) :: fine_col, fine_row
-      integer :: c(2)
-
-      c = [fine_col, fine_row]/2 - coarse_lattice%first + 1
-      if (held) c = min(max(c, 1), coarse_lattice%extent)
-      at = 0.0_wp
-      if (all(c >= 1) .and. all(c <= coarse_lattice%extent)) at = coarse(c(1), c(2))
-    end function at
-
   end subroutine prolong
+
+  !> Take a row of a coarse field, continued beyond its window.
+  pure subroutine take_row(lattice, field, row, held, first, values)
+    !> Coarse lattice and window, and field (n_col, n_row)
+    type(lattice_t), intent(in) :: lattice
+    real(wp), intent(in) :: field(:, :)
+    !> Index of the row, by the values at the rim, else by zero
+    integer, intent(in) :: row
+    logical, intent(in) :: held
+    !> Index of the first column that is wanted, and the values from there on
+    integer, intent(in) :: first
+    real(wp), intent(out) :: values(first:)
+    integer :: c, r
+
+    r = row - lattice%first(2) + 1
+    associate (start => lattice%first(1), n => shape(field))
+      if (held) then
+        do c = first, ubound(values, 1)
+          values(c) = field(min(max(c - start + 1, 1), n(1)), min(max(r, 1), n(2)))
+        end do
+        return
+      end if
+      values = 0.0_wp
+      if (r < 1 .or. r > n(2)) return
+      do c = max(first, start), min(ubound(values, 1), start + n(1) - 1)
+        values(c) = field(c - start + 1, r)
+      end do
+    end associate
+  end subroutine take_row
 
   !> Interpolate a pressure that falls to zero at its edge like the root of the distance.
   !>

@@ -9,10 +9,18 @@ module hc_active_set
   implicit none
   private
 
-  public :: active_set_t, new_active_set, paired_runs_t, pair_runs
+  public :: active_set_t, new_active_set, paired_runs_t, find_span
 
   !> Nodes that one thread looks through at a time.
   integer, parameter :: block_size = 8192
+
+  !> Runs of the active nodes of one field, cut where the same nodes of a second field become active or cease to be.
+  type :: paired_runs_t
+    !> First and last node of each run, and where it begins among the active nodes of both fields; 0: not active in the second
+    integer, allocatable :: first(:), last(:), place(:), second(:)
+    !> Number of active nodes of the first field
+    integer :: n_first = 0
+  end type paired_runs_t
 
   !> Runs of active nodes.
   type :: active_set_t
@@ -23,6 +31,8 @@ module hc_active_set
     integer, allocatable :: first(:), last(:)
     !> Where it begins among the active nodes
     integer, allocatable :: place(:)
+    !> The same of a field with two components, by `pair`
+    type(paired_runs_t) :: pairs
   contains
     !> The active nodes of a field
     procedure :: pack => pack_field
@@ -34,6 +44,8 @@ module hc_active_set
     procedure :: add => add_to_field
     !> Those of a part of the nodes
     procedure :: slice
+    !> Pair the components of a field that has two
+    procedure :: pair
     !> The nodes that are not active
     procedure :: complement
     !> The same nodes of several components
@@ -42,13 +54,46 @@ module hc_active_set
     procedure :: is_set
   end type active_set_t
 
-  !> Runs of the active nodes of one field, cut where the same nodes of a second field become active or cease to be.
-  type :: paired_runs_t
-    !> First and last node of each run, and where it begins among the active nodes of both fields; 0: not active in the second
-    integer, allocatable :: first(:), last(:), place(:), second(:)
-  end type paired_runs_t
+  !> Find the first and the last of some nodes, 1 and 0 if there are none: those that are active, or those with a value above zero
+  interface find_span
+    module procedure active_span, positive_span
+  end interface find_span
 
 contains
+
+  !> Find the first and the last active node.
+  pure subroutine active_span(active, low, high)
+    logical, intent(in), contiguous :: active(:)
+    integer, intent(out) :: low, high
+
+    high = size(active)
+    do while (high > 0)
+      if (active(high)) exit
+      high = high - 1
+    end do
+    low = 1
+    do while (low < high)
+      if (active(low)) exit
+      low = low + 1
+    end do
+  end subroutine active_span
+
+  !> Find the first and the last node with a value above zero.
+  pure subroutine positive_span(value, low, high)
+    real(wp), intent(in), contiguous :: value(:)
+    integer, intent(out) :: low, high
+
+    high = size(value)
+    do while (high > 0)
+      if (value(high) > 0.0_wp) exit
+      high = high - 1
+    end do
+    low = 1
+    do while (low < high)
+      if (value(low) > 0.0_wp) exit
+      low = low + 1
+    end do
+  end subroutine positive_span
 
   !> Find the runs of active nodes; they end at the ends of blocks, too.
   subroutine new_active_set(self, active, space)
@@ -255,6 +300,15 @@ contains
     call number_nodes(all_of_them)
   end function repeated
 
+  !> Pair the runs of two components; the nodes of the second one are a part of those of the first.
+  subroutine pair(self, n)
+    class(active_set_t), intent(inout) :: self
+    !> Number of nodes of both components
+    integer, intent(in) :: n
+
+    call pair_runs(self%slice(1, n/2), self%slice(n/2 + 1, n), self%pairs)
+  end subroutine pair
+
   !> Cut the runs of a set by those of a second one that is a part of it.
   pure subroutine pair_runs(one, second, runs)
     type(active_set_t), intent(in) :: one, second
@@ -294,6 +348,7 @@ contains
     runs%last = last(:n)
     runs%place = place(:n)
     runs%second = other(:n)
+    runs%n_first = one%n_active
   end subroutine pair_runs
 
   !> Count the nodes of the runs, and number them.

@@ -13,12 +13,25 @@ module hc_projected_cg
   use hc_error, only: error_t
   use hc_active_set, only: active_set_t
   use hc_conjugate_gradient, only: conjugate_gradient_t
-  use hc_field_space, only: field_space_t, sum_block
+  use hc_field_space, only: field_space_t
   use hc_linear_system, only: linear_system_t, invert_gram, solution_accurate, iterations_used_up, solution_broke_off
   implicit none
   private
 
   public :: projected_cg
+
+  !> Values that one thread treats at a time: few enough to stay in its cache while several passes go over them
+  integer, parameter :: block = 1024
+
+  interface
+    !> Compute a scalar product (BLAS)
+    pure real(wp) function ddot(n, dx, incx, dy, incy)
+      import :: wp
+      implicit none
+      integer, intent(in) :: n, incx, incy
+      real(wp), intent(in) :: dx(1 + (n - 1)*abs(incx)), dy(1 + (n - 1)*abs(incy))
+    end function ddot
+  end interface
 
 contains
 
@@ -55,84 +68,59 @@ contains
 
     !> Product of a direction, over all nodes
     real(wp), allocatable :: onto(:)
-    !> On the active nodes: rhs - A x; the residual, whose memory serves for the product of the direction, too; its
-    !> preconditioned projection; the direction
-    real(wp), allocatable :: left(:), r(:), z(:), d(:)
+    !> On the active nodes: the residual; its preconditioned projection, whose memory serves for the product of the
+    !> direction, too; the direction
+    real(wp), allocatable :: r(:), z(:), d(:)
     type(conjugate_gradient_t) :: recurrence
-    real(wp) :: step, largest
-    real(wp) :: inverse(size(b, 2), size(b, 2))
-    integer :: i, k, m, shift
+    real(wp) :: step, share, rz, largest
+    real(wp) :: change(size(b, 2)), along(size(b, 2)), inverse(size(b, 2), size(b, 2))
+    integer :: m
     type(field_space_t) :: space
     logical :: independent, anew
 
     space = system%space
     associate (n => nodes%n_active)
-      allocate (left(n), r(n), z(n), d(n))
+      allocate (r(n), z(n), d(n))
     end associate
-    call nodes%pack(rhs, left)
+    call find_difference(nodes, rhs, ax, r, space)
     deallocate (rhs)
-    call add_at_nodes(nodes, -1.0_wp, ax, left, space)
     allocate (onto(size(x)))
     call invert_gram(b, m_b, inverse, independent, space)
     iterations = 0
     largest = 0.0_wp
     outcome = iterations_used_up
-    multiplier = 0.0_wp
+    step = 0.0_wp
     do m = 1, size(multiplier)
-      multiplier(m) = -space%dot(b(:, m), left)/space%dot(b(:, m), b(:, m))
+      change(m) = -space%dot(b(:, m), r)/space%dot(b(:, m), b(:, m))
     end do
+    multiplier = change
     do
       ! The share of the constraints is taken out of the residual before it is
       ! preconditioned: it is the larger part by far, and its rounding errors would stay.
       ! The rest is normal to M B, so that the projected preconditioner is
       ! symmetric even if the given M B is only about M times B.
-      call constrained_residual(b, multiplier, left, r, residual, space)
-      if (size(multiplier) > 0) then
-        multiplier = multiplier - matmul(space%dots(m_b, r), inverse)
-        call constrained_residual(b, multiplier, left, r, residual, space)
-      end if
+      call advance_residual(-step, z, change, b, m_b, r, along, space)
+      change = -matmul(along, inverse)
+      multiplier = multiplier + change
+      call add_constraints(change, b, r, residual, space)
       largest = max(largest, residual)
       if (residual <= tolerance .or. iterations >= max_iterations) exit
       call system%precondition_packed(nodes, size(x), r, z, error)
       if (allocated(error)) return
-      call space%add_columns(m_b, -matmul(inverse, space%dots(b, z)), z)
-
-      call recurrence%last_share(space%dot(r, z), step, anew)
-      !$omp parallel do schedule(static) num_threads(space%threads)
-      do i = 1, size(d)
-        if (anew) then
-          d(i) = z(i)
-        else
-          d(i) = z(i) + step*d(i)
-        end if
-      end do
-      !$omp end parallel do
+      call project(-matmul(inverse, space%dots(b, z)), m_b, r, z, rz, space)
+      call recurrence%last_share(rz, share, anew)
+      call combine(1.0_wp, z, merge(0.0_wp, share, anew), d, space)
       call system%product_packed(nodes, d, onto, error)
       if (allocated(error)) return
-      associate (ad => r)
-        call nodes%pack(onto, ad)
-        step = recurrence%step_length(space%dot(d, ad))
-        if (.not. step > 0.0_wp) then
-          outcome = solution_broke_off
-          exit
-        end if
-        !$omp parallel num_threads(space%threads) private(i, shift)
-        !$omp do schedule(static)
-        do k = 1, size(nodes%first)
-          shift = nodes%place(k) - nodes%first(k)
-          do i = nodes%first(k), nodes%last(k)
-            x(i) = x(i) + step*d(i + shift)
-            left(i + shift) = left(i + shift) - step*ad(i + shift)
-          end do
-        end do
-        !$omp end do nowait
-        !$omp do schedule(static)
-        do i = 1, size(ax)
-          ax(i) = ax(i) + step*onto(i)
-        end do
-        !$omp end do
-        !$omp end parallel
-      end associate
+      call nodes%pack(onto, z)
+      step = recurrence%step_length(space%dot(d, z))
+      if (.not. step > 0.0_wp) then
+        outcome = solution_broke_off
+        exit
+      end if
+      call nodes%add(step, d, x)
+      call combine(step, onto, 1.0_wp, ax, space)
+      change = 0.0_wp
       iterations = iterations + 1
     end do
     call system%release()
@@ -142,15 +130,13 @@ contains
     if (present(drift)) drift = epsilon(1.0_wp)*largest
   end subroutine projected_cg
 
-  !> Add a multiple of the values of a field at the active nodes.
-  subroutine add_at_nodes(nodes, factor, field, packed, space)
+  !> Compute the difference of two fields at the active nodes.
+  subroutine find_difference(nodes, minuend, subtrahend, packed, space)
     !> Active nodes
     type(active_set_t), intent(in) :: nodes
-    !> The multiple
-    real(wp), intent(in) :: factor
-    !> Field over all nodes
-    real(wp), intent(in), contiguous :: field(:)
-    !> Values at the active nodes
+    !> Fields over all nodes
+    real(wp), intent(in), contiguous :: minuend(:), subtrahend(:)
+    !> Their difference at the active nodes
     real(wp), intent(inout), contiguous :: packed(:)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
@@ -160,22 +146,51 @@ contains
     do k = 1, size(nodes%first)
       shift = nodes%place(k) - nodes%first(k)
       do i = nodes%first(k), nodes%last(k)
-        packed(i + shift) = packed(i + shift) + factor*field(i)
+        packed(i + shift) = minuend(i) - subtrahend(i)
       end do
     end do
     !$omp end parallel do
-  end subroutine add_at_nodes
+  end subroutine find_difference
 
-  !> Compute r = rhs - A x + B m and its largest element.
-  subroutine constrained_residual(b, multiplier, left, r, largest, space)
-    !> Constraint vectors and multipliers
-    real(wp), intent(in), contiguous :: b(:, :)
-    real(wp), intent(in) :: multiplier(:)
-    !> rhs - A x
-    real(wp), intent(in), contiguous :: left(:)
+  !> Compute r <- r + step A d + B change, and C^T r.
+  subroutine advance_residual(step, ad, change, b, c, r, along, space)
+    !> Multiple of A d; 0: there is no A d yet
+    real(wp), intent(in) :: step
+    real(wp), intent(in), contiguous :: ad(:)
+    !> Change of the multipliers, B and C
+    real(wp), intent(in), contiguous :: change(:), b(:, :), c(:, :)
     !> Residual
     real(wp), intent(inout), contiguous :: r(:)
-    !> Its largest element
+    !> C^T r
+    real(wp), intent(out) :: along(:)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    real(wp) :: part(size(change), (size(r) + block - 1)/block)
+    integer :: k, m, from, to, n
+
+    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to, n)
+    do k = 1, size(part, 2)
+      from = (k - 1)*block + 1
+      to = min(k*block, size(r))
+      n = to - from + 1
+      if (abs(step) > 0.0_wp) call add_multiple(n, step, ad(from:to), r(from:to))
+      do m = 1, size(change)
+        if (abs(change(m)) > 0.0_wp) call add_multiple(n, change(m), b(from:to, m), r(from:to))
+      end do
+      do m = 1, size(change)
+        part(m, k) = ddot(n, c(from:to, m), 1, r(from:to), 1)
+      end do
+    end do
+    !$omp end parallel do
+    along = sum(part, dim=2)
+  end subroutine advance_residual
+
+  !> Compute r <- r + B change, and its largest element.
+  subroutine add_constraints(change, b, r, largest, space)
+    !> Change of the multipliers, and B
+    real(wp), intent(in), contiguous :: change(:), b(:, :)
+    !> Residual, and its largest element
+    real(wp), intent(inout), contiguous :: r(:)
     real(wp), intent(out) :: largest
     !> Space of the fields
     type(field_space_t), intent(in) :: space
@@ -183,21 +198,81 @@ contains
 
     largest = 0.0_wp
     !$omp parallel do schedule(static) num_threads(space%threads) private(i, m, to) reduction(max: largest)
-    do from = 1, size(r), sum_block
-      to = min(from + sum_block - 1, size(r))
-      do i = from, to
-        r(i) = left(i)
+    do from = 1, size(r), block
+      to = min(from + block - 1, size(r))
+      do m = 1, size(change)
+        call add_multiple(to - from + 1, change(m), b(from:to, m), r(from:to))
       end do
-      do m = 1, size(multiplier)
-        do i = from, to
-          r(i) = r(i) + multiplier(m)*b(i, m)
-        end do
-      end do
+      !$omp simd reduction(max: largest)
       do i = from, to
         largest = max(largest, abs(r(i)))
       end do
     end do
     !$omp end parallel do
-  end subroutine constrained_residual
+  end subroutine add_constraints
+
+  !> Project z <- z + M B share, and compute r^T z.
+  subroutine project(share, m_b, r, z, rz, space)
+    !> Shares of the constraints, and M B
+    real(wp), intent(in), contiguous :: share(:), m_b(:, :)
+    !> Residual, and its preconditioned projection
+    real(wp), intent(in), contiguous :: r(:)
+    real(wp), intent(inout), contiguous :: z(:)
+    !> r^T z
+    real(wp), intent(out) :: rz
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    real(wp) :: part((size(r) + block - 1)/block)
+    integer :: k, m, from, to
+
+    !$omp parallel do schedule(static) num_threads(space%threads) private(m, from, to)
+    do k = 1, size(part)
+      from = (k - 1)*block + 1
+      to = min(k*block, size(r))
+      do m = 1, size(share)
+        call add_multiple(to - from + 1, share(m), m_b(from:to, m), z(from:to))
+      end do
+      part(k) = ddot(to - from + 1, r(from:to), 1, z(from:to), 1)
+    end do
+    !$omp end parallel do
+    rz = sum(part)
+  end subroutine project
+
+  !> Compute y <- alpha x + beta y; where beta is 0, y need not be a number.
+  subroutine combine(alpha, x, beta, y, space)
+    real(wp), intent(in) :: alpha, beta
+    real(wp), intent(in), contiguous :: x(:)
+    real(wp), intent(inout), contiguous :: y(:)
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: i
+
+    if (abs(beta) > 0.0_wp) then
+      !$omp parallel do simd schedule(static) num_threads(space%threads)
+      do i = 1, size(x)
+        y(i) = alpha*x(i) + beta*y(i)
+      end do
+      !$omp end parallel do simd
+    else
+      !$omp parallel do simd schedule(static) num_threads(space%threads)
+      do i = 1, size(x)
+        y(i) = alpha*x(i)
+      end do
+      !$omp end parallel do simd
+    end if
+  end subroutine combine
+
+  !> Add a multiple of a vector to another.
+  pure subroutine add_multiple(n, factor, x, y)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: factor, x(n)
+    real(wp), intent(inout) :: y(n)
+    integer :: i
+
+    !$omp simd
+    do i = 1, n
+      y(i) = y(i) + factor*x(i)
+    end do
+  end subroutine add_multiple
 
 end module hc_projected_cg

@@ -25,6 +25,8 @@ module hc_preconditioner
     procedure(apply), deferred :: apply
     !> The same in single precision, and for the values at the active nodes alone
     procedure :: apply_single, apply_packed
+    !> Free what applications keep for the next one
+    procedure :: release
     !> Forget the active nodes, and free what was stored for them
     procedure :: clear
   end type preconditioner_t
@@ -94,6 +96,14 @@ contains
     call self%apply(given, wanted, work)
     call nodes%pack(wanted, traction)
   end subroutine apply_packed
+
+  !> Free what applications keep: by default nothing is kept.
+  subroutine release(self)
+    class(preconditioner_t), intent(inout) :: self
+
+    associate (nothing_of => self)
+    end associate
+  end subroutine release
 
   !> Forget the active nodes: by default nothing is stored for them.
   subroutine clear(self)

@@ -50,6 +50,8 @@ module hc_preconditioner_extension
     procedure :: extend
     !> The transpose: add what acts on the rings to the active nodes
     procedure :: fold
+    !> Set a field to zero on the rings
+    procedure :: erase
   end type edge_extension_t
 
 contains
@@ -347,6 +349,20 @@ contains
     end do
     !$omp end parallel
   end subroutine fold
+
+  !> Set a field to zero on the rings.
+  subroutine erase(self, field)
+    class(edge_extension_t), intent(in) :: self
+    !> Field over the window (n)
+    real(sp), intent(inout), contiguous :: field(:)
+    integer :: k
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do k = 1, size(self%node)
+      field(self%node(k)) = 0.0_sp
+    end do
+    !$omp end parallel do
+  end subroutine erase
 
   !> Sum over some places.
   pure real(sp) function sum_of(value, places)

@@ -22,7 +22,8 @@ module hc_symbol_preconditioner
   use hc_field_space, only: field_space_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_spectrum_cache, only: kernel_cache_t
-  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t, pair_runs
+  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
+  use hc_frame_rows, only: slip_to_plane, stick_to_plane, add_turned
   use hc_inverse_symbol, only: inverse_symbol_t, new_inverse_symbol, node_compliance
   use hc_preconditioner, only: preconditioner_t
   use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
@@ -42,6 +43,11 @@ module hc_symbol_preconditioner
     type(field_space_t) :: space
     !> Continuation of displacements beyond the contact; none before there are active nodes
     type(edge_extension_t), allocatable :: edge
+    !> Displacements, zero off the contact but for the rings of `edge`, and tractions in single precision; kept between the
+    !> applications of a solution
+    real(sp), allocatable :: given(:), wanted(:)
+  contains
+    procedure :: release
   end type symbol_preconditioner_t
 
   !> Approximate inverse of the normal flexibility.
@@ -59,10 +65,12 @@ module hc_symbol_preconditioner
     private
     !> Elastic compliance t_h of a node [m/Pa]
     real(wp) :: elastic_compliance = 0.0_wp
-    !> Compliance D along t, and direction e
-    real(wp), pointer, contiguous :: compliance(:) => null(), direction(:, :) => null()
-    !> Weights sqrt(chi) of each node in the inverse symbols without and with soft springs; is one of them not zero?
+    !> Direction e
+    real(wp), pointer, contiguous :: direction(:, :) => null()
+    !> On the nodes in contact: weights sqrt(chi) in the inverse symbols without and with soft springs, and what is left to the
+    !> springs, chi_3/D [Pa/m]; is one of the weights not zero?
     real(sp), allocatable :: weight(:, :)
+    real(wp), allocatable :: left(:)
     logical :: used(2) = .true.
     !> Nodes in contact
     type(active_set_t) :: nodes
@@ -138,9 +146,33 @@ contains
     !> The nodes
     logical, intent(in) :: active(extent(1), extent(2))
 
+    call self%release()
     if (.not. allocated(self%edge)) allocate (self%edge)
     call new_edge_extension(self%edge, active, self%space, self%options)
   end subroutine continue_beyond
+
+  !> Take memory for displacements, zero, and tractions.
+  subroutine take_memory(self, n)
+    class(symbol_preconditioner_t), intent(inout) :: self
+    !> Number of values
+    integer, intent(in) :: n
+    integer :: i
+
+    if (allocated(self%given)) return
+    allocate (self%given(n), self%wanted(n))
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do i = 1, n
+      self%given(i) = 0.0_sp
+    end do
+    !$omp end parallel do
+  end subroutine take_memory
+
+  !> Free it.
+  subroutine release(self)
+    class(symbol_preconditioner_t), intent(inout) :: self
+
+    if (allocated(self%given)) deallocate (self%given, self%wanted)
+  end subroutine release
 
   !> Estimate the pressure that causes a closing of the gap.
   subroutine apply_to_pressure(self, displacement, traction, work)
@@ -161,31 +193,23 @@ contains
     real(wp), intent(in), contiguous :: displacement(:)
     real(wp), intent(inout), contiguous :: traction(:)
     real(wp), intent(inout) :: work
-    real(sp), allocatable :: given(:), wanted(:)
     integer :: i, k, shift
 
-    allocate (given(n), wanted(n))
-    !$omp parallel num_threads(self%space%threads) private(i, shift)
-    !$omp do schedule(static)
-    do i = 1, n
-      given(i) = 0.0_sp
-    end do
-    !$omp end do
-    !$omp do schedule(static)
-    do k = 1, size(nodes%first)
-      shift = nodes%place(k) - nodes%first(k)
-      do i = nodes%first(k), nodes%last(k)
-        given(i) = real(displacement(i + shift)/self%unit, sp)
-      end do
-    end do
-    !$omp end do
-    !$omp end parallel
-    call self%apply_single(given, wanted, work)
+    call take_memory(self, n)
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
     do k = 1, size(nodes%first)
       shift = nodes%place(k) - nodes%first(k)
       do i = nodes%first(k), nodes%last(k)
-        traction(i + shift) = wanted(i)
+        self%given(i) = real(displacement(i + shift)/self%unit, sp)
+      end do
+    end do
+    !$omp end parallel do
+    call self%apply_single(self%given, self%wanted, work)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, shift)
+    do k = 1, size(nodes%first)
+      shift = nodes%place(k) - nodes%first(k)
+      do i = nodes%first(k), nodes%last(k)
+        traction(i + shift) = self%wanted(i)
       end do
     end do
     !$omp end parallel do
@@ -205,6 +229,8 @@ contains
   !> Forget the nodes in contact.
   subroutine clear_contact(self)
     class(pressure_preconditioner_t), intent(inout) :: self
+
+    call self%release()
     if (allocated(self%edge)) deallocate (self%edge)
   end subroutine clear_contact
 
@@ -213,24 +239,29 @@ contains
     class(shear_preconditioner_t), intent(inout) :: self
     logical, intent(in), contiguous :: active(:)
     real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
-    integer :: i, k
+    integer :: i, k, at
     logical :: known, used(2)
+    real(wp) :: share
 
-    self%compliance => compliance
     self%direction => direction
     known = allocated(self%weight)
     if (known) known = self%nodes%is_set(active)
     if (.not. known) then
       call continue_beyond(self, self%extent, active)
       call new_active_set(self%nodes, active, self%space)
+      if (allocated(self%weight)) deallocate (self%weight, self%left)
+      allocate (self%weight(self%nodes%n_active, 2), self%left(self%nodes%n_active))
     end if
-    if (.not. allocated(self%weight)) allocate (self%weight(size(active), 2))
     used = .false.
-    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i) reduction(.or.: used)
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, share) reduction(.or.: used)
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
-        self%weight(i, :) = real(blend(self%options, compliance(i)/self%elastic_compliance), sp)
-        used = used .or. self%weight(i, :) > 0.0_sp
+        at = self%nodes%place(k) + i - self%nodes%first(k)
+        self%weight(at, :) = real(blend(self%options, compliance(i)/self%elastic_compliance), sp)
+        used = used .or. self%weight(at, :) > 0.0_sp
+        share = 1.0_wp - sum(real(self%weight(at, :), wp)**2)
+        self%left(at) = 0.0_wp
+        if (share > rounding .and. compliance(i) > 0.0_wp) self%left(at) = share/compliance(i)
       end do
     end do
     !$omp end parallel do
@@ -247,6 +278,7 @@ contains
     real(wp), allocatable :: given(:), wanted(:)
 
     both = self%nodes%repeated(size(displacement)/2, 2)
+    call both%pair(size(displacement))
     allocate (given(both%n_active), wanted(both%n_active))
     call both%pack(displacement, given)
     call self%apply_packed(both, size(displacement), given, wanted, work)
@@ -261,102 +293,71 @@ contains
     real(wp), intent(in), contiguous :: displacement(:)
     real(wp), intent(inout), contiguous :: traction(:)
     real(wp), intent(inout) :: work
-    type(active_set_t) :: along_t, along_e
-    type(paired_runs_t) :: runs
-    !> Components along x and y
-    real(sp), allocatable :: given(:), wanted(:)
-    integer :: m, n_t
+    integer :: m, i
 
-    along_t = nodes%slice(1, n/2)
-    along_e = nodes%slice(n/2 + 1, n)
-    call pair_runs(along_t, along_e, runs)
-    n_t = along_t%n_active
-    call apply_springs(runs, self%space%threads, self%weight, self%compliance, displacement(:n_t), traction(:n_t))
-    traction(n_t + 1:) = 0.0_wp
-    allocate (given(n), wanted(n))
-    do m = 1, size(self%used)
-      if (.not. self%used(m)) cycle
-      call to_plane(runs, self%space%threads, self%direction, self%weight(:, m), self%unit, displacement(:n_t), &
-                    displacement(n_t + 1:), given)
-      if (m == 1) call self%inverse%apply_single(given, wanted, self%edge)
-      ! displacements on soft springs are not continued beyond the contact
-      if (m == 2) call self%inverse%apply_single(given, wanted, on_springs=.true.)
-      work = work + self%inverse%cost
-      call add_in_frames(runs, self%space%threads, self%direction, self%weight(:, m), wanted, traction(:n_t), &
-                         traction(n_t + 1:))
-    end do
+    call take_memory(self, n)
+    associate (runs => nodes%pairs, n_t => nodes%pairs%n_first, n_all => nodes%n_active)
+      !$omp parallel do simd schedule(static) num_threads(self%space%threads)
+      do i = 1, n_t
+        traction(i) = self%left(i)*displacement(i)
+      end do
+      !$omp end parallel do simd
+      call self%space%fill(traction(n_t + 1:n_all), 0.0_wp)
+      do m = 1, size(self%used)
+        if (.not. self%used(m)) cycle
+        call to_plane(runs, self%space%threads, self%direction, self%weight(:, m), self%unit, displacement(:n_t), &
+                      displacement(n_t + 1:n_all), self%given)
+        if (m == 1) then
+          call self%inverse%apply_single(self%given, self%wanted, self%edge)
+        else
+          ! displacements on soft springs are not continued beyond the contact
+          if (allocated(self%edge)) then
+            call self%edge%erase(self%given(:n/2))
+            call self%edge%erase(self%given(n/2 + 1:))
+          end if
+          call self%inverse%apply_single(self%given, self%wanted, on_springs=.true.)
+        end if
+        work = work + self%inverse%cost
+        call add_in_frames(runs, self%space%threads, self%direction, self%weight(:, m), self%wanted, traction(:n_t), &
+                           traction(n_t + 1:n_all))
+      end do
+    end associate
   end subroutine apply_to_shear_packed
 
   ! The arguments of the following procedures are no pointers, so that the compiler can exclude aliases.
 
-  !> Apply the part chi_3/D along t.
-  subroutine apply_springs(runs, threads, weight, compliance, displacement, traction)
-    !> Active nodes
-    type(paired_runs_t), intent(in) :: runs
-    integer, intent(in) :: threads
-    !> Weights of both inverse symbols (n, 2), compliance D (n)
-    real(sp), intent(in), contiguous :: weight(:, :)
-    real(wp), intent(in), contiguous :: compliance(:)
-    !> Displacement and traction along t, at the active nodes
-    real(wp), intent(in), contiguous :: displacement(:)
-    real(wp), intent(inout), contiguous :: traction(:)
-    real(wp) :: left
-    integer :: k, i, at
-
-    !$omp parallel do schedule(static) num_threads(threads) private(i, at, left)
-    do k = 1, size(runs%first)
-      do i = runs%first(k), runs%last(k)
-        at = runs%place(k) + i - runs%first(k)
-        left = 1.0_wp - sum(real(weight(i, :), wp)**2)
-        traction(at) = 0.0_wp
-        if (left > rounding .and. compliance(i) > 0.0_wp) traction(at) = left/compliance(i)*displacement(at)
-      end do
-    end do
-    !$omp end parallel do
-  end subroutine apply_springs
-
-  !> Weight a displacement and turn it to x and y, zero off the active nodes: its continuation beyond the contact is made afresh.
+  !> Weight a displacement and turn it to x and y; values off the active nodes stay.
   subroutine to_plane(runs, threads, direction, weight, unit, along_t, along_e, plane)
     !> Active nodes
     type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
-    !> Direction e (2, n), weight (n), and unit of the displacement
+    !> Direction e (2, n), weight at the active nodes, and unit of the displacement
     real(wp), intent(in), contiguous :: direction(:, :)
     real(sp), intent(in), contiguous :: weight(:)
     real(wp), intent(in) :: unit
     !> Displacement along t and e at the active nodes
     real(wp), intent(in), contiguous :: along_t(:), along_e(:)
     !> Displacement along x and y (2 n)
-    real(sp), intent(out), contiguous :: plane(:)
-    real(wp) :: t, e
-    integer :: n, k, i
+    real(sp), intent(inout), contiguous :: plane(:)
+    integer :: n, k, from, to, at, second
 
-    n = size(weight)
-    !$omp parallel num_threads(threads) private(i, t, e)
-    !$omp do schedule(static)
-    do i = 1, size(plane)
-      plane(i) = 0.0_sp
-    end do
-    !$omp end do
-    !$omp do schedule(static)
+    n = size(plane)/2
+    !$omp parallel do schedule(static) num_threads(threads) private(from, to, at, second)
     do k = 1, size(runs%first)
-      if (runs%second(k) == 0) then
-        do i = runs%first(k), runs%last(k)
-          t = weight(i)/unit*along_t(runs%place(k) + i - runs%first(k))
-          plane(i) = real(-direction(2, i)*t, sp)
-          plane(n + i) = real(direction(1, i)*t, sp)
-        end do
+      from = runs%first(k)
+      to = runs%last(k)
+      at = runs%place(k)
+      second = runs%second(k)
+      if (second == 0) then
+        call slip_to_plane(to - from + 1, direction(:, from:to), weight(at:at + to - from), 1.0_wp/unit, &
+                           along_t(at:at + to - from), plane(from:to), plane(n + from:n + to))
       else
-        do i = runs%first(k), runs%last(k)
-          t = weight(i)/unit*along_t(runs%place(k) + i - runs%first(k))
-          e = weight(i)/unit*along_e(runs%second(k) + i - runs%first(k))
-          plane(i) = real(-direction(2, i)*t + direction(1, i)*e, sp)
-          plane(n + i) = real(direction(1, i)*t + direction(2, i)*e, sp)
-        end do
+        call stick_to_plane(to - from + 1, direction(:, from:to), weight(at:at + to - from), 1.0_wp/unit, &
+                            along_t(at:at + to - from), along_e(second:second + to - from), plane(from:to), &
+                            plane(n + from:n + to))
       end if
     end do
-    !$omp end do
-    !$omp end parallel
+    !$omp end parallel do
   end subroutine to_plane
 
   !> Add a weighted traction along x and y to one in the frames.
@@ -364,26 +365,25 @@ contains
     !> Active nodes
     type(paired_runs_t), intent(in) :: runs
     integer, intent(in) :: threads
-    !> Direction e (2, n) and weight (n)
+    !> Direction e (2, n), and weight at the active nodes
     real(wp), intent(in), contiguous :: direction(:, :)
     real(sp), intent(in), contiguous :: weight(:)
     !> Traction along x and y (2 n), and along t and e at the active nodes
     real(sp), intent(in), contiguous :: plane(:)
     real(wp), intent(inout), contiguous :: along_t(:), along_e(:)
-    integer :: n, k, i, at
+    integer :: n, k, from, to, at, second
 
-    n = size(weight)
-    !$omp parallel do schedule(static) num_threads(threads) private(i, at)
+    n = size(plane)/2
+    !$omp parallel do schedule(static) num_threads(threads) private(from, to, at, second)
     do k = 1, size(runs%first)
-      do i = runs%first(k), runs%last(k)
-        at = runs%place(k) + i - runs%first(k)
-        along_t(at) = along_t(at) + weight(i)*(-direction(2, i)*plane(i) + direction(1, i)*plane(n + i))
-      end do
-      if (runs%second(k) == 0) cycle
-      do i = runs%first(k), runs%last(k)
-        at = runs%second(k) + i - runs%first(k)
-        along_e(at) = along_e(at) + weight(i)*(direction(1, i)*plane(i) + direction(2, i)*plane(n + i))
-      end do
+      from = runs%first(k)
+      to = runs%last(k)
+      at = runs%place(k)
+      second = runs%second(k)
+      call add_turned(to - from + 1, -1.0_wp, direction(:, from:to), weight(at:at + to - from), plane(n + from:n + to), &
+                      plane(from:to), along_t(at:at + to - from))
+      if (second > 0) call add_turned(to - from + 1, 1.0_wp, direction(:, from:to), weight(at:at + to - from), plane(from:to), &
+                                      plane(n + from:n + to), along_e(second:second + to - from))
     end do
     !$omp end parallel do
   end subroutine add_in_frames
@@ -392,10 +392,10 @@ contains
   subroutine clear_sheared(self)
     class(shear_preconditioner_t), intent(inout) :: self
 
-    self%compliance => null()
     self%direction => null()
+    call self%release()
     if (allocated(self%edge)) deallocate (self%edge)
-    if (allocated(self%weight)) deallocate (self%weight)
+    if (allocated(self%weight)) deallocate (self%weight, self%left)
   end subroutine clear_sheared
 
   !> Compute sqrt(chi) of the inverse symbols without and with soft springs; the rest of the squares belongs to 1/D.

@@ -441,6 +441,7 @@ contains
       image = 0.0_wp
       rhs = merge(1.0_wp, 0.0_wp, active)
       call new_active_set(nodes, active, system%space)
+      call nodes%pair(2*n)
       call projected_cg(system, nodes, none(:nodes%n_active, :), m_none(:nodes%n_active, :), rhs, unknown, &
                         image, 1.0e-6_wp, 100, no_multiplier, residual, iterations, outcome, error)
       if (allocated(error)) return

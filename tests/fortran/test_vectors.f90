@@ -6,7 +6,7 @@ module test_vectors
   use hc_lapack, only: eliminate
   use hc_coulomb, only: coulomb_t
   use hc_disc_law, only: cone_row, linearize, on_cone, residual_row, zone_row
-  use hc_shear_system, only: slip_compliance_row
+  use hc_frame_rows, only: slip_compliance_row
   use hc_contact_state, only: separated
   use hc_active_set, only: active_set_t, new_active_set
   use testing, only: test_t, new_test, check, check_true, largest

@@ -3,6 +3,7 @@
 !> Equations: docs/theory/residuals.md, (R1) to (R4).
 module hc_contact_residuals
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use, intrinsic :: iso_fortran_env, only: int64
   use hc_precision, only: wp
   use hc_pyramid_influence, only: pyramid_t, new_pyramid, k_1, k_xx, k_xy
   use hc_lattice, only: lattice_t
@@ -22,6 +23,9 @@ module hc_contact_residuals
 
   !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
   real(wp), parameter :: least_traction = 1.0e-3_wp
+  !> Of the bits of a number, shifted by one: all but the sign, the last one of the exponent, and the one above it
+  integer, parameter :: above = 62
+  integer(int64), parameter :: no_sign = 2_int64**above - 1, one_more = 2_int64**51
 
 contains
 
@@ -87,7 +91,7 @@ contains
   !> negative, and else infinite; so it is where a number is not finite, which a maximum would hide.
   real(wp) function normal_residual(pressure, gap, candidate, compliance, space, law)
     !> Pressure [Pa] and gap [m]
-    real(wp), intent(in) :: pressure(:, :), gap(:, :)
+    real(wp), intent(in), contiguous :: pressure(:, :), gap(:, :)
     !> Nodes that may come into contact
     logical, intent(in), contiguous :: candidate(:, :)
     !> Self-compliance d_n [m/Pa]
@@ -96,35 +100,41 @@ contains
     type(field_space_t), intent(in) :: space
     !> Law of contact; absent: unilateral contact
     class(normal_law_t), intent(in), optional :: law
-    class(normal_law_t), allocatable :: actual
-    real(wp), dimension(size(pressure, 1)) :: p, g
-    real(wp) :: p_max, worst
-    integer :: col, row, n_wrong
+    type(unilateral_t) :: unilateral
+    real(wp) :: g(size(pressure, 1)), p_max, worst
+    integer(int64) :: found
+    integer :: col, row, first
+    logical :: wrong
 
-    if (present(law)) then
-      allocate (actual, source=law)
-    else
-      allocate (unilateral_t :: actual)
-    end if
     p_max = 0.0_wp
     worst = 0.0_wp
-    n_wrong = 0
-    !$omp parallel do schedule(static) num_threads(space%threads) private(col, p, g) reduction(max: p_max, worst) &
-    !$omp& reduction(+: n_wrong)
+    wrong = .false.
+    !$omp parallel do schedule(static) num_threads(space%threads) private(col, first, g, found) reduction(max: p_max, worst) &
+    !$omp& reduction(.or.: wrong)
     do row = 1, size(pressure, 2)
-      !$omp simd reduction(max: p_max) reduction(+: n_wrong)
+      ! a comparison with NaN may be trapped: numbers are not finite where one more overflows the exponent
+      found = 0_int64
+      !$omp simd reduction(ior: found)
       do col = 1, size(pressure, 1)
-        ! a comparison with NaN may be trapped
-        p(col) = merge(pressure(col, row), 0.0_wp, ieee_is_finite(pressure(col, row)))
-        g(col) = merge(gap(col, row), 0.0_wp, ieee_is_finite(gap(col, row)))
-        p_max = max(p_max, p(col))
-        n_wrong = n_wrong + merge(0, 1, ieee_is_finite(pressure(col, row)) .and. &
-                                  (ieee_is_finite(gap(col, row)) .or. .not. candidate(col, row)))
+        g(col) = merge(gap(col, row), 0.0_wp, candidate(col, row))
+        found = ior(found, iand(shiftr(transfer(g(col), found), 1), no_sign) + one_more)
+        found = ior(found, iand(shiftr(transfer(pressure(col, row), found), 1), no_sign) + one_more)
       end do
-      call actual%violation((row - 1)*size(pressure, 1) + 1, compliance, p, g, candidate(:, row), worst)
+      wrong = wrong .or. btest(found, above)
+      if (btest(found, above)) cycle
+      !$omp simd reduction(max: p_max)
+      do col = 1, size(pressure, 1)
+        p_max = max(p_max, pressure(col, row))
+      end do
+      first = (row - 1)*size(pressure, 1) + 1
+      if (present(law)) then
+        call law%violation(first, compliance, pressure(:, row), g, candidate(:, row), worst)
+      else
+        call unilateral%violation(first, compliance, pressure(:, row), g, candidate(:, row), worst)
+      end if
     end do
     !$omp end parallel do
-    if (n_wrong > 0) then
+    if (wrong) then
       normal_residual = huge(1.0_wp)
     else if (p_max > 0.0_wp) then
       normal_residual = worst/p_max

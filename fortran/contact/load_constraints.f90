@@ -10,6 +10,7 @@ module hc_load_constraints
   use hc_precision, only: wp, pi
   use hc_lapack, only: eliminate
   use hc_field_space, only: field_space_t
+  use hc_active_set, only: find_span
   use hc_contact_state, only: load_target_t, stick, slip, normal, along_x, along_y, about_z, n_motion, force_control
   use hc_contact_problem, only: friction_problem_t
   implicit none
@@ -46,19 +47,24 @@ contains
     type(load_target_t), intent(in) :: target
     !> Nodes in contact (n_col, n_row)
     logical, intent(in) :: contact(problem%lattice%extent(1), problem%lattice%extent(2))
+    !> Nodes of each row, and the sum of their columns
     real(wp), dimension(size(contact, 2)) :: nodes, columns
-    real(wp) :: middle(2)
-    integer :: n_contact, row, col
+    real(wp) :: middle(2), n_row, in_row
+    integer :: n_contact, row, col, low, high
 
     associate (control => target%control, space => problem%space, lattice => problem%lattice)
-      !$omp parallel do schedule(static) num_threads(space%threads) private(col)
+      !$omp parallel do schedule(static) num_threads(space%threads) private(col, low, high, n_row, in_row)
       do row = 1, size(contact, 2)
-        nodes(row) = 0.0_wp
-        columns(row) = 0.0_wp
-        do col = 1, size(contact, 1)
-          nodes(row) = nodes(row) + merge(1.0_wp, 0.0_wp, contact(col, row))
-          columns(row) = columns(row) + merge(real(col, wp), 0.0_wp, contact(col, row))
+        call find_span(contact(:, row), low, high)
+        n_row = 0.0_wp
+        in_row = 0.0_wp
+        !$omp simd reduction(+: n_row, in_row)
+        do col = low, high
+          n_row = n_row + merge(1.0_wp, 0.0_wp, contact(col, row))
+          in_row = in_row + col*merge(1.0_wp, 0.0_wp, contact(col, row))
         end do
+        nodes(row) = n_row
+        columns(row) = in_row
       end do
       !$omp end parallel do
       n_contact = max(nint(sum(nodes)), 1)

@@ -188,12 +188,14 @@ contains
     real(wp), intent(in), contiguous :: p(:), gap(:)
     logical, intent(in), contiguous :: candidate(:)
     real(wp), intent(inout) :: worst
+    real(wp) :: stiffness
     integer :: i
 
+    stiffness = 1.0_wp/compliance
     associate (law => self, same_everywhere => first)
       !$omp simd reduction(max: worst)
       do i = 1, size(p)
-        worst = max(worst, merge(abs(min(p(i), gap(i)/compliance)), 0.0_wp, candidate(i)))
+        worst = max(worst, abs(min(p(i), stiffness*gap(i)))*merge(1.0_wp, 0.0_wp, candidate(i)))
       end do
     end associate
   end subroutine unilateral_violation

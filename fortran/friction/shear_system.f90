@@ -230,6 +230,7 @@ contains
     integer :: n, k, from, to
 
     n = size(self%compliance)
+    call self%release()
     call take_from(self)
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(from, to)
     do k = 1, size(self%nodes%first)

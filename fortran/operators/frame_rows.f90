@@ -1,7 +1,7 @@
 !> Passes over nodes that follow each other in a row, between components along x and y and those in the frames of the nodes.
 !>
 !> A node in contact has a frame: its direction e, and t = (-e_2, e_1). Arguments have explicit shapes and do not overlap, so
-!> that the compiler takes several nodes at a time.
+!> that the compiler takes several nodes at a time; conditions are factors of 0 or 1, or it would compute in branches.
 module hc_frame_rows
   use hc_precision, only: wp, sp
   implicit none
@@ -97,15 +97,16 @@ contains
     real(wp), intent(in) :: compliance(n), ux(n), uy(n)
     !> Tractions if all nodes stuck, and what is left of them
     real(wp), intent(inout) :: qx(n), qy(n)
-    real(wp) :: moved, stretch, left
+    real(wp) :: moved, stretch, left, sprung
     integer :: i
 
-    !$omp simd private(moved, stretch, left)
+    !$omp simd private(moved, stretch, left, sprung)
     do i = 1, n
       ! what the spring gives way under that traction
       stretch = compliance(i)*sqrt(qx(i)**2 + qy(i)**2)
       moved = sqrt(ux(i)**2 + uy(i)**2)
-      left = merge(moved/max(moved + stretch, nothing), 1.0_wp, stretch > 0.0_wp)
+      sprung = merge(1.0_wp, 0.0_wp, stretch > 0.0_wp)
+      left = sprung*(moved/max(moved + stretch, nothing)) + (1.0_wp - sprung)
       qx(i) = left*qx(i)
       qy(i) = left*qy(i)
     end do

@@ -20,6 +20,7 @@ module hc_preconditioner_extension
   use hc_options, only: preconditioner_options_t
   use hc_lattice, only: neighbors
   use hc_field_space, only: field_space_t
+  use hc_active_set, only: find_span
   implicit none
   private
 
@@ -39,8 +40,8 @@ module hc_preconditioner_extension
     integer, allocatable :: inner(:, :), n_inner(:)
     !> Neighbours in the same ring and the node itself, as places in the list (7, n), and how many they are
     integer, allocatable :: beside(:, :), n_beside(:)
-    !> Fall from ring to ring over the number of neighbors in the ring before
-    real(sp), allocatable :: fall(:)
+    !> Fall from ring to ring over the number of neighbors in the ring before; 1 over the number of those in the same ring
+    real(sp), allocatable :: fall(:), mean(:)
     !> Times that a ring is smoothed
     integer :: smoothings = 0
     !> Space of the rings
@@ -72,13 +73,14 @@ contains
     integer, allocatable :: mark(:)
     integer, allocatable :: frontier(:), next(:), node(:)
     integer :: n_ring, n_col, width, step(6), n_active, r, n, k
+    real(wp) :: fall
 
     n_col = size(active, 1)
     width = n_col + 2
     step = neighbors(1, :) + width*neighbors(2, :)
     call mark_window(active, space, mark)
     n_active = space%count(active)
-    call find_edge(mark, step, shape(active), space, frontier)
+    call find_edge(active, mark, step, space, frontier)
     n_ring = 0
     if (size(frontier) > 0) then
       n_ring = min(options%max_rings, int(options%ring_factor*(real(n_active, wp)/size(frontier))**options%ring_power))
@@ -97,16 +99,19 @@ contains
     n_ring = size(self%ring) - 1
     self%smoothings = options%smoothings
     if (n >= worth_sharing) self%space = space
-    allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%inner(6, n), self%beside(7, n))
-    !$omp parallel num_threads(self%space%threads) private(r, k)
+    allocate (self%node(n), self%n_inner(n), self%n_beside(n), self%fall(n), self%mean(n), self%inner(6, n), &
+              self%beside(7, n))
+    !$omp parallel num_threads(self%space%threads) private(r, k, fall)
     do r = 1, n_ring
+      fall = profile(r, n_ring)/profile(r - 1, n_ring)
       !$omp do schedule(static)
       do k = self%ring(r), self%ring(r + 1) - 1
         call list_neighbors(node(k), step, mark, self%ring(r), self%ring(r + 1), self%inner(:, k), self%beside(:, k), &
                             self%n_inner(k), self%n_beside(k))
         self%node(k) = in_window(node(k))
         self%inner(:self%n_inner(k), k) = in_window(self%inner(:self%n_inner(k), k))
-        self%fall(k) = real(profile(r, n_ring)/profile(r - 1, n_ring)/self%n_inner(k), sp)
+        self%mean(k) = 1.0_sp/self%n_beside(k)
+        self%fall(k) = real(fall/self%n_inner(k), sp)
       end do
       !$omp end do nowait
     end do
@@ -156,46 +161,70 @@ contains
   end function profile
 
   !> Find the active nodes with a neighbor that is not; a node at the rim of the window has none there.
-  subroutine find_edge(mark, step, extent, space, edge)
+  subroutine find_edge(active, mark, step, space, edge)
+    !> Active nodes (n_col, n_row)
+    logical, intent(in), contiguous :: active(:, :)
     !> Marks of all nodes, and steps to the neighbors of a node
-    integer, intent(in) :: mark(:), step(6)
-    !> Number of columns and rows of the window
-    integer, intent(in) :: extent(2)
+    integer, intent(in), contiguous :: mark(:)
+    integer, intent(in) :: step(6)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> The nodes, as places in the marks
     integer, allocatable, intent(out) :: edge(:)
+    integer :: before(size(active, 2) + 1), row
 
-    type :: list_t
-      integer, allocatable :: node(:)
-    end type list_t
-    type(list_t) :: found(extent(2))
-    integer :: is_edge(extent(1)), first(extent(2) + 1), col, row, k, place
-
-    !$omp parallel do schedule(static) num_threads(space%threads) private(is_edge, col, k, place)
-    do row = 1, extent(2)
-      place = row*(extent(1) + 2) + 1
-      is_edge = 0
-      do k = 1, size(step)
-        do col = 1, extent(1)
-          is_edge(col) = merge(1, is_edge(col), mark(place + col + step(k)) == free)
-        end do
-      end do
-      do col = 1, extent(1)
-        is_edge(col) = merge(is_edge(col), 0, mark(place + col) == 0)
-      end do
-      found(row)%node = pack([(place + col, col=1, extent(1))], is_edge == 1)
+    before(1) = 0
+    !$omp parallel do schedule(static) num_threads(space%threads)
+    do row = 1, size(active, 2)
+      call list_edge(active(:, row), mark, step, row*(size(active, 1) + 2) + 1, before(row + 1))
     end do
     !$omp end parallel do
-    first(1) = 1
-    do row = 1, extent(2)
-      first(row + 1) = first(row) + size(found(row)%node)
+    do row = 1, size(active, 2)
+      before(row + 1) = before(row) + before(row + 1)
     end do
-    allocate (edge(first(extent(2) + 1) - 1))
-    do row = 1, extent(2)
-      edge(first(row):first(row + 1) - 1) = found(row)%node
+    allocate (edge(before(size(before))))
+    !$omp parallel do schedule(static) num_threads(space%threads)
+    do row = 1, size(active, 2)
+      if (before(row) == before(row + 1)) cycle
+      call list_edge(active(:, row), mark, step, row*(size(active, 1) + 2) + 1, node=edge(before(row) + 1:before(row + 1)))
     end do
+    !$omp end parallel do
   end subroutine find_edge
+
+  !> Count or list the nodes of a row at the edge.
+  pure subroutine list_edge(active, mark, step, before, n, node)
+    !> Active nodes of the row
+    logical, intent(in), contiguous :: active(:)
+    !> Marks of all nodes, steps to the neighbors of a node, and the place in the marks before the row
+    integer, intent(in), contiguous :: mark(:)
+    integer, intent(in) :: step(6), before
+    !> Number of nodes at the edge, and the nodes
+    integer, intent(out), optional :: n, node(:)
+    integer :: is_edge(size(active)), col, k, low, high, found
+
+    call find_span(active, low, high)
+    do col = low, high
+      is_edge(col) = 0
+    end do
+    do k = 1, size(step)
+      do col = low, high
+        is_edge(col) = merge(1, is_edge(col), mark(before + col + step(k)) == free)
+      end do
+    end do
+    found = 0
+    do col = low, high
+      is_edge(col) = merge(is_edge(col), 0, active(col))
+      found = found + is_edge(col)
+    end do
+    if (present(n)) n = found
+    if (.not. present(node)) return
+    found = 0
+    do col = low, high
+      if (is_edge(col) == 0) cycle
+      found = found + 1
+      node(found) = before + col
+    end do
+  end subroutine list_edge
 
   !> Find the nodes next to a ring that have no ring yet.
   pure subroutine next_ring(ring, step, mark, listed, next)
@@ -271,29 +300,29 @@ contains
     !$omp parallel num_threads(self%space%threads) private(r, k, s)
     do r = 1, size(self%ring) - 1
       associate (from => self%ring(r), to => self%ring(r + 1) - 1)
-        !$omp do schedule(static)
-        do k = from, to
-          value(k) = self%fall(k)*sum_of(field, self%inner(:self%n_inner(k), k))
-          if (r == 1 .and. present(first)) value(k) = first*value(k)
-        end do
-        !$omp end do
-        do s = 1, self%smoothings
+        call add_up(from, to, self%inner, self%n_inner, field, value, self%fall)
+        if (r == 1 .and. present(first)) then
           !$omp do schedule(static)
           do k = from, to
-            smooth(k) = sum_of(value, self%beside(:self%n_beside(k), k))/self%n_beside(k)
+            value(k) = first*value(k)
           end do
           !$omp end do
+        end if
+        do s = 1, self%smoothings
+          call add_up(from, to, self%beside, self%n_beside, value, smooth, self%mean)
           !$omp do schedule(static)
           do k = from, to
             value(k) = smooth(k)
-            if (.not. present(own)) field(self%node(k)) = smooth(k)
           end do
           !$omp end do
         end do
-        if (.not. present(own)) cycle
         !$omp do schedule(static)
         do k = from, to
-          field(self%node(k)) = field(self%node(k)) + (1.0_sp - own(self%node(k)))*value(k)
+          if (present(own)) then
+            field(self%node(k)) = field(self%node(k)) + (1.0_sp - own(self%node(k)))*value(k)
+          else
+            field(self%node(k)) = value(k)
+          end if
         end do
         !$omp end do
       end associate
@@ -328,14 +357,10 @@ contains
         do s = 1, self%smoothings
           !$omp do schedule(static)
           do k = from, to
-            share(k) = value(k)/self%n_beside(k)
+            share(k) = self%mean(k)*value(k)
           end do
           !$omp end do
-          !$omp do schedule(static)
-          do k = from, to
-            value(k) = sum_of(share, self%beside(:self%n_beside(k), k))
-          end do
-          !$omp end do
+          call add_up(from, to, self%beside, self%n_beside, share, value)
         end do
         ! several nodes add to the same neighbor, always in the same order
         !$omp single
@@ -364,16 +389,30 @@ contains
     !$omp end parallel do
   end subroutine erase
 
-  !> Sum over some places.
-  pure real(sp) function sum_of(value, places)
+  !> Sum at nodes of a ring over some places, by the threads of a parallel region.
+  subroutine add_up(from, to, places, n_places, value, total, factor)
+    !> First and last node
+    integer, intent(in) :: from, to
+    !> Places of each node, and how many they are
+    integer, intent(in), contiguous :: places(:, :), n_places(:)
+    !> Values at the places, and their sums
     real(sp), intent(in), contiguous :: value(:)
-    integer, intent(in), contiguous :: places(:)
-    integer :: i
+    real(sp), intent(inout), contiguous :: total(:)
+    !> Factor of each sum; absent: 1
+    real(sp), intent(in), contiguous, optional :: factor(:)
+    real(sp) :: one
+    integer :: k, i
 
-    sum_of = 0.0_sp
-    do i = 1, size(places)
-      sum_of = sum_of + value(places(i))
+    !$omp do schedule(static)
+    do k = from, to
+      one = 0.0_sp
+      do i = 1, n_places(k)
+        one = one + value(places(i, k))
+      end do
+      if (present(factor)) one = factor(k)*one
+      total(k) = one
     end do
-  end function sum_of
+    !$omp end do
+  end subroutine add_up
 
 end module hc_preconditioner_extension

@@ -257,11 +257,15 @@ contains
     do k = 1, size(self%nodes%first)
       do i = self%nodes%first(k), self%nodes%last(k)
         at = self%nodes%place(k) + i - self%nodes%first(k)
-        self%weight(at, :) = real(blend(self%options, compliance(i)/self%elastic_compliance), sp)
+        if (compliance(i) > 0.0_wp) then
+          self%weight(at, :) = real(blend(self%options, compliance(i)/self%elastic_compliance), sp)
+          share = 1.0_wp - sum(real(self%weight(at, :), wp)**2)
+          self%left(at) = merge(share/compliance(i), 0.0_wp, share > rounding)
+        else
+          self%weight(at, :) = [1.0_sp, 0.0_sp]
+          self%left(at) = 0.0_wp
+        end if
         used = used .or. self%weight(at, :) > 0.0_sp
-        share = 1.0_wp - sum(real(self%weight(at, :), wp)**2)
-        self%left(at) = 0.0_wp
-        if (share > rounding .and. compliance(i) > 0.0_wp) self%left(at) = share/compliance(i)
       end do
     end do
     !$omp end parallel do

@@ -1,17 +1,14 @@
 !> Displacements continued beyond the edge of a contact, for a better preconditioner.
 !>
-!> The inverse K^-1 of the flexibility over the whole lattice is cheap by FFT. The
-!> inverse of its part on the active nodes is that of the whole, minimised over
-!> what the displacement may be elsewhere:
+!> The inverse K^-1 of the flexibility over the whole lattice is cheap by FFT. The inverse of its part on the active nodes is that
+!> of the whole, minimised over what the displacement may be elsewhere:
 !>
 !>     r^T (K_CC)^-1 r = min over all continuations u of r of u^T K^-1 u,
 !>
-!> because no traction acts outside. Any linear continuation E thus gives a symmetric
-!> preconditioner E^T K^-1 E >= (K_CC)^-1, the better the closer E comes to the
-!> minimum; zero outside is the plainest. Beyond the edge of a loaded region the
-!> surface falls off like the root of the distance, and long waves along the edge fall off less.
-!> Here each ring of nodes around the active ones takes the
-!> mean of its neighbors in the ring before, smoothed along the ring, and falls off like
+!> because no traction acts outside. Any linear continuation E thus gives a symmetric preconditioner E^T K^-1 E >= (K_CC)^-1,
+!> the better the closer E comes to the minimum; zero outside is the plainest. Beyond the edge of a loaded region the surface
+!> falls off like the root of the distance, and long waves along the edge fall off less. Here each ring of nodes around the
+!> active ones takes the mean of its neighbors in the ring before, smoothed along the ring, and falls off like
 !> 1 - sqrt(ring/(rings + 1)).
 !>
 !> Equations: docs/theory/preconditioner.md, (P2), (P3).
@@ -340,20 +337,22 @@ contains
     !> Height of the continuation in the first ring; absent: 1
     real(sp), intent(in), optional :: first
     real(sp), allocatable :: value(:), share(:)
-    integer :: r, k, s, i
+    integer :: r, k, s
 
     if (.not. allocated(self%node)) return
     allocate (value(size(self%node)), share(size(self%node)))
-    !$omp parallel num_threads(self%space%threads) private(r, k, s, i)
+    !$omp parallel num_threads(self%space%threads) private(r, k, s)
     do r = size(self%ring) - 1, 1, -1
       associate (from => self%ring(r), to => self%ring(r + 1) - 1)
-        !$omp do schedule(static)
-        do k = from, to
-          value(k) = field(self%node(k))
-          if (present(own)) value(k) = (1.0_sp - own(self%node(k)))*value(k)
-          if (r == 1 .and. present(first)) value(k) = first*value(k)
-        end do
-        !$omp end do
+        call take_up(from, to, self%node, field, value)
+        if (present(own) .or. (r == 1 .and. present(first))) then
+          !$omp do schedule(static)
+          do k = from, to
+            if (present(own)) value(k) = (1.0_sp - own(self%node(k)))*value(k)
+            if (r == 1 .and. present(first)) value(k) = first*value(k)
+          end do
+          !$omp end do
+        end if
         do s = 1, self%smoothings
           !$omp do schedule(static)
           do k = from, to
@@ -362,13 +361,8 @@ contains
           !$omp end do
           call add_up(from, to, self%beside, self%n_beside, share, value)
         end do
-        ! several nodes add to the same neighbor, always in the same order
         !$omp single
-        do k = from, to
-          do i = 1, self%n_inner(k)
-            field(self%inner(i, k)) = field(self%inner(i, k)) + self%fall(k)*value(k)
-          end do
-        end do
+        call spread_out(from, to, self%inner, self%n_inner, self%fall, value, field)
         !$omp end single
       end associate
     end do
@@ -388,6 +382,44 @@ contains
     end do
     !$omp end parallel do
   end subroutine erase
+
+  !> Take the values of a field at the nodes of a ring, by the threads of a parallel region.
+  subroutine take_up(from, to, node, field, value)
+    !> First and last node
+    integer, intent(in) :: from, to
+    !> Their places in the field
+    integer, intent(in), contiguous :: node(:)
+    real(sp), intent(in), contiguous :: field(:)
+    !> The values
+    real(sp), intent(inout), contiguous :: value(:)
+    integer :: k
+
+    !$omp do schedule(static)
+    do k = from, to
+      value(k) = field(node(k))
+    end do
+    !$omp end do
+  end subroutine take_up
+
+  !> Add values at the nodes of a ring to some places of a field; several nodes to the same one, always in the same order.
+  pure subroutine spread_out(from, to, places, n_places, factor, value, field)
+    !> First and last node
+    integer, intent(in) :: from, to
+    !> Places of each node, and how many they are
+    integer, intent(in), contiguous :: places(:, :), n_places(:)
+    !> Values and their factors
+    real(sp), intent(in), contiguous :: factor(:), value(:)
+    real(sp), intent(inout), contiguous :: field(:)
+    real(sp) :: one
+    integer :: k, i
+
+    do k = from, to
+      one = factor(k)*value(k)
+      do i = 1, n_places(k)
+        field(places(i, k)) = field(places(i, k)) + one
+      end do
+    end do
+  end subroutine spread_out
 
   !> Sum at nodes of a ring over some places, by the threads of a parallel region.
   subroutine add_up(from, to, places, n_places, value, total, factor)

@@ -1,14 +1,16 @@
 !> Fields and packed ones: whatever the number of threads, the same bits.
 module test_vectors
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf, ieee_negative_inf
   use hc_precision, only: wp, sp
   use hc_field_space, only: field_space_t, space_over, most_threads
   use hc_error, only: error_t
   use hc_lapack, only: eliminate
   use hc_coulomb, only: coulomb_t
   use hc_disc_law, only: cone_row, linearize, on_cone, residual_row, zone_row
-  use hc_frame_rows, only: slip_compliance_row
-  use hc_contact_state, only: separated
-  use hc_active_set, only: active_set_t, new_active_set
+  use hc_frame_rows, only: slip_compliance_row, turn_row, plane_row, add_springs_row, take_off_row
+  use hc_contact_residuals, only: normal_residual
+  use hc_contact_state, only: separated, stick, slip
+  use hc_active_set, only: active_set_t, new_active_set, find_span
   use testing, only: test_t, new_test, check, check_true, largest
   !$ use omp_lib, only: omp_get_max_threads
   implicit none
@@ -30,7 +32,11 @@ contains
       new_test('odd_fields', test_odd_fields), &
       new_test('threads_of_windows', test_threads), &
       new_test('packing', test_packing), &
+      new_test('pairs', test_pairs), &
       new_test('rows_like_nodes', test_rows), &
+      new_test('linearized_rows', test_linearized_rows), &
+      new_test('frames', test_frames), &
+      new_test('not_finite', test_not_finite), &
       new_test('springs', test_springs), &
       new_test('elimination', test_elimination) &
     ]
@@ -198,6 +204,160 @@ contains
       end do
     end do
   end subroutine test_packing
+
+  !> Each active node of the first component is in one run, with its place, and with that of the second component if it has one.
+  subroutine test_pairs(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 3001
+    type(active_set_t) :: nodes
+    logical :: active(2*n)
+    integer :: place(2*n), found(2*n), k, i, low, high
+
+    active(:n) = sample(n) > -0.3_wp
+    active(n + 1:) = active(:n) .and. cshift(sample(n), 7) > 0.0_wp
+    place = 0
+    k = 0
+    do i = 1, 2*n
+      if (i == n + 1) k = 0
+      if (.not. active(i)) cycle
+      k = k + 1
+      place(i) = k
+    end do
+    call new_active_set(nodes, active, alone)
+    call nodes%pair(2*n)
+    found = 0
+    associate (runs => nodes%pairs)
+      do k = 1, size(runs%first)
+        do i = runs%first(k), runs%last(k)
+          found(i) = runs%place(k) + i - runs%first(k)
+          if (runs%second(k) > 0) found(n + i) = runs%second(k) + i - runs%first(k)
+        end do
+      end do
+      call check_true(error, all(found == place) .and. runs%n_first == count(active(:n)), 'places')
+    end associate
+    if (allocated(error)) return
+    call find_span(active(:n), low, high)
+    call check_true(error, low == findloc(active(:n), .true., dim=1) .and. high == findloc(active(:n), .true., 1, back=.true.), &
+                    'span')
+    if (allocated(error)) return
+    call find_span([-1.0_wp, 0.0_wp, 2.0_wp, -3.0_wp, 4.0_wp, 0.0_wp], low, high)
+    call check_true(error, low == 3 .and. high == 5, 'span of values above zero')
+    if (allocated(error)) return
+    call find_span([.false., .false.], low, high)
+    call check_true(error, low == 1 .and. high == 0, 'no span')
+  end subroutine test_pairs
+
+  !> A row is linearised as (F6) says; without slip all nodes in contact stick, without any bound those without a traction.
+  subroutine test_linearized_rows(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 301
+    real(wp), parameter :: mu = 0.4_wp, r = 2.0e12_wp
+    type(coulomb_t) :: law
+    real(wp), dimension(n) :: p, qx, qy, dsx, dsy, compliance
+    real(wp) :: direction(2, n), d(2), e(2), spring
+    integer :: zone(n), expected, i
+    logical :: contact(n)
+
+    p = 1.0e9_wp*sample(n)
+    contact = p > 0.0_wp
+    qx = 0.3_wp*p*cos(sample(n))
+    qy = 0.4e9_wp*sample(n)**2
+    dsx = 1.0e-4_wp*sample(n)
+    dsy = 1.0e-4_wp*sample(n)*qx/p
+    law%coefficient = mu
+    call law%linearize(1, maxval(p), r, contact, p, qx, qy, dsx, dsy, zone, direction, compliance)
+    do i = 1, n
+      d = [qx(i), qy(i)] - r*[dsx(i), dsy(i)]
+      expected = separated
+      e = [1.0_wp, 0.0_wp]
+      spring = 0.0_wp
+      if (contact(i)) expected = stick
+      if (contact(i) .and. norm2(d) > mu*p(i)) then
+        expected = slip
+        e = d/norm2(d)
+        spring = (norm2(d) - mu*p(i))/(r*mu*p(i))
+      end if
+      call check_true(error, zone(i) == expected, 'zone')
+      if (allocated(error)) return
+      call check(error, norm2(direction(:, i) - e), 0.0_wp, 1.0e-15_wp, 'direction')
+      if (allocated(error)) return
+      call check(error, compliance(i), spring, 1.0e-12_wp*spring, 'compliance')
+      if (allocated(error)) return
+    end do
+    law%no_slip = .true.
+    call law%linearize(1, maxval(p), r, contact, p, qx, qy, dsx, dsy, zone, direction, compliance)
+    call check_true(error, all(zone == merge(stick, separated, contact)) .and. .not. any(compliance > 0.0_wp), 'no slip')
+    if (allocated(error)) return
+    law = coulomb_t(0.0_wp)
+    qx(:9) = 0.0_wp
+    qy(:9) = 0.0_wp
+    contact = .true.
+    call law%linearize(1, maxval(p), 0.0_wp*r + 1.0_wp, contact, p, qx, qy, 0.0_wp*dsx, 0.0_wp*dsy, zone, direction, compliance)
+    call check_true(error, all(zone(:9) == stick) .and. all(zone(10:) == slip), 'no friction')
+  end subroutine test_linearized_rows
+
+  !> Into the frames and back again; the springs of slipping nodes are added and taken off.
+  subroutine test_frames(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 7
+    real(wp), dimension(n) :: x, y, t, e, u, v, compliance
+    real(wp) :: direction(2, n), largest_stretch
+
+    x = sample(n)
+    y = cos(x)
+    compliance = max(sample(n), 0.0_wp)
+    direction(1, :) = cos(3.0_wp*y)
+    direction(2, :) = sin(3.0_wp*y)
+    call plane_row(n, direction, x, y, t, e)
+    call check(error, largest(t - (-direction(2, :)*x + direction(1, :)*y)), 0.0_wp, 1.0e-15_wp, 'along t')
+    if (allocated(error)) return
+    call check(error, largest(e - (direction(1, :)*x + direction(2, :)*y)), 0.0_wp, 1.0e-15_wp, 'along e')
+    if (allocated(error)) return
+    u = x
+    v = y
+    call add_springs_row(n, direction, compliance, y, u, v)
+    call check(error, largest(u - t - compliance*y) + largest(v - e), 0.0_wp, 1.0e-15_wp, 'with springs')
+    if (allocated(error)) return
+    largest_stretch = 0.0_wp
+    call take_off_row(n, compliance, y, u, largest_stretch)
+    call check(error, largest_stretch, maxval(abs(compliance*y)), 0.0_wp, 'largest stretch')
+    if (allocated(error)) return
+    call turn_row(n, direction, u, v)
+    call check(error, largest(u - x) + largest(v - y), 0.0_wp, 4.0e-15_wp, 'there and back')
+  end subroutine test_frames
+
+  !> A number that is not finite makes R_n infinite, but a gap where nothing can touch is not looked at.
+  subroutine test_not_finite(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: pressure(5, 3), gap(5, 3), wrong(3)
+    logical :: candidate(5, 3)
+    integer :: k, i
+
+    wrong = [ieee_value(1.0_wp, ieee_quiet_nan), ieee_value(1.0_wp, ieee_positive_inf), ieee_value(1.0_wp, ieee_negative_inf)]
+    candidate = .true.
+    candidate(5, 3) = .false.
+    pressure = 0.0_wp
+    pressure(2:4, 2) = [1.0_wp, 2.0_wp, 1.0_wp]
+    do k = 1, size(wrong)
+      gap = merge(0.0_wp, 1.0_wp, pressure > 0.0_wp)
+      gap(5, 3) = wrong(k)
+      gap(4, 2) = 0.25_wp
+      ! the largest finite numbers are finite
+      gap(1, 1) = huge(1.0_wp)
+      call check(error, normal_residual(pressure, gap, candidate, 0.5_wp, alone), 0.25_wp, 1.0e-15_wp, 'where nothing can touch')
+      if (allocated(error)) return
+      do i = 1, 5
+        gap(i, 2) = wrong(k)
+        call check_true(error, normal_residual(pressure, gap, candidate, 0.5_wp, alone) >= huge(1.0_wp), 'gap')
+        if (allocated(error)) return
+        gap(i, 2) = 1.0_wp
+        pressure(i, 1) = wrong(k)
+        call check_true(error, normal_residual(pressure, gap, candidate, 0.5_wp, alone) >= huge(1.0_wp), 'pressure')
+        if (allocated(error)) return
+        pressure(i, 1) = 0.0_wp
+      end do
+    end do
+  end subroutine test_not_finite
 
   !> Passes over a row say what the law of friction says node by node.
   subroutine test_rows(error)

@@ -344,15 +344,15 @@ contains
       gap(4, 2) = 0.25_wp
       ! the largest finite numbers are finite
       gap(1, 1) = huge(1.0_wp)
-      call check(error, normal_residual(pressure, gap, candidate, 0.5_wp, alone), 0.25_wp, 1.0e-15_wp, 'where nothing can touch')
+      call check(error, normal_residual(pressure, gap, candidate, 1.0_wp, alone), 0.125_wp, 1.0e-15_wp, 'where nothing can touch')
       if (allocated(error)) return
       do i = 1, 5
         gap(i, 2) = wrong(k)
-        call check_true(error, normal_residual(pressure, gap, candidate, 0.5_wp, alone) >= huge(1.0_wp), 'gap')
+        call check_true(error, normal_residual(pressure, gap, candidate, 1.0_wp, alone) >= huge(1.0_wp), 'gap')
         if (allocated(error)) return
         gap(i, 2) = 1.0_wp
         pressure(i, 1) = wrong(k)
-        call check_true(error, normal_residual(pressure, gap, candidate, 0.5_wp, alone) >= huge(1.0_wp), 'pressure')
+        call check_true(error, normal_residual(pressure, gap, candidate, 1.0_wp, alone) >= huge(1.0_wp), 'pressure')
         if (allocated(error)) return
         pressure(i, 1) = 0.0_wp
       end do

@@ -96,6 +96,8 @@ module hc_options
     !> Component of the traction across the direction of slip, relative to the largest that friction allows, that is no step
     !> towards a solution: nodes are fixed in stick instead
     real(wp) :: most_across = 5.0_wp
+    !> Compliance of the spring of a slipping node, over that of the node, below which its component across is left as a start
+    real(wp) :: soft_spring = 8.0_wp
     !> Factor of the classification parameter at the first shear traction, where nodes are fixed, and under strong coupling:
     !> there the zones are far from those of the solution
     real(wp) :: cautious_share = 0.2_wp
@@ -161,9 +163,11 @@ module hc_options
     integer :: max_rings = 16
     !> Times that a ring is smoothed: waves along the edge fall off the faster the shorter they are
     integer :: smoothings = 2
-    !> Compliances of springs, over that of a node, (P5): up to the first one only the inverse symbol counts, from the last one on
-    !> only the spring; the one between is that of the body on springs whose symbol is inverted
-    real(wp) :: stiff_spring = 0.5_wp, soft_spring = 8.0_wp, loose_spring = 64.0_wp
+    !> Compliances of the shortest and of the longest waves in slip, over that of a node, (P5): the shortest ones are known, and
+    !> from 20 to 80 on the longest ones make no difference. Steps of the lattice to the neighbors that displacements are averaged
+    !> over, one after the other, and from slip to the nodes in stick that take part
+    real(wp) :: short_waves = 2.0_wp, long_waves = 40.0_wp
+    integer :: smoothing_steps(3) = [1, 2, 4], smoothing_reach = 4
     !> Springs along the normal, (P7): elastic compliance of the waves that a single spring acts on, as d_n and the stiffest
     !> spring times these
     real(wp) :: wave_of_nodes = 2.0_wp, wave_of_springs = 1.0_wp

@@ -16,7 +16,7 @@ module hc_spectrum_file
 
   !> The first word of a file, and its layout: to be raised whenever that, or the order of the values, changes.
   character(len=24), parameter :: magic = 'hexcontact kernels'
-  integer(int64), parameter :: layout = 3
+  integer(int64), parameter :: layout = 4
   !> Length of the text for program and machine.
   integer, parameter :: maker_length = 256
   !> Words of what is known of a head beforehand, and of all of it: bytes of a value, shape and hash come after.

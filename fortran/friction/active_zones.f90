@@ -97,7 +97,7 @@ contains
     n_col = now%problem%lattice%extent(1)
     allocate (zone(n), active(2*n))
     r = shear_parameter(now)
-    soft = now%problem%options%preconditioner%soft_spring*now%shear%elastic_compliance
+    soft = now%problem%options%newton%soft_spring*now%shear%elastic_compliance
     associate (friction => now%problem%friction, direction => now%shear%direction, compliance => now%shear%compliance)
       p_max = now%operators%space%max(now%p)
       !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(dsx, dsy, i, from, to, low, high)

@@ -14,7 +14,8 @@ module hc_elastic_operators
   use hc_flexibility_fft, only: fft_flexibility_t, new_fft_flexibility, fft_memory
   use hc_inverse_symbol, only: preconditioner_memory
   use hc_preconditioner, only: preconditioner_t
-  use hc_symbol_preconditioner, only: pressure_preconditioner_t, shear_preconditioner_t, new_symbol_preconditioner
+  use hc_symbol_preconditioner, only: pressure_preconditioner_t, new_symbol_preconditioner
+  use hc_shear_preconditioner, only: shear_preconditioner_t, new_shear_preconditioner
   use hc_spectrum_cache, only: kernel_cache_t
   implicit none
   private
@@ -71,7 +72,7 @@ contains
     if (allocated(error)) return
     call new_symbol_preconditioner(normal, lattice, pair, space, tuning, error, cache)
     if (allocated(error)) return
-    call new_symbol_preconditioner(tangential, lattice, pair, space, tuning, error, cache)
+    call new_shear_preconditioner(tangential, lattice, pair, space, tuning, error, cache)
     if (allocated(error)) return
     call move_alloc(flexibility, self%flexibility)
     call move_alloc(normal, self%normal)

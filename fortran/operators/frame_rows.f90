@@ -113,63 +113,55 @@ contains
   end subroutine slip_compliance_row
 
   !> Turn the displacements of slipping nodes.
-  pure subroutine slip_to_plane(n, direction, weight, factor, along_t, x, y)
-    !> Number of nodes
+  pure subroutine slip_to_plane(n, direction, along_t, x, y)
+    !> Number of nodes, and their directions e
     integer, intent(in) :: n
-    !> Directions e and weights, and a factor of all
-    real(wp), intent(in) :: direction(2, n), factor
-    real(sp), intent(in) :: weight(n)
+    real(wp), intent(in) :: direction(2, n)
     !> Displacement along t, and along x and y
     real(wp), intent(in) :: along_t(n)
     real(sp), intent(inout) :: x(n), y(n)
-    real(wp) :: t
     integer :: i
 
-    !$omp simd private(t)
+    !$omp simd
     do i = 1, n
-      t = factor*weight(i)*along_t(i)
-      x(i) = real(-direction(2, i)*t, sp)
-      y(i) = real(direction(1, i)*t, sp)
+      x(i) = real(-direction(2, i)*along_t(i), sp)
+      y(i) = real(direction(1, i)*along_t(i), sp)
     end do
   end subroutine slip_to_plane
 
   !> Turn the displacements of sticking nodes.
-  pure subroutine stick_to_plane(n, direction, weight, factor, along_t, along_e, x, y)
-    !> Number of nodes
+  pure subroutine stick_to_plane(n, direction, factor, along_t, along_e, x, y)
+    !> Number of nodes, their directions e, and a factor of the components along them
     integer, intent(in) :: n
-    !> Directions e and weights, and a factor of all
     real(wp), intent(in) :: direction(2, n), factor
-    real(sp), intent(in) :: weight(n)
     !> Displacement along t and e, and along x and y
     real(wp), intent(in) :: along_t(n), along_e(n)
     real(sp), intent(inout) :: x(n), y(n)
-    real(wp) :: t, e
+    real(wp) :: e
     integer :: i
 
-    !$omp simd private(t, e)
+    !$omp simd private(e)
     do i = 1, n
-      t = factor*weight(i)*along_t(i)
-      e = factor*weight(i)*along_e(i)
-      x(i) = real(-direction(2, i)*t + direction(1, i)*e, sp)
-      y(i) = real(direction(1, i)*t + direction(2, i)*e, sp)
+      e = factor*along_e(i)
+      x(i) = real(-direction(2, i)*along_t(i) + direction(1, i)*e, sp)
+      y(i) = real(direction(1, i)*along_t(i) + direction(2, i)*e, sp)
     end do
   end subroutine stick_to_plane
 
-  !> Add w (e_1 a + sign e_2 b).
-  pure subroutine add_turned(n, sign, direction, weight, a, b, total)
+  !> Add e_1 a + sign e_2 b.
+  pure subroutine add_turned(n, sign, direction, a, b, total)
     !> Number of nodes
     integer, intent(in) :: n
-    !> Sign, directions e and weights w
+    !> Sign, and directions e
     real(wp), intent(in) :: sign, direction(2, n)
-    real(sp), intent(in) :: weight(n)
-    !> Components of the traction, and what is added to
+    !> Components, and what is added to
     real(sp), intent(in) :: a(n), b(n)
     real(wp), intent(inout) :: total(n)
     integer :: i
 
     !$omp simd
     do i = 1, n
-      total(i) = total(i) + weight(i)*(direction(1, i)*a(i) + sign*direction(2, i)*b(i))
+      total(i) = total(i) + (direction(1, i)*a(i) + sign*direction(2, i)*b(i))
     end do
   end subroutine add_turned
 

@@ -4,10 +4,7 @@
 !> as large, so that one application costs about a quarter of a product. It is symmetric
 !> and positive definite, also when it is restricted to a set of nodes.
 !>
-!> For shear tractions there is a second one, of a body whose every node has a soft spring (symbol_preconditioner says where
-!> it serves).
-!>
-!> Equations: docs/theory/preconditioner.md, (P1), (P4) to (P6).
+!> Equations: docs/theory/preconditioner.md, (P1), (P4), (P7).
 module hc_inverse_symbol
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
@@ -36,7 +33,7 @@ module hc_inverse_symbol
   real(wp), parameter :: self_ratio = 2.854_wp
   !> Excess over the stiffest spring below which a spring counts as equal to it, over t of (P7): single precision
   real(wp), parameter :: negligible = 1.0e-3_wp
-  !> Kernels of the tangential inverse; those on soft springs come after them.
+  !> Kernels of the tangential inverse.
   integer, parameter :: n_tangential = 3
 
   !> Approximate inverse of the normal or of the tangential flexibility.
@@ -73,7 +70,7 @@ module hc_inverse_symbol
 contains
 
   !> Make plans and inverse symbol over a window.
-  subroutine new_inverse_symbol(self, lattice, pair, space, error, soft, cache)
+  subroutine new_inverse_symbol(self, lattice, pair, space, error, tangential, cache)
     !> Preconditioner to be set up
     type(inverse_symbol_t), intent(out) :: self
     !> Lattice and window
@@ -84,23 +81,23 @@ contains
     type(field_space_t), intent(in) :: space
     !> Allocated on failure: not enough memory
     type(error_t), allocatable, intent(out) :: error
-    !> For shear tractions instead of the pressure: compliance of soft springs over that of a node
-    real(wp), intent(in), optional :: soft
-    !> Cache of spectra; for the usual springs
+    !> For shear tractions instead of the pressure
+    logical, intent(in), optional :: tangential
+    !> Cache of spectra
     type(kernel_cache_t), pointer, intent(in), optional :: cache
 
     type(kernel_key_t) :: key
     integer, allocatable :: f(:, :)
     integer :: length(2), b, i, n_component
-    real(wp) :: scale, k(3), matrix(3), spring, layer, basis(2, 2), gamma
+    real(wp) :: scale, k(3), matrix(3), layer, basis(2, 2), gamma
     real(wp), allocatable :: symbol(:)
     logical :: found
 
-    self%tangential = present(soft)
+    if (present(tangential)) self%tangential = tangential
     n_component = merge(2, 1, self%tangential)
     self%shape = [lattice%extent, n_component]
     length = good_size(lattice%extent)
-    call new_convolution(self%convolution, lattice%extent, length, merge(2*n_tangential, 1, self%tangential), n_component, &
+    call new_convolution(self%convolution, lattice%extent, length, merge(n_tangential, 1, self%tangential), n_component, &
                          space, error)
     if (allocated(error)) return
     self%unit = pair%lambda_1*lattice%spacing()
@@ -111,9 +108,7 @@ contains
     ! all in units of lambda_1 and the spacing
     basis = lattice%unit_basis()
     gamma = pair%gamma()
-    spring = 0.0_wp
     layer = pair%tangential_layer/self%unit
-    if (self%tangential) spring = soft*(node_ratio(pair) + layer)
     scale = 1.0_wp/product(real(length, wp))
     !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, k, matrix, symbol)
     do b = 1, self%convolution%n_block
@@ -132,9 +127,7 @@ contains
           ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
           matrix = [k(symbol_1) + gamma*k(symbol_xx), gamma*k(symbol_xy), k(symbol_1) + gamma*(k(symbol_1) - k(symbol_xx))]
           matrix([1, 3]) = matrix([1, 3]) + layer
-          self%convolution%spectrum(i, b, :n_tangential) = real(scale*inverse(matrix), sp)
-          matrix([1, 3]) = matrix([1, 3]) + spring
-          self%convolution%spectrum(i, b, n_tangential + 1:) = real(scale*inverse(matrix), sp)
+          self%convolution%spectrum(i, b, :) = real(scale*inverse(matrix), sp)
         end do
       end if
     end do
@@ -165,7 +158,7 @@ contains
 
     n_component = merge(2, 1, tangential)
     if (present(shared)) n_component = merge(0, n_component, shared)
-    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(2*n_tangential, 1, tangential), n_component, &
+    preconditioner_memory = convolution_memory(extent, good_size(extent), merge(n_tangential, 1, tangential), n_component, &
                                                threads)
     ! fields in single precision; those of the tangential one belong to the shear system
     if (.not. tangential) preconditioner_memory = preconditioner_memory + 8*int(extent(1), long)*extent(2)
@@ -212,7 +205,7 @@ contains
   end subroutine apply
 
   !> Estimate it in single precision, displacements and tractions in any units of ratio `unit`.
-  subroutine apply_single(self, displacement, traction, edge, on_springs)
+  subroutine apply_single(self, displacement, traction, edge)
     class(inverse_symbol_t), intent(inout) :: self
     !> Closing of the gap, or tangential displacements (n_col, n_row, 1 or 2); changed on the rings of `edge`
     real(sp), intent(inout), target :: displacement(self%shape(1), self%shape(2), self%shape(3))
@@ -220,10 +213,8 @@ contains
     real(sp), intent(out), target :: traction(self%shape(1), self%shape(2), self%shape(3))
     !> Continuation beyond the nodes where displacements are given
     type(edge_extension_t), intent(in), optional :: edge
-    !> Displacements of nodes on soft springs; absent: without springs
-    logical, intent(in), optional :: on_springs
     real(sp), pointer, contiguous :: field(:), sprung(:)
-    integer :: m, block(2, 2)
+    integer :: m
 
     if (allocated(self%sprung)) then
       associate (n => self%shape(1)*self%shape(2))
@@ -240,9 +231,7 @@ contains
       end do
     end if
     if (self%tangential) then
-      block = tangential_block
-      if (present(on_springs)) block = block + merge(n_tangential, 0, on_springs)
-      call self%convolution%convolve(block, displacement, traction)
+      call self%convolution%convolve(tangential_block, displacement, traction)
     else
       call self%convolution%convolve(normal_block, displacement, traction)
     end if
@@ -346,15 +335,7 @@ contains
     !> Elastic constants of the two bodies
     type(elastic_pair_t), intent(in) :: pair
 
-    node_compliance = node_ratio(pair)*pair%lambda_1*lattice%spacing() + pair%tangential_layer
+    node_compliance = (2.0_wp + pair%gamma())*pair%lambda_1*lattice%spacing() + pair%tangential_layer
   end function node_compliance
-
-  !> Compute t_h over lambda_1 and the spacing.
-  pure real(wp) function node_ratio(pair)
-    !> Elastic constants of the two bodies
-    type(elastic_pair_t), intent(in) :: pair
-
-    node_ratio = 2.0_wp + pair%gamma()
-  end function node_ratio
 
 end module hc_inverse_symbol

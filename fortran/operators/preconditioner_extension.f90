@@ -48,14 +48,12 @@ module hc_preconditioner_extension
     procedure :: extend
     !> The transpose: add what acts on the rings to the active nodes
     procedure :: fold
-    !> Set a field to zero on the rings
-    procedure :: erase
   end type edge_extension_t
 
 contains
 
   !> Find the rings around the active nodes.
-  subroutine new_edge_extension(self, active, space, options)
+  subroutine new_edge_extension(self, active, space, options, within)
     !> Continuation to be set up
     type(edge_extension_t), intent(out) :: self
     !> Active nodes (n_col, n_row)
@@ -64,6 +62,8 @@ contains
     type(field_space_t), intent(in) :: space
     !> Tuning numbers
     type(preconditioner_options_t), intent(in) :: options
+    !> Nodes beyond which there are no rings (n_col, n_row); absent: all of the window
+    logical, intent(in), contiguous, optional :: within(:, :)
 
     !> Marks of the nodes, one column and row around the window included: 0 on active nodes, the place in the list on
     !> those of the rings, `free` elsewhere and `outside` around
@@ -75,7 +75,7 @@ contains
     n_col = size(active, 1)
     width = n_col + 2
     step = neighbors(1, :) + width*neighbors(2, :)
-    call mark_window(active, space, mark)
+    call mark_window(active, space, mark, within)
     n_active = space%count(active)
     call find_edge(active, mark, step, space, frontier)
     n_ring = 0
@@ -127,13 +127,15 @@ contains
   end subroutine new_edge_extension
 
   !> Mark all nodes before there are rings.
-  subroutine mark_window(active, space, mark)
+  subroutine mark_window(active, space, mark, within)
     !> Active nodes (n_col, n_row)
     logical, intent(in) :: active(:, :)
     !> Space of the fields
     type(field_space_t), intent(in) :: space
     !> Marks of the nodes, with those around the window
     integer, allocatable, intent(out) :: mark(:)
+    !> Nodes that are not outside (n_col, n_row); absent: all of the window
+    logical, intent(in), optional :: within(:, :)
     integer :: row, width, start
 
     width = size(active, 1) + 2
@@ -145,6 +147,9 @@ contains
       start = row*width + 1
       mark(start) = outside
       mark(start + 1:start + width - 2) = merge(0, free, active(:, row))
+      if (present(within)) then
+        where (.not. (active(:, row) .or. within(:, row))) mark(start + 1:start + width - 2) = outside
+      end if
       mark(start + width - 1) = outside
     end do
     !$omp end parallel do
@@ -368,20 +373,6 @@ contains
     end do
     !$omp end parallel
   end subroutine fold
-
-  !> Set a field to zero on the rings.
-  subroutine erase(self, field)
-    class(edge_extension_t), intent(in) :: self
-    !> Field over the window (n)
-    real(sp), intent(inout), contiguous :: field(:)
-    integer :: k
-
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do k = 1, size(self%node)
-      field(self%node(k)) = 0.0_sp
-    end do
-    !$omp end parallel do
-  end subroutine erase
 
   !> Take the values of a field at the nodes of a ring, by the threads of a parallel region.
   subroutine take_up(from, to, node, field, value)

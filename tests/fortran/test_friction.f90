@@ -402,9 +402,9 @@ contains
     if (allocated(error)) return
     call check_true(error, positive_definite(m), 'preconditioner positive definite')
     if (allocated(error)) return
-    ! the softest nodes are left to 1/D
+    ! the softest nodes, 10^6.4 times as soft as the body, are left to 1/D
     i = maxloc(system%compliance, dim=1)
-    call check(error, m(i, i)*system%compliance(i), 1.0_wp, 1.0e-14_wp, '1/D')
+    call check(error, m(i, i)*system%compliance(i), 1.0_wp, 2.0e-6_wp, '1/D')
   end subroutine test_shear_system
 
   !> Nodes that slip far or not so far: conjugate gradients take few iterations, and no more on twice as fine a lattice.
@@ -445,7 +445,7 @@ contains
       call projected_cg(system, nodes, none(:nodes%n_active, :), m_none(:nodes%n_active, :), rhs, unknown, &
                         image, 1.0e-6_wp, 100, no_multiplier, residual, iterations, outcome, error)
       if (allocated(error)) return
-      call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 9, 'iterations')
+      call check_true(error, residual <= 1.0e-6_wp .and. iterations <= 6, 'iterations')
       if (allocated(error)) return
     end do
   end subroutine test_slip_preconditioner

@@ -15,6 +15,7 @@ module test_preconditioner
   use hc_contact_problem, only: friction_problem_t
   use hc_coulomb, only: coulomb_t
   use hc_elastic_operators, only: operators_t, new_operators
+  use hc_shear_system, only: shear_system_t, new_shear_system
   use hc_frictional_contact, only: frictional_contact_t
   use hc_lattice_solver, only: solve_on_lattice
   use hc_normal_iterate, only: normal_iterate_t
@@ -50,7 +51,8 @@ contains
       new_test('diagonal', test_diagonal), &
       new_test('diagonal_coupled', test_diagonal_coupled), &
       new_test('diagonal_frictionless', test_diagonal_frictionless), &
-      new_test('springs', test_springs) &
+      new_test('springs', test_springs), &
+      new_test('slip', test_slip) &
     ]
   end subroutine collect_preconditioner
 
@@ -108,6 +110,77 @@ contains
       if (allocated(error)) return
     end do
   end subroutine test_springs
+
+  !> In partial slip M of the shear traction is symmetric and at least the inverse, and close to it, (P5), (P6): for x = (T + D) y
+  !> on the unknowns, x^T M x >= x^T y, also for y at the front of stick, and whatever the frames of the nodes in stick are.
+  subroutine test_slip(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: side = 49, n = side**2
+    type(lattice_t) :: lattice
+    type(operators_t), target :: operators
+    type(shear_system_t), target :: system
+    real(wp), dimension(side, side) :: x, y, radius
+    real(wp), dimension(n) :: distance, turn
+    real(wp), dimension(2*n) :: traction, moved, answer, other, other_moved, other_answer
+    logical :: unknown(2*n)
+    integer :: front, frame
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-24, -24], [side, side], error)
+    if (allocated(error)) return
+    call new_operators(operators, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.5_wp), field_space_t(), error)
+    if (allocated(error)) return
+    call new_shear_system(system, operators)
+    call lattice%coordinates(x, y)
+    radius = sqrt((x - 0.3_wp)**2 + (y + 0.2_wp)**2)
+    do front = 4, 16, 4
+      distance = reshape(max(radius - front, 0.0_wp), [n])
+      ! from nothing at the front to far above that of the whole contact at its edge
+      system%compliance = system%elastic_compliance*merge(0.2_wp*distance**1.5_wp/max(18.0_wp - reshape(radius, [n]), 1.0e-4_wp), &
+                                                          0.0_wp, reshape(radius < 18.0_wp, [n]))
+      do frame = 1, 2
+        ! slip along x, but for a turn; in stick the same frames, or any
+        call random_number(turn)
+        turn = merge(turn*6.0_wp*(frame - 1), 0.1_wp*reshape(x - y, [n])/18.0_wp, .not. system%compliance > 0.0_wp)
+        system%direction(1, :) = cos(turn)
+        system%direction(2, :) = sin(turn)
+        unknown = [reshape(radius < 18.0_wp, [n]), reshape(radius < 18.0_wp, [n]) .and. .not. system%compliance > 0.0_wp]
+        call system%set_contact(unknown(:n))
+        call random_number(traction)
+        call random_number(other)
+        traction = merge(traction - 0.5_wp, 0.0_wp, unknown)
+        other = merge(other*exp(-([distance, distance] - 0.5_wp)**2), 0.0_wp, unknown)
+        call estimate(traction, moved, answer)
+        if (allocated(error)) return
+        call estimate(other, other_moved, other_answer)
+        if (allocated(error)) return
+        ! single precision
+        call check(error, dot_product(other_moved, answer), dot_product(moved, other_answer), &
+                   1.0e-5_wp*sqrt(dot_product(moved, answer)*dot_product(other_moved, other_answer)), 'w^T M x')
+        if (allocated(error)) return
+        call check_true(error, dot_product(moved, answer) > 0.999_wp*dot_product(moved, traction) .and. &
+                        dot_product(other_moved, other_answer) > 0.999_wp*dot_product(other_moved, other), 'at least the inverse')
+        if (allocated(error)) return
+        call check_true(error, dot_product(moved, answer) < 1.2_wp*dot_product(moved, traction) .and. &
+                        dot_product(other_moved, other_answer) < 1.9_wp*dot_product(other_moved, other), 'close to the inverse')
+        if (allocated(error)) return
+      end do
+    end do
+
+  contains
+
+    !> Multiply, and estimate what was multiplied.
+    subroutine estimate(y, x, m_x)
+      real(wp), intent(in), contiguous :: y(:)
+      real(wp), intent(out), contiguous :: x(:), m_x(:)
+
+      call system%product(y, x, error)
+      if (allocated(error)) return
+      x = merge(x, 0.0_wp, unknown)
+      call system%precondition(x, m_x, error)
+      m_x = merge(m_x, 0.0_wp, unknown)
+    end subroutine estimate
+
+  end subroutine test_slip
 
   subroutine set_active(self, active, compliance, direction)
     class(diagonal_preconditioner_t), intent(inout) :: self

@@ -1,0 +1,407 @@
+!> The preconditioner of the shear traction, with the springs of slipping nodes.
+!>
+!> Unknowns are both components of a node that sticks, and the one along t of a node that slips, whose spring has the compliance
+!> D. With the flexibility T and its inverse symbol, as in (P2),
+!>
+!>     r^T (T + D)^-1 r = min over u of u^T T^-1 u + (r - u)^T D^-1 (r - u),
+!>
+!> u what the bodies take of the displacement r and r - u what the springs take; where nothing is known of u, along the direction
+!> of slip and off the contact, it is free. Any linear u = U r gives a symmetric M >= (T + D)^-1,
+!>
+!>     M = U^T T^-1 U + (I - U)^T D^-1 (I - U).
+!>
+!> Of a wave of compliance tau the bodies take tau/(tau + D): U is a + (1 - a) c S f, with the share a of the shortest waves, that
+!> of the longest ones f, c = 1 - short/long, and S a mean over neighbors in several steps, which only long waves pass.
+!> Beyond the front of stick u is continued along the direction of slip, and beyond the edge of the contact in both.
+!>
+!> Equations: docs/theory/preconditioner.md, (P2) to (P6).
+module hc_shear_preconditioner
+  use hc_precision, only: wp, sp
+  use hc_error, only: error_t
+  use hc_options, only: preconditioner_options_t
+  use hc_lattice, only: lattice_t, neighbors
+  use hc_field_space, only: field_space_t
+  use hc_elastic_pair, only: elastic_pair_t
+  use hc_spectrum_cache, only: kernel_cache_t
+  use hc_active_set, only: active_set_t, new_active_set, paired_runs_t
+  use hc_plane_fields, only: to_plane, add_in_frames, keep_along, copy_nodes, add_nodes, set_to_zero
+  use hc_inverse_symbol, only: node_compliance
+  use hc_preconditioner_extension, only: edge_extension_t, new_edge_extension
+  use hc_symbol_preconditioner, only: symbol_preconditioner_t, new_symbol_preconditioner
+  implicit none
+  private
+
+  public :: shear_preconditioner_t, new_shear_preconditioner
+
+  !> Approximate inverse of the tangential flexibility with the springs of slipping nodes.
+  type, extends(symbol_preconditioner_t) :: shear_preconditioner_t
+    private
+    !> Elastic compliance t_h of a node [m/Pa]
+    real(wp) :: elastic_compliance = 0.0_wp
+    !> Direction e
+    real(wp), pointer, contiguous :: direction(:, :) => null()
+    !> Shares a and f of each node in contact
+    real(sp), allocatable :: own(:), far(:)
+    !> Some node slips
+    logical :: slips = .false.
+    !> Nodes in contact; those that slip, and those near them that stick; both together, and the others
+    type(active_set_t) :: nodes, slipping, sticking, near, apart
+    !> Continuation from stick into slip; none if no node slips
+    type(edge_extension_t), allocatable :: front
+    !> Fields along x and y, zero off the nodes near slip: averaged, and the mean (n with a margin, 2)
+    real(sp), allocatable :: field(:, :), mean(:, :)
+  contains
+    procedure :: set_active => set_sheared
+    procedure :: apply => apply_to_shear
+    procedure :: apply_packed => apply_to_shear_packed
+    procedure :: release => release_fields
+    procedure :: clear => clear_sheared
+  end type shear_preconditioner_t
+
+contains
+
+  !> Set up a preconditioner over a window.
+  subroutine new_shear_preconditioner(self, lattice, pair, space, options, error, cache)
+    !> Preconditioner to be set up
+    type(shear_preconditioner_t), intent(out) :: self
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Elastic constants of the two bodies
+    type(elastic_pair_t), intent(in) :: pair
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    !> Tuning numbers
+    type(preconditioner_options_t), intent(in) :: options
+    !> Allocated on failure: not enough memory
+    type(error_t), allocatable, intent(out) :: error
+    !> Cache of spectra
+    type(kernel_cache_t), pointer, intent(in), optional :: cache
+
+    call new_symbol_preconditioner(self, lattice, pair, space, options, error, cache, tangential=.true.)
+    self%elastic_compliance = node_compliance(lattice, pair)
+  end subroutine new_shear_preconditioner
+
+  !> Set the nodes in contact, and the springs of those that slip.
+  subroutine set_sheared(self, active, compliance, direction)
+    class(shear_preconditioner_t), intent(inout) :: self
+    logical, intent(in), contiguous :: active(:)
+    real(wp), intent(in), optional, target, contiguous :: compliance(:), direction(:, :)
+    logical, allocatable :: slips(:)
+    real(wp) :: ratio
+    integer :: i, k, at
+    logical :: known
+
+    self%direction => direction
+    known = allocated(self%own)
+    if (known) known = self%nodes%is_set(active)
+    if (.not. known) then
+      call self%continue_beyond(self%extent, active)
+      call new_active_set(self%nodes, active, self%space)
+      if (allocated(self%own)) deallocate (self%own, self%far)
+      allocate (self%own(self%nodes%n_active), self%far(self%nodes%n_active))
+    end if
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(i, at, ratio)
+    do k = 1, size(self%nodes%first)
+      do i = self%nodes%first(k), self%nodes%last(k)
+        at = self%nodes%place(k) + i - self%nodes%first(k)
+        ratio = compliance(i)/self%elastic_compliance
+        self%own(at) = real(self%options%short_waves/(self%options%short_waves + ratio), sp)
+        self%far(at) = real(self%options%long_waves/(self%options%long_waves + ratio), sp)
+      end do
+    end do
+    !$omp end parallel do
+    allocate (slips(size(active)))
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do i = 1, size(slips)
+      slips(i) = active(i) .and. compliance(i) > 0.0_wp
+    end do
+    !$omp end parallel do
+    self%slips = any(slips)
+    if (.not. self%slips) return
+    known = known .and. allocated(self%slipping%first)
+    if (known) known = self%slipping%is_set(slips)
+    if (known) return
+    call self%release()
+    call new_active_set(self%slipping, slips, self%space)
+    call find_near(self, self%extent, active, slips)
+    if (.not. allocated(self%front)) allocate (self%front)
+    call new_front(self, self%extent, active, slips)
+  end subroutine set_sheared
+
+  !> Set up the continuation from stick into slip.
+  subroutine new_front(self, extent, active, slips)
+    class(shear_preconditioner_t), intent(inout) :: self
+    !> Columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Nodes in contact, and those of them that slip
+    logical, intent(in) :: active(extent(1), extent(2)), slips(extent(1), extent(2))
+
+    call new_edge_extension(self%front, active .and. .not. slips, self%space, self%options, within=active)
+  end subroutine new_front
+
+  !> Find the nodes in contact near slip, a rhombus of the lattice about each that slips.
+  subroutine find_near(self, extent, active, slips)
+    class(shear_preconditioner_t), intent(inout) :: self
+    !> Columns and rows of the window
+    integer, intent(in) :: extent(2)
+    !> Nodes in contact, and those of them that slip
+    logical, intent(in), contiguous :: active(:), slips(:)
+    logical, allocatable :: along(:, :), near(:)
+    integer :: row, other, first, last, k
+
+    allocate (along(extent(1), extent(2)), near(size(active)))
+    associate (reach => self%options%smoothing_reach, n => extent(1))
+      !$omp parallel num_threads(self%space%threads) private(other, first, last, k)
+      !$omp do schedule(static)
+      do row = 1, extent(2)
+        first = (row - 1)*n
+        along(:, row) = slips(first + 1:first + n)
+        if (.not. any(along(:, row))) cycle
+        do k = 1, min(reach, n - 1)
+          along(:n - k, row) = along(:n - k, row) .or. slips(first + k + 1:first + n)
+          along(k + 1:, row) = along(k + 1:, row) .or. slips(first + 1:first + n - k)
+        end do
+      end do
+      !$omp end do
+      !$omp do schedule(static)
+      do row = 1, extent(2)
+        first = (row - 1)*n + 1
+        last = row*n
+        near(first:last) = along(:, row)
+        do other = max(row - reach, 1), min(row + reach, extent(2))
+          near(first:last) = near(first:last) .or. along(:, other)
+        end do
+        near(first:last) = near(first:last) .and. active(first:last)
+      end do
+      !$omp end do
+      !$omp end parallel
+    end associate
+    call new_active_set(self%near, near, self%space)
+    call new_active_set(self%sticking, near .and. .not. slips, self%space)
+    call new_active_set(self%apart, active .and. .not. near, self%space)
+  end subroutine find_near
+
+  !> Estimate the shear traction, in the frames of the nodes, that causes a displacement there.
+  subroutine apply_to_shear(self, displacement, traction, work)
+    class(shear_preconditioner_t), intent(inout) :: self
+    real(wp), intent(in), contiguous, target :: displacement(:)
+    real(wp), intent(out), contiguous, target :: traction(:)
+    real(wp), intent(inout) :: work
+    type(active_set_t) :: both
+    real(wp), allocatable :: given(:), wanted(:)
+
+    both = self%nodes%repeated(size(displacement)/2, 2)
+    call both%pair(size(displacement))
+    allocate (given(both%n_active), wanted(both%n_active))
+    call both%pack(displacement, given)
+    call self%apply_packed(both, size(displacement), given, wanted, work)
+    call both%unpack(wanted, traction)
+  end subroutine apply_to_shear
+
+  !> Estimate it at the active nodes: the component along t of all nodes in contact, that along e of some.
+  subroutine apply_to_shear_packed(self, nodes, n, displacement, traction, work)
+    class(shear_preconditioner_t), intent(inout) :: self
+    type(active_set_t), intent(in) :: nodes
+    integer, intent(in) :: n
+    real(wp), intent(in), contiguous :: displacement(:)
+    real(wp), intent(inout), contiguous :: traction(:)
+    real(wp), intent(inout) :: work
+    !> Along t: what the bodies take of the displacement, and the traction of the springs under the rest
+    real(wp), allocatable :: across(:), rest(:)
+
+    call self%take_memory(n)
+    if (self%slips) call take_fields(self, n/2)
+    associate (runs => nodes%pairs, n_t => nodes%pairs%n_first, n_all => nodes%n_active, threads => self%space%threads)
+      allocate (across(n_t), rest(n_t))
+      across = displacement(:n_t)/self%unit
+      if (self%slips) call share_out(self, runs, displacement(n_t + 1:n_all), across, rest)
+      call to_plane(runs, threads, self%direction, self%given(:n/2), self%given(n/2 + 1:), across, displacement(n_t + 1:n_all), &
+                    1.0_wp/self%unit)
+      if (self%slips) call continue_into_slip(self)
+      call self%inverse%apply_single(self%given, self%wanted, self%edge)
+      work = work + self%inverse%cost
+      if (self%slips) call fold_into_stick(self)
+      call self%space%fill(traction(:n_all), 0.0_wp)
+      call add_in_frames(runs, threads, self%direction, self%wanted(:n/2), self%wanted(n/2 + 1:), traction(:n_t), &
+                         traction(n_t + 1:n_all))
+      if (self%slips) call collect(self, runs, rest, across, traction(:n_t), traction(n_t + 1:n_all))
+    end associate
+  end subroutine apply_to_shear_packed
+
+  !> Compute u = U r, and the traction of the springs under r - u.
+  subroutine share_out(self, runs, along_e, across, rest)
+    class(shear_preconditioner_t), intent(inout) :: self
+    !> Active nodes
+    type(paired_runs_t), intent(in) :: runs
+    !> Displacement along e at the active nodes [m]
+    real(wp), intent(in), contiguous :: along_e(:)
+    !> r along t, then u
+    real(wp), intent(inout), contiguous :: across(:)
+    !> Traction of the springs
+    real(wp), intent(out), contiguous :: rest(:)
+    real(wp) :: waves, stiffness, displacement
+    integer :: i, m, pass
+
+    rest = self%far*across
+    call to_plane(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest, along_e, 1.0_wp/self%unit)
+    ! what is not averaged: the mean has to be symmetric
+    do m = 1, 2
+      call set_to_zero(self%apart, self%space%threads, self%field(1:, m))
+    end do
+    do pass = 1, size(self%options%smoothing_steps)
+      call average(self, self%options%smoothing_steps(pass))
+    end do
+    call self%space%fill(rest, 0.0_wp)
+    call add_in_frames(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), rest)
+    waves = 1.0_wp - self%options%short_waves/self%options%long_waves
+    stiffness = self%unit/(self%options%short_waves*self%elastic_compliance)
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads) private(displacement)
+    do i = 1, size(across)
+      displacement = across(i)
+      across(i) = self%own(i)*displacement + (1.0_wp - self%own(i))*(waves*rest(i))
+      rest(i) = self%own(i)*stiffness*(displacement - waves*rest(i))
+    end do
+    !$omp end parallel do simd
+  end subroutine share_out
+
+  !> Compute U^T y + (I - U)^T v, the transpose of `share_out`.
+  subroutine collect(self, runs, rest, work, along_t, along_e)
+    class(shear_preconditioner_t), intent(inout) :: self
+    !> Active nodes
+    type(paired_runs_t), intent(in) :: runs
+    !> Traction v of the springs along t; place for as many numbers
+    real(wp), intent(in), contiguous :: rest(:)
+    real(wp), intent(inout), contiguous :: work(:)
+    !> Traction y of the bodies, then the sum, along t and e at the active nodes
+    real(wp), intent(inout), contiguous :: along_t(:), along_e(:)
+    real(wp) :: waves
+    integer :: i, pass
+
+    waves = 1.0_wp - self%options%short_waves/self%options%long_waves
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads)
+    do i = 1, size(work)
+      work(i) = (1.0_wp - self%own(i))*waves*(along_t(i) - rest(i))
+      along_t(i) = self%own(i)*along_t(i) + (1.0_wp - self%own(i))*rest(i)
+    end do
+    !$omp end parallel do simd
+    call to_plane(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), work)
+    do pass = size(self%options%smoothing_steps), 1, -1
+      call average(self, self%options%smoothing_steps(pass))
+    end do
+    call self%space%fill(work, 0.0_wp)
+    call add_in_frames(runs, self%space%threads, self%direction, self%field(1:, 1), self%field(1:, 2), work, along_e)
+    !$omp parallel do simd schedule(static) num_threads(self%space%threads)
+    do i = 1, size(work)
+      along_t(i) = along_t(i) + self%far(i)*work(i)
+    end do
+    !$omp end parallel do simd
+  end subroutine collect
+
+  !> Average the field over each node and its six neighbors at some steps, on the nodes near slip.
+  subroutine average(self, step)
+    class(shear_preconditioner_t), intent(inout) :: self
+    !> Steps of the lattice to the neighbors
+    integer, intent(in) :: step
+    real(sp), allocatable :: swap(:, :)
+    integer :: k, m, shift(6)
+
+    shift = step*(neighbors(1, :) + self%extent(1)*neighbors(2, :))
+    !$omp parallel do schedule(static) num_threads(self%space%threads) private(m)
+    do k = 1, size(self%near%first)
+      do m = 1, 2
+        call average_row(self%near%first(k), self%near%last(k), shift, lbound(self%field, 1), self%field(:, m), self%mean(:, m))
+      end do
+    end do
+    !$omp end parallel do
+    call move_alloc(self%field, swap)
+    call move_alloc(self%mean, self%field)
+    call move_alloc(swap, self%mean)
+  end subroutine average
+
+  !> Average a row of nodes.
+  pure subroutine average_row(first, last, shift, low, field, mean)
+    !> The first and the last node, steps to the neighbors, and the lower bound of the fields
+    integer, intent(in) :: first, last, shift(6), low
+    real(sp), intent(in), contiguous :: field(low:)
+    real(sp), intent(inout), contiguous :: mean(low:)
+    integer :: i
+
+    !$omp simd
+    do i = first, last
+      mean(i) = (field(i) + field(i + shift(1)) + field(i + shift(2)) + field(i + shift(3)) + field(i + shift(4)) &
+                 + field(i + shift(5)) + field(i + shift(6)))*(1.0_sp/7.0_sp)
+    end do
+  end subroutine average_row
+
+  !> Continue displacements from stick into slip, along the direction of slip: there they are free.
+  subroutine continue_into_slip(self)
+    class(shear_preconditioner_t), intent(inout) :: self
+    integer :: n, m
+
+    n = size(self%given)/2
+    do m = 1, 2
+      call copy_nodes(self%sticking, self%space%threads, self%given((m - 1)*n + 1:m*n), self%mean(1:n, m))
+      call set_to_zero(self%slipping, self%space%threads, self%mean(1:n, m))
+      call self%front%extend(self%mean(1:n, m))
+    end do
+    call keep_along(self%slipping, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
+    do m = 1, 2
+      call add_nodes(self%slipping, self%space%threads, self%mean(1:n, m), self%given((m - 1)*n + 1:m*n))
+    end do
+  end subroutine continue_into_slip
+
+  !> Fold tractions in slip, along the direction of slip, back into stick: the transpose of `continue_into_slip`.
+  subroutine fold_into_stick(self)
+    class(shear_preconditioner_t), intent(inout) :: self
+    integer :: n, m
+
+    n = size(self%wanted)/2
+    do m = 1, 2
+      call copy_nodes(self%near, self%space%threads, self%wanted((m - 1)*n + 1:m*n), self%mean(1:n, m))
+    end do
+    call keep_along(self%slipping, self%space%threads, self%direction, self%mean(1:n, 1), self%mean(1:n, 2))
+    do m = 1, 2
+      call self%front%fold(self%mean(1:n, m))
+      call copy_nodes(self%sticking, self%space%threads, self%mean(1:n, m), self%wanted((m - 1)*n + 1:m*n))
+    end do
+  end subroutine fold_into_stick
+
+  !> Take memory for the fields, zero, with a margin for the steps of the means.
+  subroutine take_fields(self, n)
+    class(shear_preconditioner_t), intent(inout) :: self
+    !> Number of nodes of the window
+    integer, intent(in) :: n
+    integer :: margin, i
+
+    if (allocated(self%field)) return
+    margin = maxval(self%options%smoothing_steps)*(self%extent(1) + 1)
+    allocate (self%field(1 - margin:n + margin, 2), self%mean(1 - margin:n + margin, 2))
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do i = 1 - margin, n + margin
+      self%field(i, :) = 0.0_sp
+      self%mean(i, :) = 0.0_sp
+    end do
+    !$omp end parallel do
+  end subroutine take_fields
+
+  !> Free it, and what the inverse symbol takes.
+  subroutine release_fields(self)
+    class(shear_preconditioner_t), intent(inout) :: self
+
+    call self%free_memory()
+    if (allocated(self%field)) deallocate (self%field, self%mean)
+  end subroutine release_fields
+
+  !> Forget the active nodes, and free what was stored for them.
+  subroutine clear_sheared(self)
+    class(shear_preconditioner_t), intent(inout) :: self
+
+    self%direction => null()
+    call self%release()
+    if (allocated(self%edge)) deallocate (self%edge)
+    if (allocated(self%front)) deallocate (self%front)
+    if (allocated(self%own)) deallocate (self%own, self%far)
+    self%slipping = active_set_t()
+  end subroutine clear_sheared
+
+end module hc_shear_preconditioner

@@ -127,9 +127,7 @@ class Journal:
         from .result import Result
 
         with reading(self.folder, "a journal"):
-            dataset = assemble(self.metadata, self, self.complete)
-        if self.stopped:
-            dataset.attrs["stopped"] = self.stopped
+            dataset = assemble(self.metadata, self, self.complete, stopped=self.stopped)
         return Result(dataset, str(path))
 
     @property

@@ -7,9 +7,9 @@ motions, residuals, panels and maps, arrays of the compiled core.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ NAN = float("nan")
 NOT_KEPT = -1  # zone of a step whose fields are not in the output (output.every)
 
 
-@dataclass(frozen=True)
-class Variable:
+class Variable(NamedTuple):
     """One quantity of the result.
 
     Attributes
@@ -79,7 +78,7 @@ class Variable:
     long_name: str
     padding: float | int = NAN
     dtype: str = "f8"
-    flags: Mapping[int, str] = field(default_factory=dict)
+    flags: Mapping[int, str] = MappingProxyType({})
     symbol: str = ""
     title: str = ""
     motion: str = ""

@@ -1,6 +1,5 @@
 """Records that refer to the deck in earlier ones: sessions, whose deck grows by the loads of each step."""
 
-import dataclasses
 import shutil
 from pathlib import Path
 from typing import Any
@@ -181,7 +180,7 @@ def test_a_reference_to_other_metadata_is_refused(out: Path, changes: dict[str, 
     assert isinstance(about, Growth)
     write_record(record, about, step)
     assert len(open_result(out)) == 3
-    write_record(record, dataclasses.replace(about, **changes), step)
+    write_record(record, about._replace(**changes), step)
     for read in (open_result, Store.reopened):
         with pytest.raises(DeckError, match=rf"000002\.npz .*{fault}"):
             read(out)

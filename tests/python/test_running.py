@@ -16,6 +16,7 @@ from hexcontact import Case, ConvergenceError, DeckError, Result, Step, StopRun,
 from hexcontact.deck.surfaces import Sphere
 from hexcontact.deck.tables import Load
 from hexcontact.result.journal import journal_of
+from hexcontact.solve import run
 
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 SOFT = {"young_modulus": 70e9, "poisson_ratio": 0.33}
@@ -322,6 +323,28 @@ def test_steps_may_be_taken_back() -> None:
     for count in (0, 3):
         with pytest.raises(DeckError, match=rf"steps = {count}: expected 1 to 2"):
             session.back(count)
+
+
+def test_a_result_is_that_of_the_moment_it_was_asked_for() -> None:
+    """Its data set is made when it is first used, which may be later or elsewhere."""
+    session = fretting().start()
+    session.advance(normal_load=100.0)
+    result, sent = session.result(), pickle.dumps(session.result())
+    session.advance(tangential_load_x=6.0)
+    assert len(result) == len(pickle.loads(sent)) == 1
+    assert pickle.loads(sent).dataset.identical(result.dataset)
+    assert result.dataset is result.dataset
+
+
+def test_a_run_whose_data_set_is_not_used_makes_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Any] = []
+    make = run.assemble
+    monkeypatch.setattr(run, "assemble", lambda *given: made.append(given) or make(*given))
+    result = frictionless().run()
+    assert not made
+    assert len(result) == 4
+    assert result.complete
+    assert len(made) == 1
 
 
 def test_steps_of_the_case_may_be_taken_back(whole: Result) -> None:

@@ -7,8 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import HexcontactError
 from ..result.history import (
@@ -80,8 +79,7 @@ def pairs(title: str, rows: Iterable[Row]) -> TextTable:
 # --- the load steps of a run or a file ------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Summary:
+class Summary(NamedTuple):
     """The load steps of a run or a file.
 
     Attributes

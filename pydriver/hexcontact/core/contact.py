@@ -221,7 +221,7 @@ class FlexibilityOperator(Handle):
         return w, s_x, s_y
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class NormalSolution:
     """Solution of a frictionless contact problem, with its residuals.
 

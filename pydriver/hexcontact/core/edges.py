@@ -6,8 +6,7 @@ Lattice arrays have shape (n_row, n_col).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,8 +51,7 @@ def tractions_memory(
     return int(_api.memory_of_edges(n_col, n_row, contact, sheared, unlike, threads))
 
 
-@dataclass(frozen=True)
-class Edge:
+class Edge(NamedTuple):
     """An area of the plane whose edge runs between the nodes.
 
     Parameters
@@ -78,8 +76,7 @@ class Edge:
     ellipse: Ellipse
 
 
-@dataclass(frozen=True)
-class ZoneMesh:
+class ZoneMesh(NamedTuple):
     """Triangles that fill an area of the plane up to its edge between the nodes, and a field there.
 
     Parameters

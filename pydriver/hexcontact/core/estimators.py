@@ -6,6 +6,7 @@ Lattice arrays have shape (n_row, n_col); the neighbors of node (j, i) are (j, i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,8 +39,7 @@ class CircleFit:
     count: int
 
 
-@dataclass(frozen=True)
-class Ellipse:
+class Ellipse(NamedTuple):
     """An ellipse: semi-axes (m), direction of the major axis from x (rad, in (-pi/2, pi/2]), center (m)."""
 
     semi_major: float

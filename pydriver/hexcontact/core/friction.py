@@ -46,7 +46,7 @@ MOTION = ("approach", "shift_x", "shift_y", "twist", *BULK_STRAIN)
 """Motions of the remote parts, in the order of the core."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrictionLaw:
     """Friction at the nodes of a window: no traction is above min(mu p^k, limit).
 
@@ -92,7 +92,7 @@ class FrictionLaw:
         return min(float(mu) * pressure**self.power, self.shear_limit) / length
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ContactState(NormalSolution):
     """The end of a load step, from which the next one starts.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import functools
 import mmap
 import os
 import threading
@@ -96,10 +97,8 @@ def claim(needed: int) -> None:
 
 def _left_on_machine() -> int:
     """Return the memory (bytes) that the machine has left, by Linux itself or else by psutil."""
-    with contextlib.suppress(OSError, ValueError):
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        return int(_read("/proc/meminfo").partition(b"MemAvailable:")[2].split(None, 1)[0]) * 1024
     import psutil
 
     return int(psutil.virtual_memory().available)
@@ -131,36 +130,48 @@ def _left_in_limits() -> Iterator[int]:
 
 def _left_in_groups(cgroups: Path, process: Path) -> Iterator[int]:
     """Yield the free bytes of each control group (version 1 or 2) that limits this process."""
-    try:
-        lines = process.read_text().splitlines()
-    except OSError:
-        return
-    for line in lines:
+    with contextlib.suppress(OSError):
+        for files in _files_of_groups(cgroups, _read(process)):
+            if (left := _left_in_group(*files)) is not None:
+                yield left
+
+
+@functools.cache
+def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, bytes]]:
+    """Return limit, usage and statistics of each control group, and the key of the file cache in these."""
+    found = []
+    for line in os.fsdecode(groups).splitlines():
         _, controllers, group = line.split(":", 2)
         if controllers == "":
-            root, limit, usage, cache = cgroups, "memory.max", "memory.current", "inactive_file"
+            root, limit, usage, cache = cgroups, "memory.max", "memory.current", b"inactive_file"
         elif "memory" in controllers.split(","):
             root, limit, usage = cgroups / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"
-            cache = "total_inactive_file"
+            cache = b"total_inactive_file"
         else:
             continue
         # in a container, the own group may be the root and others missing
         own = root / group.lstrip("/")
         for folder in (own, *own.parents):
-            if (left := _left_in_group(folder, limit, usage, cache)) is not None:
-                yield left
+            found.append((f"{folder}/{limit}", f"{folder}/{usage}", f"{folder}/memory.stat", cache))
             if folder == root:
                 break
+    return found
 
 
-def _left_in_group(folder: Path, limit: str, usage: str, cache: str) -> int | None:
+def _left_in_group(limit: str, usage: str, statistics: str, cache: bytes) -> int | None:
     """Return limit less usage, without the file cache, which the kernel frees on demand."""
     try:
-        allowed = int((folder / limit).read_text())  # "max" is no limit, nor is what no machine has
+        allowed = int(_read(limit))  # "max" is no limit, nor is what no machine has
         if allowed > _NO_LIMIT:
             return None
-        used = int((folder / usage).read_text())
-        statistics = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
-        return max(0, allowed - used + int(statistics.get(cache, 0)))
+        used, known = int(_read(usage)), _read(statistics).split()
+        freed = dict(zip(known[::2], known[1::2], strict=True)).get(cache, 0)
+        return max(0, allowed - used + int(freed))
     except (OSError, ValueError):
         return None
+
+
+def _read(path: str | Path) -> bytes:
+    """Read a file of the kernel, without buffers and text, which take longer than the file."""
+    with open(path, "rb", buffering=0) as file:
+        return file.read()

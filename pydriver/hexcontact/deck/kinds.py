@@ -31,7 +31,6 @@ _DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _SHARE = rf"\s*([+-]?{_DIGITS})\s*\*?\s*(?:mu|[\u00b5\u03bc])\s*\*?\s*P\s*"  # both letters mu
 
 
-@dataclass(frozen=True)
 class Kind:
     """A kind of value, for annotations ``Annotated[float, kind]``."""
 
@@ -70,7 +69,7 @@ class Kind:
         return self.schema()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Quantity(Kind):
     """A finite number with a dimension and bounds, in SI once read.
 
@@ -135,7 +134,7 @@ class Quantity(Kind):
         return {"anyOf": [text, number], **known}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class PowerCoefficient(Kind):
     """A coefficient above 0 of a power law, which its table parses in a unit that depends on the exponent."""
 
@@ -162,7 +161,7 @@ class Share:
         return f"{self.share!r} mu P"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class OrShare(Kind):
     """A force, or a share of the limit of friction."""
 
@@ -191,7 +190,7 @@ class OrShare(Kind):
         return self.kind.schema() | {"examples": ["10 N", "0.6 mu P"]}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Whole(Kind):
     """A whole number between two bounds."""
 
@@ -216,7 +215,7 @@ class Whole(Kind):
         return {"type": "integer", "minimum": self.at_least, "maximum": self.at_most}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Word(Kind):
     """One of several words."""
 
@@ -292,7 +291,7 @@ class Flag(Kind):
         return {"type": "boolean"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Several(Kind):
     """An array of values of one kind: `count` of them, or at least one.
 
@@ -336,7 +335,7 @@ def _is_array(value: object) -> TypeGuard[Iterable[Any]]:
     return hasattr(value, "__getitem__") and hasattr(value, "__len__") and getattr(value, "shape", (1,)) != ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class WordOr(Kind):
     """One fixed word, or a value of another kind."""
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
@@ -25,8 +25,7 @@ MOST_INCLUDED = 100  # files; one that several others include counts each time
 MOST_SERIES = 1000  # files of series
 
 
-@dataclass(frozen=True)
-class Assembled:
+class Assembled(NamedTuple):
     """A deck assembled from its sources.
 
     Attributes

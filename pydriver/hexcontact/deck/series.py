@@ -103,7 +103,7 @@ MOST_STEPS = 100_000
 # --- the table ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class OrEmpty(Kind):
     """A value, or "" in rows without it."""
 
@@ -211,8 +211,7 @@ def driven_twice(arrays: Mapping[str, Any]) -> Iterator[tuple[int, str, str]]:
 # --- files ----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Column:
+class _Column(NamedTuple):
     """A column of a file: header without unit, unit (may be empty), and cells."""
 
     header: str

@@ -9,9 +9,8 @@ from __future__ import annotations
 import functools
 import math
 import re
-from dataclasses import dataclass
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..text import listed
 
@@ -19,8 +18,7 @@ if TYPE_CHECKING:
     import pint
 
 
-@dataclass(frozen=True)
-class Dimension:
+class Dimension(NamedTuple):
     """The dimension of a number.
 
     Attributes

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, reals
+from ..arrays import Array, Mask, reals
 from ..core.contact import shaped
 from ..core.lattice import Lattice
 from ..deck.surfaces import Separation
@@ -116,9 +116,12 @@ class Gap:
         ours = isinstance(self.source, np.ndarray | HeightMap | Separation)
         return gap if ours else gap.copy()  # a function may keep, and change, what it returns
 
-    def ends_within(self, distance: float, x: Array, y: Array) -> bool:
-        """Test whether one of some points is within a distance (m) of the end of a height map."""
-        return isinstance(self.source, HeightMap) and self.source.ends_within(distance, x, y)
+    def ends_within(self, lattice: Lattice, chosen: Mask) -> bool:
+        """Test whether a height map ends within a spacing of one of some nodes of a window."""
+        source = self.source
+        if not isinstance(source, HeightMap):
+            return False
+        return source.ends_within(lattice.spacing, lattice.x[chosen], lattice.y[chosen])
 
     def __eq__(self, other: object) -> bool:
         """Test whether two gaps are the same; functions are if they are one object."""

@@ -24,8 +24,7 @@ MOTIONS: tuple[Motion, ...] = ("z", "x", "y", "twist")
 Stress = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """The prescribed load or displacement of one rigid motion in one load step.
 
     Attributes
@@ -49,8 +48,7 @@ class Target:
         return self.value + self.from_start * start
 
 
-@dataclass(frozen=True)
-class Ramp:
+class Ramp(NamedTuple):
     """A segment in increments that are chosen during its solution (``steps = "auto"``).
 
     Attributes

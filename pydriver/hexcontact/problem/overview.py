@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import platform
@@ -45,11 +46,12 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         ),
         **({"accuracy_target": case.accuracy.target} if case.accuracy else {}),
         **({"warnings": "\n".join(doubts)} if (doubts := plausibility.warnings(case)) else {}),
-        "machine": _machine(),
+        "machine": machine(),
     }
 
 
-def _machine() -> str:
+@functools.cache
+def machine() -> str:
     """Describe the machine: "node7, Linux x86_64, 16 processors"."""
     count = os.cpu_count() or 1
     return (

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
     from .problem import Problem
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(NamedTuple):
     """A limit of an expected value.
 
     Attributes
@@ -200,7 +198,7 @@ def _even_steps(count: float) -> str:
 def limits() -> list[dict[str, Any]]:
     """Return the table of limits for programs, without infinite ones."""
     return [
-        {name: value for name, value in asdict(limit).items() if name != "words" and value not in _OPEN}
+        {name: value for name, value in limit._asdict().items() if name != "words" and value not in _OPEN}
         for limit in LIMITS
     ]
 

@@ -263,7 +263,7 @@ class Problem:
         DeckError
             If the contact reaches it.
         """
-        if self._gap.ends_within(lattice.spacing, lattice.x[contact], lattice.y[contact]):
+        if self._gap.ends_within(lattice, contact):
             raise DeckError(
                 f"gap: the contact of load step {number} reaches the end of the height map; expected heights "
                 "of a larger part, or a function that says what lies beyond"

@@ -7,7 +7,7 @@ Shifted copies of a lattice have its spacing and origins moved by fractions of i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ LEAST_LEVELS = 3
 SHIFTS = ((0.7549, 0.5698), (0.5098, 0.1397), (0.2647, 0.7095), (0.0195, 0.2794))
 
 
-@dataclass(frozen=True)
-class Trial:
+class Trial(NamedTuple):
     """A lattice of a refinement.
 
     Parameters

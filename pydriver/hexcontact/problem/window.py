@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,8 +42,7 @@ class NoContactFound(Exception):
     """Raised without a bounded contact; the message is the reason, without a key."""
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """Rough place and size of the contact.
 
     Attributes
@@ -83,8 +81,7 @@ class Estimate:
     def joined(self, other: Estimate) -> Estimate:
         """Return an estimate that covers both: the larger radius, the union of the bounds."""
         larger = self if self.radius >= other.radius else other
-        return replace(
-            larger,
+        return larger._replace(
             lower=np.minimum(self.lower - self.cell, other.lower - other.cell) + larger.cell,
             upper=np.maximum(self.upper + self.cell, other.upper + other.cell) - larger.cell,
             size=np.maximum(self.size, other.size),

@@ -16,9 +16,8 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,9 +126,7 @@ class Journal:
         from .result import Result
 
         with reading(self.folder, "a journal"):
-            dataset = assemble(self.metadata, self, self.complete)
-        if self.stopped:
-            dataset.attrs["stopped"] = self.stopped
+            dataset = assemble(self.metadata, self, self.complete, stopped=self.stopped)
         return Result(dataset, str(path))
 
     @property
@@ -163,8 +160,7 @@ def _is_temporary(name: str, folder: Path) -> bool:
 # --- records ------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Growth:
+class Growth(NamedTuple):
     """Reference of a record to metadata in an earlier one, and the text that it adds to the deck.
 
     Attributes
@@ -298,7 +294,7 @@ def write_record(path: Path, about: Metadata | Growth, step: Step) -> None:
     known = {
         "journal_version": VERSION,
         "hexcontact_version": __version__,
-        "growth" if isinstance(about, Growth) else "metadata": vars(about),
+        **({"growth": about._asdict()} if isinstance(about, Growth) else {"metadata": vars(about)}),
         "index": step.index,
         "lattice": dataclasses.asdict(step.lattice),
         "history": dict(step.history),

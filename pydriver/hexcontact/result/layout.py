@@ -287,6 +287,7 @@ def assemble(
     steps: Iterable[Step],
     complete: bool = True,
     trials: Mapping[str, Sequence[Any]] | None = None,
+    stopped: str = "",
 ) -> xarray.Dataset:
     """Return the data set of the steps of a run.
 
@@ -300,6 +301,8 @@ def assemble(
         Whether these are all steps of the run.
     trials : mapping of str to sequence, optional
         As for `Layout`.
+    stopped : str
+        Reason why the run ended early, if it did.
 
     Returns
     -------
@@ -329,7 +332,8 @@ def assemble(
         if name in values
     }
     coordinates = {name: variables.pop(name) for name in COORDINATES}
-    return xarray.Dataset(variables, coords=coordinates, attrs=layout.attributes(complete))
+    attributes = layout.attributes(complete) | ({"stopped": stopped} if stopped else {})
+    return xarray.Dataset(variables, coords=coordinates, attrs=attributes)
 
 
 # --- list of quantities ----------------------------------------------------------------------------------

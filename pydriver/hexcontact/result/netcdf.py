@@ -8,6 +8,7 @@ chunks. A program that rewrites the file with HDF5 removes the seal.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
 import sys
@@ -78,15 +79,19 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
     """
     with _new_file(path) as file:
         with _alone():
-            file.setncatts(layout.attributes(complete))
             for name, size in layout.sizes.items():
                 file.createDimension(name, size)
-            for name, values in (layout.coordinates() | layout.histories() | layout.trials).items():
-                if VARIABLES[name].dtype == "str":
-                    _write_text(file, name, values)
-                else:
-                    _column(file, name, layout)[...] = values
+            given = [
+                _text(file, name, values)
+                if VARIABLES[name].dtype == "str"
+                else (_column(file, name, layout), values)
+                for name, values in (layout.coordinates() | layout.histories() | layout.trials).items()
+            ]
             columns = {name: _column(file, name, layout) for name in layout.fields}
+            vars(file)["defined"] = True
+            file.setncatts(layout.attributes(complete))
+            for column, values in given:
+                column[...] = values
             mesh.write_mesh(file, layout.window)
         gap_column = columns.pop("initial_gap", None)
         gap: Any = None
@@ -103,16 +108,32 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
                 gap_column[...] = gap
 
 
+@functools.cache
+def _file_type() -> type[netCDF4.Dataset]:
+    """Return files that only leave the mode of definitions once they are `defined`: leaving it flushes."""
+    import netCDF4
+
+    class File(netCDF4.Dataset):
+        def _redef(self) -> None:
+            if "defined" in vars(self):
+                super()._redef()  # type: ignore[misc]
+
+        def _enddef(self) -> None:
+            if "defined" in vars(self):
+                super()._enddef()  # type: ignore[misc]
+
+    return File
+
+
 @contextlib.contextmanager
 def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
     """Create a file; at the end close it and add its checksum."""
-    import netCDF4
-
+    file_type = _file_type()
     memory.give_back()
     memory.claim(memory.WRITING)  # netCDF crashes without
     try:
         with _alone():
-            file = netCDF4.Dataset(path, "w", format="NETCDF4_CLASSIC")
+            file = file_type(path, "w", format="NETCDF4_CLASSIC")
         try:
             yield file
         finally:
@@ -159,8 +180,8 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     return column
 
 
-def _write_text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> None:
-    """Write the text variable `name`.
+def _text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> tuple[netCDF4.Variable, NDArray[Any]]:
+    """Create the text variable `name`, and return it with its characters.
 
     Characters, not netCDF strings, on which HDF5 crashes if a file is open more than once.
     """
@@ -170,7 +191,7 @@ def _write_text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> None:
     attributes = {**variable.attributes, "_Encoding": "utf-8"}
     column = mesh.add_column(file, name, "S1", (*variable.dims, f"{name}_length"), attributes)
     column.set_auto_chartostring(False)
-    column[...] = characters
+    return column, characters
 
 
 # --- reading --------------------------------------------------------------------------------------

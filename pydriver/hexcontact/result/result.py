@@ -54,15 +54,21 @@ class Result(BelowSurface):
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        As `assemble` makes it or `hexcontact.open_result` reads it.
+    dataset : xarray.Dataset or callable
+        As `assemble` makes it or `hexcontact.open_result` reads it; or what makes it when it is first used.
     path : str
         Its file; empty if there is none.
     """
 
-    def __init__(self, dataset: xarray.Dataset, path: str = "") -> None:
-        self.dataset = dataset
-        self.path = path
+    def __init__(self, dataset: xarray.Dataset | Callable[[], xarray.Dataset], path: str = "") -> None:
+        self._made, self.path = dataset, path
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """All quantities, and attributes of the run."""
+        if callable(self._made):
+            self._made = self._made()
+        return self._made
 
     def __getattr__(self, name: str) -> xarray.DataArray:
         """Return a quantity."""
@@ -219,10 +225,8 @@ class Result(BelowSurface):
 
         Raises
         ------
-        DeckError
-            If there is no such field in the output.
-        IndexError
-            If there is no such step.
+        DeckError, IndexError
+            If there is no such field in the output, or no such step.
         """
         [values] = self._fields([name], step).values()
         return interpolate(self.lattice, name, values, x, y, self._tractions([name], step, source))
@@ -373,10 +377,8 @@ class Result(BelowSurface):
 
         Raises
         ------
-        KeyError
-            If there is no such quantity.
-        IndexError
-            If there is no such step.
+        KeyError, IndexError
+            If there is no such quantity, or no such step.
         """
         data = self.dataset if step is None else self.dataset.sel(step=[int(self.step(step)["step"])])
         chosen = [self[name].name for name in names] or list(self.history.columns)
@@ -414,10 +416,8 @@ class Result(BelowSurface):
 
         Raises
         ------
-        KeyError
-            If there is no such quantity.
-        IndexError
-            If there is no such step.
+        KeyError, IndexError
+            If there is no such quantity, or no such step.
         """
         from ..analytic.compare import compare
 

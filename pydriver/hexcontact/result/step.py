@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Value = float | int | str
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Step:
     """A finished load step.
 

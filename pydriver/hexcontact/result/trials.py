@@ -13,9 +13,8 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,8 +32,7 @@ _JOURNAL = r"\d+_\d+\.nc\.d"
 FOLDER = "lattices"  # in the journal
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """The solution on one lattice.
 
     Parameters
@@ -112,7 +110,7 @@ class TrialFolder:
         about = {
             "trials_version": VERSION,
             "metadata": dataclasses.asdict(metadata),
-            "solutions": [dataclasses.asdict(solution) for solution in solutions],
+            "solutions": [solution._asdict() for solution in solutions],
         }
         about = json.loads(json.dumps(about, default=np.generic.item))  # as after reading
         with replacing(self.ledger, self._temporary) as path:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,8 +39,7 @@ class _Rim(Exception):
         self.solution = solution
 
 
-@dataclass
-class _Solved:
+class _Solved(NamedTuple):
     """A load step that was solved as a whole and in halves."""
 
     whole: ContactState

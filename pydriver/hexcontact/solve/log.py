@@ -79,7 +79,8 @@ class Log(Listener):
 
     def said(self, event: str, /, text: str = "", level: int = logging.INFO, **values: object) -> None:
         """Write an event and its values."""
-        logger.log(level, words(event, **values))
+        if logger.isEnabledFor(level):
+            logger.log(level, words(event, **values))
 
     def ended(self, error: BaseException | None) -> None:
         """Write the error that ends the run, once."""

@@ -6,6 +6,7 @@ import dataclasses
 import logging
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,7 +99,8 @@ def run(
     listener = listeners(case, progress, on_step)
     if output is None:
         with listener.following(case.title, case.planned_steps):
-            return checked(_in_memory(case, listener))
+            result = _in_memory(case, listener)
+            return checked(result) if case.accuracy else result
     with (
         Store(output, metadata_of(case), overwrite) as store,
         listener.following(case.title, case.planned_steps),
@@ -133,8 +135,7 @@ def _in_memory(case: Problem, listener: Listener) -> Result:
                 listener.step(step)
     except Stopped as reason:
         stopped = str(reason)
-    dataset = assemble(about, finished, not stopped, trials)
-    return Result(dataset.assign_attrs(stopped=stopped) if stopped else dataset)
+    return Result(partial(assemble, about, finished, not stopped, trials, stopped))
 
 
 def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[Step] = ()) -> None:

@@ -8,6 +8,7 @@ import tomllib
 import weakref
 from collections import deque
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -144,7 +145,7 @@ class Session:
         _ = self.step
         if self._store is None:
             about = self._described(self._loads, len(self._steps)) if self._by_hand else self._about
-            return Result(assemble(about, self._steps, self._whole))
+            return Result(partial(assemble, about, self.steps, self._whole))
         return open_result(self._store.path)
 
     @property

@@ -13,8 +13,9 @@ import numpy as np
 from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import DeckError, PathWarning
+from ..problem import plausibility
 from ..problem.loads import LoadStep
-from ..problem.overview import parameters_of
+from ..problem.overview import machine
 from ..problem.problem import Problem
 from ..result.history import unasked_path
 from ..result.step import Step
@@ -105,12 +106,12 @@ def steps(
 
 def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) -> None:
     """Report the beginning of the load history, or that it goes on after `done` steps."""
-    known = parameters_of(case)
-    named = ("algorithm", "friction_coefficient", "coupling", "entry", "tolerance")
-    values: dict[str, Any] = {"title": case.title, "version": __version__, "machine": known["machine"]}
+    solver = case.solver
+    values: dict[str, Any] = {"title": case.title, "version": __version__, "machine": machine()}
     values |= {"steps": case.planned_steps or "auto"} | ({"done": done} if done else {})
     values |= {"window": lattice.shape, "spacing": lattice.spacing, "method": case.method_for(lattice)}
-    values |= {name: known[name] for name in named}
+    values |= {"algorithm": solver.algorithm, "friction_coefficient": case.friction_coefficient}
+    values |= {"coupling": solver.coupling, "entry": solver.entry, "tolerance": solver.tolerance}
     listener.said("resumed" if done else "begun", **values)
     if case.full_contact:
         sentence = (
@@ -118,7 +119,7 @@ def _announce(case: Problem, lattice: Lattice, done: int, listener: Listener) ->
             "the half-spaces move as a whole, and what is solved is the layer"
         )
         listener.said("full contact", sentence, area=lattice.size * lattice.cell_area)
-    for sentence in [] if case.trial else known.get("warnings", "").splitlines():
+    for sentence in [] if case.trial else plausibility.warnings(case):
         listener.said("doubtful", f"warning: {sentence}", logging.WARNING, warning=sentence)
 
 

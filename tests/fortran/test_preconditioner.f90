@@ -52,7 +52,8 @@ contains
       new_test('diagonal_coupled', test_diagonal_coupled), &
       new_test('diagonal_frictionless', test_diagonal_frictionless), &
       new_test('springs', test_springs), &
-      new_test('slip', test_slip) &
+      new_test('slip', test_slip), &
+      new_test('slip_spectrum', test_slip_spectrum) &
     ]
   end subroutine collect_preconditioner
 
@@ -181,6 +182,52 @@ contains
     end subroutine estimate
 
   end subroutine test_slip
+
+  !> With the springs of Cattaneo and Mindlin's slip zone at Q = mu P/2 no eigenvalue of M (T + D) is above 2, on any lattice.
+  subroutine test_slip_spectrum(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(operators_t), target :: operators
+    type(shear_system_t), target :: system
+    real(wp), allocatable :: x(:, :), y(:, :), radius(:), slip(:), v(:), image(:), back(:)
+    logical, allocatable :: unknown(:)
+    real(wp) :: eigenvalue
+    integer :: spacings, half, side, n, k
+
+    do spacings = 18, 36, 18
+      half = int(1.34_wp*spacings)
+      side = 2*half + 1
+      n = side**2
+      if (allocated(x)) deallocate (x, y, radius, slip, unknown, v, image, back)
+      allocate (x(side, side), y(side, side), radius(n), slip(n), unknown(2*n), v(2*n), image(2*n), back(2*n))
+      call new_lattice(lattice, equilateral_basis(1.0_wp), [-half, -half], [side, side], error)
+      if (allocated(error)) return
+      call new_operators(operators, lattice, elastic_pair_t(1.0_wp, 0.0_wp, 0.5_wp), field_space_t(), error)
+      if (allocated(error)) return
+      call new_shear_system(system, operators)
+      call lattice%coordinates(x, y)
+      radius(:) = reshape(sqrt((x - 0.3_wp)**2 + (y + 0.2_wp)**2), [n])/spacings
+      ! slip grows like the power 1.5 of the distance from stick, and the pressure falls like the root of that from the edge
+      slip(:) = max(radius - 0.794_wp, 0.0_wp)**1.5_wp/sqrt(max(1.0_wp - radius**2, 1.0e-6_wp))
+      system%compliance = merge(2.0_wp*spacings*system%elastic_compliance*slip, 0.0_wp, radius < 1.0_wp)
+      unknown(:) = [radius < 1.0_wp, radius < 0.794_wp]
+      call system%set_contact(unknown(:n))
+      call random_number(v)
+      v = merge(v - 0.5_wp, 0.0_wp, unknown)
+      do k = 1, 60
+        call system%product(v, image, error)
+        if (allocated(error)) return
+        image = merge(image, 0.0_wp, unknown)
+        call system%precondition(image, back, error)
+        if (allocated(error)) return
+        back = merge(back, 0.0_wp, unknown)
+        eigenvalue = dot_product(back, image)/dot_product(v, image)
+        v = back/sqrt(sum(back**2))
+      end do
+      call check(error, eigenvalue, 1.9_wp, 0.1_wp, 'largest eigenvalue')
+      if (allocated(error)) return
+    end do
+  end subroutine test_slip_spectrum
 
   subroutine set_active(self, active, compliance, direction)
     class(diagonal_preconditioner_t), intent(inout) :: self

@@ -121,7 +121,7 @@ module hc_options
     !> Relaxation of the shear traction at a front (F12): nodes in contact from which on the products saved take longer than it
     !> does; rings of nodes on each side, and passes; residual R_t below which there is none, since zones stand then; changes that
     !> are left out, over R_t and the largest traction
-    integer :: front_nodes = 10000, front_rings = 3, front_passes = 4
+    integer :: front_nodes = 5000, front_rings = 3, front_passes = 4
     real(wp) :: front_residual = 1.0e-4_wp, front_share = 0.01_wp
     !> Tolerance from which on the residuals of a solution are those of the displacements that its linear solvers carried along:
     !> their rounding errors are far below. Share of it that what is cut off to record admissible tractions may displace

@@ -90,7 +90,7 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             columns = {name: _column(file, name, layout) for name in layout.fields}
             vars(file)["defined"] = True
             file.setncatts(layout.attributes(complete))
-            # chunks are written once; the default, 64 MB for each variable, is set with the end of definitions
+            # chunks are written once; the default, 64 MB a variable, is set with the end of definitions
             for column in file.variables.values():
                 if column.dimensions[-2:] == ("row", "col"):
                     column.set_var_chunk_cache(size=0)

@@ -48,8 +48,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     type(coupled_system_t) :: system
-    real(wp), allocatable :: x(:), ax(:), rhs(:), columns(:, :), mb(:, :), rows(:, :)
-    real(wp), allocatable :: shear_columns(:, :), part(:, :), plane(:), b(:, :), m_b(:, :), c(:, :)
+    real(wp), allocatable :: x(:), ax(:), rhs(:), column(:), plane(:)
+    real(wp), allocatable :: shear_columns(:, :), part(:, :), b(:, :), m_b(:, :), c(:, :)
     real(wp), allocatable :: gap(:), ahead(:), aside(:)
     logical, allocatable :: active(:), shear_active(:), contact(:)
     type(active_set_t), target :: nodes, sheared, pressed
@@ -117,42 +117,40 @@ contains
     n_shear = size(shear_missing)
     m = n_shear
     if (now%target%control(normal) == force_control) m = m + 1
-    allocate (mb(3*n, m), source=0.0_wp)
     call find_rigid_traction(now, sheared, shear_columns, .false., part, error)
     if (allocated(error)) return
-    allocate (columns(3*n, m), source=0.0_wp)
+    ! one by one: over all nodes they are large
+    allocate (b(nodes%n_active, m), m_b(nodes%n_active, m), c(nodes%n_active, m), column(3*n))
     do k = 1, n_shear
-      call sheared%unpack(part(:, k), mb(n + 1:, k))
-      call sheared%unpack(shear_columns(:, k), columns(n + 1:, k))
-    end do
-    deallocate (part, shear_columns)
-    if (m > n_shear) columns(:n, m) = merge(1.0_wp, 0.0_wp, now%contact)
-    rows = columns
-    do k = 1, n_shear
+      column = 0.0_wp
+      call sheared%unpack(part(:, k), column(n + 1:))
+      call nodes%pack(column, m_b(:, k))
+      column = 0.0_wp
+      call sheared%unpack(shear_columns(:, k), column(n + 1:))
+      call nodes%pack(column, b(:, k))
       ! the traction mu p e belongs to the pressure
       plane = reshape(driven%direction(k, now%problem), [2*n])
-      rows(:n, k) = system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
+      column(:n) = system%slope*(now%shear%direction(1, :)*plane(:n) + now%shear%direction(2, :)*plane(n + 1:))
+      call nodes%pack(column, c(:, k))
     end do
+    deallocate (part, shear_columns, plane)
     missing(:n_shear) = shear_missing
     multiplier(:n_shear) = driven%multipliers(now%motion)
     if (m > n_shear) then
       missing(m) = now%target%value(normal)/now%problem%lattice%cell_area() - system%space%sum(now%p)
       multiplier(m) = now%motion(normal)
-    end if
-    deallocate (plane)
-    if (m > n_shear) then
       allocate (shear_columns(pressed%n_active, 1), source=1.0_wp)
       call find_punch_pressure(now, pressed, shear_columns, part, error)
       if (allocated(error)) return
-      call pressed%unpack(part(:, 1), mb(:n, m))
+      column = 0.0_wp
+      call pressed%unpack(part(:, 1), column(:n))
+      call nodes%pack(column, m_b(:, m))
+      column(:n) = merge(1.0_wp, 0.0_wp, now%contact)
+      call nodes%pack(column, b(:, m))
+      c(:, m) = b(:, m)
       deallocate (part, shear_columns)
     end if
-    call nodes%pack_columns(columns, b)
-    deallocate (columns)
-    call nodes%pack_columns(mb, m_b)
-    deallocate (mb)
-    call nodes%pack_columns(rows, c)
-    deallocate (rows)
+    deallocate (column)
     call satisfy_constraints(c, m_b, missing(:m), x, independent, system%space, nodes)
     ! 4.
     if (independent) then

@@ -7,7 +7,7 @@
 module hc_friction_iterate
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp
-  use hc_error, only: error_t, status, raise
+  use hc_error, only: error_t
   use hc_contact_state, only: contact_state_t, load_target_t, normal, along_x, along_y, about_z, n_motion, &
     force_control
   use hc_contact_residuals, only: normal_residual, tangential_scale
@@ -31,7 +31,7 @@ module hc_friction_iterate
     real(wp), allocatable :: p(:), w(:)
     !> Shear traction, and the tangential displacement that it causes together with the pressure
     real(wp), allocatable :: q(:), u(:)
-    !> Closing of the gap that the shear traction causes
+    !> Closing of the gap that the shear traction causes; no element where it causes none
     real(wp), allocatable :: closing(:)
     !> It is that of the traction cut to the cone, as a staggered sweep leaves it; or it is part of `w`, and
     !> `closing` is zero, as after a coupled sweep
@@ -54,7 +54,9 @@ module hc_friction_iterate
     real(wp) :: tolerance = 0.0_wp
     !> Initial gap; relative displacement at the beginning of the step
     real(wp), pointer, contiguous :: h(:) => null(), origin(:) => null()
-    logical, allocatable :: candidate(:)
+    !> Nodes that may touch: those of the problem, or the ones among them where the bodies would overlap
+    logical, pointer, contiguous :: candidate(:) => null()
+    logical, allocatable :: reached(:)
     !> Pressure moves nodes tangentially; shear tractions move them along the normal, and so the pressure
     logical :: shear_feels_pressure = .false., pressure_feels_shear = .false.
     !> Damping and cuts of the classification parameter
@@ -89,15 +91,13 @@ module hc_friction_iterate
     procedure :: find_residuals, find_tangential_residual
     !> Are tractions and motions finite?
     procedure :: is_finite
-    !> Are displacements those of the tractions?
-    procedure :: check_displacements
   end type friction_iterate_t
 
 contains
 
   !> Set tractions and motions from those of a state, and find what they displace.
   subroutine set_start(self, problem, operators, start, reference, target, tolerance, error, estimate)
-    class(friction_iterate_t), intent(inout) :: self
+    class(friction_iterate_t), intent(inout), target :: self
     !> The problem
     type(friction_problem_t), intent(in), target :: problem
     !> Operator and preconditioners over its window
@@ -135,7 +135,13 @@ contains
     self%h(1:n) => problem%initial_gap
     self%origin(1:2*n) => reference
     allocate (self%p(n), self%q(2*n))
-    allocate (self%candidate(n), self%contact(n))
+    allocate (self%contact(n))
+    self%candidate(1:n) => problem%candidate
+    if (highest < huge(1.0_wp)) then
+      allocate (self%reached(n))
+      self%reached = self%candidate .and. self%h < highest
+      self%candidate => self%reached
+    end if
     if (problem%normal_law%is_compliant()) allocate (self%pressure%compliance(n), self%pressure%offset(n), source=0.0_wp)
     !$omp parallel do schedule(static) num_threads(operators%space%threads) private(from, to)
     do row = 1, problem%lattice%extent(2)
@@ -144,7 +150,6 @@ contains
       self%p(from:to) = start%pressure(:, row)
       self%q(from:to) = start%traction(:, row, 1)
       self%q(n + from:n + to) = start%traction(:, row, 2)
-      self%candidate(from:to) = problem%candidate(:, row) .and. self%h(from:to) < highest
       self%contact(from:to) = self%p(from:to) > 0.0_wp .and. self%candidate(from:to)
     end do
     !$omp end parallel do
@@ -185,18 +190,17 @@ contains
     integer :: n, row, from, to
 
     n = size(self%p)
-    allocate (self%w(n), self%closing(n), self%u(2*n))
+    call allocate_displacements(self)
     if (self%pressure_feels_shear) then
       call self%operators%apply([along_x, along_y], self%q, [normal], self%closing, error)
       if (allocated(error)) return
-    else
-      call self%operators%space%fill(self%closing, 0.0_wp)
     end if
     !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(from, to)
     do row = 1, size(estimate, 2)
       to = row*size(estimate, 1)
       from = to - size(estimate, 1) + 1
-      self%w(from:to) = estimate(:, row, 1) - self%closing(from:to)
+      self%w(from:to) = estimate(:, row, 1)
+      if (self%pressure_feels_shear) self%w(from:to) = self%w(from:to) - self%closing(from:to)
       self%u(from:to) = estimate(:, row, 2)
       self%u(n + from:n + to) = estimate(:, row, 3)
     end do
@@ -216,7 +220,7 @@ contains
     space = self%operators%space
     self%cut = .false.
     self%joint = .false.
-    if (.not. allocated(self%w)) allocate (self%w(n), self%closing(n), self%u(2*n))
+    if (.not. allocated(self%w)) call allocate_displacements(self)
     allocate (moved(3*n))
     if (self%shear_feels_pressure .and. .not. (self%without_start .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
@@ -228,7 +232,7 @@ contains
       if (allocated(error)) return
       call space%fill(self%u, 0.0_wp)
     end if
-    call space%fill(self%closing, 0.0_wp)
+    if (self%pressure_feels_shear) call space%fill(self%closing, 0.0_wp)
     if (.not. space%max_abs(self%q) > 0.0_wp) return
     if (self%pressure_feels_shear) then
       call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
@@ -240,6 +244,15 @@ contains
     end if
     call space%add(moved(n + 1:), self%u)
   end subroutine refresh
+
+  !> Allocate the displacements.
+  subroutine allocate_displacements(self)
+    class(friction_iterate_t), intent(inout) :: self
+
+    associate (n => size(self%p))
+      allocate (self%w(n), self%closing(merge(n, 0, self%pressure_feels_shear)), self%u(2*n))
+    end associate
+  end subroutine allocate_displacements
 
   !> Free the displacements; the next ones come from `refresh`.
   subroutine forget_displacements(self)
@@ -258,7 +271,9 @@ contains
     allocate (gap(size(self%p)))
     !$omp parallel do schedule(static) num_threads(self%operators%space%threads)
     do i = 1, size(gap)
-      gap(i) = self%h(i) + self%closing(i) + self%w(i) - self%motion(normal)
+      gap(i) = self%h(i)
+      if (self%pressure_feels_shear) gap(i) = gap(i) + self%closing(i)
+      gap(i) = gap(i) + self%w(i) - self%motion(normal)
     end do
     !$omp end parallel do
   end subroutine find_gap
@@ -301,13 +316,12 @@ contains
   subroutine project_to_cone(self, q)
     class(friction_iterate_t), intent(in) :: self
     !> The traction, components along x and y (2 n) [Pa]
-    real(wp), allocatable, intent(out) :: q(:)
+    real(wp), intent(inout), contiguous :: q(:)
     real(wp) :: unit
     integer :: n, n_col, row, from, to
 
     n = size(self%p)
     n_col = self%problem%lattice%extent(1)
-    allocate (q(2*n))
     unit = pressure_unit(self)
     !$omp parallel do schedule(static) num_threads(self%operators%space%threads) private(from, to)
     do row = 1, n/n_col
@@ -383,54 +397,6 @@ contains
     end do
     !$omp end parallel do
   end function is_finite
-
-  !> Fail where `w`, `closing` and `u` are not what the tractions cause: every step of the algorithm has to
-  !> leave them so. The products are not counted.
-  subroutine check_displacements(self, error)
-    class(friction_iterate_t), intent(inout) :: self
-    !> Allocated on failure
-    type(error_t), allocatable, intent(out) :: error
-    real(wp) :: applications, largest
-    real(wp), allocatable :: q(:), moved(:), by_pressure(:), w(:), u(:), closing(:)
-
-    associate (n => size(self%p), rounding => self%problem%options%newton%displacement_rounding)
-      allocate (moved(3*n), by_pressure(3*n), source=0.0_wp)
-      applications = self%operators%flexibility%applications
-      call self%operators%apply([normal], self%p, [normal, along_x, along_y], by_pressure, error)
-      if (allocated(error)) return
-      if (.not. self%shear_feels_pressure) by_pressure(n + 1:) = 0.0_wp
-      call self%operators%apply([along_x, along_y], self%q, [normal, along_x, along_y], moved, error)
-      if (allocated(error)) return
-      u = by_pressure(n + 1:) + moved(n + 1:)
-      if (self%cut) then
-        call self%project_to_cone(q)
-        call self%operators%apply([along_x, along_y], q, [normal], moved(:n), error)
-        if (allocated(error)) return
-      end if
-      if (.not. self%pressure_feels_shear) moved(:n) = 0.0_wp
-      w = by_pressure(:n) + merge(moved(:n), 0.0_wp, self%joint)
-      closing = merge(0.0_wp, moved(:n), self%joint)
-      self%operators%flexibility%applications = applications
-      ! what sticks moves little: pressure and shear traction cancel there
-      largest = maxval(abs(by_pressure(n + 1:))) + maxval(abs(moved(n + 1:)))
-      if (.not. (agree(self%w, w, maxval(abs(w)), rounding) .and. &
-                 agree(self%closing, closing, maxval(abs(w)), rounding) .and. &
-                 (agree(self%u, u, largest, rounding) .or. .not. self%problem%friction%resists()))) then
-        call raise(error, status%no_convergence, 'friction: displacements are not those of the tractions')
-      end if
-    end associate
-  end subroutine check_displacements
-
-  !> Return whether two fields agree but for rounding errors.
-  pure logical function agree(one, other, scale, rounding)
-    real(wp), intent(in) :: one(:), other(:)
-    !> Size of what they belong to
-    real(wp), intent(in) :: scale
-    !> Share of it that rounding errors may make up
-    real(wp), intent(in) :: rounding
-
-    agree = all(abs(one - other) <= rounding*scale)
-  end function agree
 
   !> Compute R_n of a gap under the present pressure.
   real(wp) function gap_residual(self, gap)

@@ -120,32 +120,34 @@ contains
     integer, parameter :: field = 8, half = 4
     !> Directions of GMRES that are enough as a rule
     integer, parameter :: n_direction = 7
-    integer(long) :: n, everywhere, building, iterating, inside, recording
+    integer(long) :: n, everywhere, iterating, inside, recording
 
     n = int(extent(1), long)*extent(2)
-    ! iterate; traction estimates; shear system; weights of its preconditioner
-    everywhere = 7*field + 2*half + (1 + 2*max(n_force - 1, 1))*half + 3*field + 2*half
-    building = 0
+    ! iterate; traction estimates; shear system
+    everywhere = 6*field + half + (1 + 2*max(n_force - 1, 1))*half + 3*field
+    ! what the preconditioner of the shear traction gets and gives, what it averages and the mean; packed: its weights, what it
+    ! turns into the frames
+    iterating = 4*2*half
+    inside = 2*half + 2*field
+    ! state after and displacements, without those of the iterate
+    recording = (10 + 3 - 3)*field + half
     if (coupled) then
-      ! unknowns, slope; constraints thrice, and what makes them
-      everywhere = everywhere + (3 + 1)*field
-      building = (3*3*n_force + 2)*field
-      ! products of the unknowns and of a direction, its tractions, what the preconditioner gets and gives; the products of
-      ! all directions off the contact; without the displacements of the iterate
-      iterating = (3 + 3 + 3 - 4)*field + 2*2*half + 3*n_direction*field
+      ! closing by the shear traction, unknowns, slope
+      everywhere = everywhere + (1 + 3 + 1)*field
+      ! products of the unknowns and of a direction, its tractions; the products of all directions off the contact; without the
+      ! displacements of the iterate
+      iterating = iterating + (3 + 3 + 3 - 4)*field + 3*n_direction*field
       ! packed: both of all directions, residuals, constraints thrice
-      inside = 3*(2*n_direction + 2 + 3*n_force)*field - 3*n_direction*field
+      inside = inside + 3*(2*n_direction + 2 + 3*n_force)*field - 3*n_direction*field
+      ! tractions together, without the closing
+      recording = recording + (3 - 1)*field
     else
-      ! traction before
-      everywhere = everywhere + 2*field
-      ! product of a direction, its tractions, and what the preconditioner gets and gives
-      iterating = 2*2*field + 2*2*half
-      ! packed: vectors of conjugate gradients, constraints twice
-      inside = 2*(4 + 2*max(n_force - 1, 1))*field
+      ! product of a direction, its tractions
+      iterating = iterating + 2*2*field
+      ! packed: traction before, vectors of conjugate gradients, constraints twice
+      inside = inside + 2*(1 + 4 + 2*max(n_force - 1, 1))*field
     end if
-    ! state after, displacements and the tractions of unlike materials, without the displacements of the iterate
-    recording = (10 + 3 + 3 - 4)*field + half
-    friction_step_memory = n*everywhere + max(n*building, n*iterating + n_contact*inside, n*recording)
+    friction_step_memory = n*everywhere + max(n*iterating + n_contact*inside, n*recording)
   end function friction_step_memory
 
   !> Compute the displacements of given tractions by the operator of the finest lattice.

@@ -16,6 +16,7 @@ module hc_lattice_solver
   use hc_load_constraints, only: overloads
   use hc_elastic_operators, only: operators_t
   use hc_friction_iterate, only: friction_iterate_t
+  use hc_displacement_check, only: check_displacements
   use hc_staggered_newton, only: staggered_sweep
   use hc_coupled_newton, only: coupled_sweep
   use hc_linear_system, only: solution_broke_off
@@ -84,7 +85,7 @@ contains
       if (failed) call staggered_sweep(now, error)
       if (allocated(error)) return
       if (.not. now%is_finite()) exit
-      if (debug_checks) call now%check_displacements(error)
+      if (debug_checks) call check_displacements(now, error)
       if (allocated(error)) return
       if (now%fixed) then
         fixed = fixed + 1
@@ -140,19 +141,17 @@ contains
   !> Record the tractions of an iterate, without tension and within the admissible set.
   subroutine record(now, state)
     type(friction_iterate_t), intent(in) :: now
-    type(contact_state_t), intent(inout) :: state
-    real(wp), allocatable :: q(:)
-    integer :: n, row, from, to
+    type(contact_state_t), intent(inout), target :: state
+    real(wp), pointer, contiguous :: q(:)
+    integer :: row, from, to
 
-    n = size(now%p)
+    q(1:size(state%traction)) => state%traction
     call now%project_to_cone(q)
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
     do row = 1, size(state%pressure, 2)
       to = row*size(state%pressure, 1)
       from = to - size(state%pressure, 1) + 1
       call now%problem%normal_law%project(now%p(from:to), state%pressure(:, row))
-      state%traction(:, row, 1) = q(from:to)
-      state%traction(:, row, 2) = q(n + from:n + to)
     end do
     !$omp end parallel do
   end subroutine record
@@ -169,7 +168,8 @@ contains
     do row = 1, size(displacement, 2)
       to = row*size(displacement, 1)
       from = to - size(displacement, 1) + 1
-      displacement(:, row, 1) = now%w(from:to) + now%closing(from:to)
+      displacement(:, row, 1) = now%w(from:to)
+      if (now%pressure_feels_shear) displacement(:, row, 1) = displacement(:, row, 1) + now%closing(from:to)
       displacement(:, row, 2) = now%u(from:to)
       displacement(:, row, 3) = now%u(n + from:n + to)
     end do

@@ -67,6 +67,7 @@ contains
     if (allocated(error)) return
     ! 4.
     if (now%pressure_feels_shear) then
+      allocate (q(2*size(now%p)))
       call now%project_to_cone(q)
       call now%operators%apply([along_x, along_y], q, [normal], now%closing, error)
       if (allocated(error)) return
@@ -140,7 +141,8 @@ contains
       allocate (rhs(n))
       !$omp parallel do schedule(static) num_threads(now%pressure%space%threads)
       do i = 1, n
-        rhs(i) = level - now%h(i) - now%closing(i)
+        rhs(i) = level - now%h(i)
+        if (now%pressure_feels_shear) rhs(i) = rhs(i) - now%closing(i)
         if (changed) now%p(i) = merge(max(now%p(i), 0.0_wp), 0.0_wp, now%contact(i))
       end do
       !$omp end parallel do
@@ -190,7 +192,7 @@ contains
 
     real(wp), allocatable :: x(:), ax(:), rhs(:), constraint(:, :), mb(:, :), q(:)
     logical, allocatable :: active(:)
-    type(active_set_t) :: nodes
+    type(active_set_t) :: nodes, loaded
     real(wp), allocatable :: missing(:), multiplier(:)
     type(driven_motions_t) :: driven
     type(newton_options_t) :: options
@@ -206,8 +208,11 @@ contains
       return
     end if
     call relax_fronts(now)
-    allocate (q(2*n))
-    call now%shear%space%copy(now%q, q)
+    ! the traction before, where there is one
+    active = .not. (abs(now%q(:n)) <= 0.0_wp .and. abs(now%q(n + 1:)) <= 0.0_wp)
+    call new_active_set(loaded, [active, active], now%shear%space)
+    allocate (q(loaded%n_active))
+    call loaded%pack(now%q, q)
     fixing = .false.
     highest = now%traction_scale()
     scale = now%problem%tangential_compliance*highest
@@ -272,11 +277,11 @@ contains
       end if
       fixing = .true.
       call now%globalization%cut(options%cautious_share, options)
-      now%q = q
+      call take_back()
     end do
     deallocate (constraint, mb)
     if (now%unsupported) then
-      now%q = q
+      call take_back()
       call now%refresh(error)
       return
     end if
@@ -289,9 +294,11 @@ contains
     if (share < 1.0_wp) then
       judged = .false.
       ! Newton's method oscillates: any iterate between carries the same loads
-      now%q = merge(q + share*(now%q - q), 0.0_wp, [now%contact, now%contact])
-      now%motion = motion + share*(now%motion - motion)
       call move_alloc(now%q, x)
+      call take_back()
+      x = merge(now%q + share*(x - now%q), 0.0_wp, [now%contact, now%contact])
+      deallocate (now%q)
+      now%motion = motion + share*(now%motion - motion)
       call now%shear%turn(x)
       call move_alloc(now%u, ax)
       call displace(now, x, ax, error)
@@ -304,6 +311,13 @@ contains
     end if
 
   contains
+
+    !> Take the traction before.
+    subroutine take_back()
+      if (.not. allocated(now%q)) allocate (now%q(2*n))
+      call now%shear%space%fill(now%q, 0.0_wp)
+      call loaded%unpack(q, now%q)
+    end subroutine take_back
 
     !> Take a traction and its displacement out of the frames.
     subroutine take(traction, displacement)

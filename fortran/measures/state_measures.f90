@@ -147,17 +147,16 @@ contains
     type(lattice_t), intent(in) :: lattice
     !> State with friction
     type(contact_state_t), intent(in) :: state
-    real(wp), allocatable :: x(:, :), y(:, :)
+    real(wp), dimension(size(state%pressure, 1)) :: x, y
     real(wp) :: moved(2)
     integer :: col, row
 
-    allocate (x, y, mold=state%pressure)
-    call lattice%coordinates(x, y)
     energy = 0.0_wp
-    do row = 1, size(x, 2)
-      do col = 1, size(x, 1)
+    do row = 1, size(state%pressure, 2)
+      call lattice%row_coordinates(row, x, y)
+      do col = 1, size(x)
         if (state%zone(col, row) == separated) cycle
-        moved = state%relative_displacement(col, row, :) + remote_displacement(state%motion, x(col, row), y(col, row))
+        moved = state%relative_displacement(col, row, :) + remote_displacement(state%motion, x(col), y(col))
         energy = energy + dot_product(state%traction(col, row, :), moved)
       end do
     end do
@@ -209,8 +208,7 @@ contains
                          state%motion(normal), space, found, edges)
     if (.not. allocated(state%traction)) return
     found%elastic_energy = found%elastic_energy + shear_energy(lattice, state)
-    allocate (reserve, x, y, mold=initial_gap)
-    call lattice%coordinates(x, y)
+    allocate (reserve, mold=initial_gap)
     reserve = 0.0_wp ! of no use where nothing slips
     if (friction%is_bounded()) then
       allocate (length(size(reserve, 1)))
@@ -222,7 +220,11 @@ contains
     end if
     zone = state%zone == stick
     found%stick = size_of(lattice, space%count(zone), edges%stick_edge(zone, reserve))
+    deallocate (reserve)                                                       ! before the coordinates, which take more
+    allocate (x, y, mold=initial_gap)
+    call lattice%coordinates(x, y)
     call zone_extent(x, y, zone, found%stick_center, found%stick_lower, found%stick_upper, space)
+    deallocate (x, y)
     found%max_traction = space%max(norm2(state%traction, dim=3))
   end function measure_state
 

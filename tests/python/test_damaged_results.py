@@ -73,7 +73,7 @@ def test_flipped_bytes_in_a_result_are_noticed(out: Path) -> None:
     for at in range(0, len(whole) - 8, 211):
         out.write_bytes(whole[:at] + bytes(255 - byte for byte in whole[at : at + 8]) + whole[at + 8 :])
         for read in (open_result, histories):
-            with pytest.raises(DeckError, match=r"out\.nc is damaged: its bytes are not those"):
+            with pytest.raises(DeckError, match=r"out\.nc is damaged: (its bytes are not|the checksum)"):
                 read(out)
 
 

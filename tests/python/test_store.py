@@ -32,6 +32,7 @@ from hexcontact.result import journal as journal_module
 from hexcontact.result import store as store_module
 from hexcontact.result.journal import Journal, journal_of
 from hexcontact.result.layout import Metadata, assemble
+from hexcontact.result.step import Stored
 from hexcontact.result.store import Store, open_result
 
 
@@ -161,6 +162,28 @@ def test_the_journal_of_another_run_does_not_mix_in(out: Path) -> None:
         store.append(made_step(7 - 7))
     assert open_result(out).case_title == "a case"
     assert open_result(journal_of(out)).case_title == "new"
+
+
+def test_fields_of_large_records_are_read_one_by_one(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only those that this process wrote; their checksums are compared."""
+    monkeypatch.setattr(journal_module, "_LARGE", 0)
+    described = written(out)
+    result = open_result(out)
+    assert result.dataset.identical(assemble(described, [made_step(k) for k in range(3)]))
+    other = out.with_name("other.nc")
+    written(other, count=2)
+    [first, second] = Journal(journal_of(other), ours=True)
+    assert isinstance(first.fields, Stored) and list(first.fields) == list(made_step(0).fields)
+    record = Journal(journal_of(other)).records[1]
+    data = bytearray(record.read_bytes())
+    record.write_bytes(data[: len(data) // 3])
+    with pytest.raises(DeckError, match="damaged"):
+        second.fields["zone"]
+    place = data.index(made_step(1).pressure.tobytes())
+    data[place + 9] ^= 1
+    record.write_bytes(data)
+    with pytest.raises(DeckError, match="damaged"):
+        list(Journal(journal_of(other), ours=True))
 
 
 def test_interim_outputs_cost_linear_time(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:

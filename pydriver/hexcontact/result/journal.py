@@ -29,7 +29,7 @@ from ..files import beginning, reading
 from ..variables import VARIABLES
 from .check import fault_of_record, fault_of_sequence
 from .layout import Metadata, assemble
-from .step import Step
+from .step import Step, Stored
 
 if TYPE_CHECKING:
     from .result import Result
@@ -43,6 +43,7 @@ VERSION = 2
 _ABOUT = "about"  # name of the text among the arrays
 _LACKS = "{0} lacks the record of step {1}, {1:06d}" + SUFFIX
 _KIND = "a record of a journal"
+_LARGE = 2**22  # bytes of a record; of a smaller one, opening the file for each field takes longer
 _NO_FOLLOWER = "{} does not belong to the records before it: {}"
 _FIELDS, _COMPANION = "fields", "companion"  # parts with fields: of the step, of a second solution
 
@@ -62,7 +63,8 @@ class Journal:
     companions : bool
         Read the companions of steps, too.
     ours : bool
-        Whether this process has written or read the records already: only their checksums are compared.
+        Whether this process has written or read the records already: only their checksums are compared, and
+        the fields of large ones are not in memory, but read whenever they are asked for.
     """
 
     def __init__(self, folder: Path, companions: bool = False, ours: bool = False) -> None:
@@ -348,7 +350,11 @@ def read_step(
     with reading(path, _KIND), zipfile.ZipFile(path) as file:
         known = _known(file, path)
         about = _about(known)
-        fields = _fields(file, _FIELDS, known)
+        if check or path.stat().st_size < _LARGE:
+            fields: Mapping[str, NDArray[Any]] = _fields(file, _FIELDS, known)
+        else:
+            members = {f"{_FIELDS}_{number}.npy": names for number, names in enumerate(known[_FIELDS])}
+            fields = Stored(path, file, members)
         lattice = Lattice(**known["lattice"] | {"origin": tuple(known["lattice"]["origin"])})
         step = Step(
             *(known["index"], lattice, fields, known["history"]),

@@ -235,8 +235,10 @@ class Layout:
 
     def initial_gap(self, known: NDArray[Any] | None, step: Step) -> NDArray[Any]:
         """Return the initial gap on the whole window: the `known` part, completed by `step`."""
-        values = self.padded("initial_gap", step)
-        return values if known is None else np.where(np.isnan(known), values, known)
+        if known is None:
+            return self.padded("initial_gap", step)
+        unknown = np.isnan(known)
+        return np.where(unknown, self.padded("initial_gap", step), known) if unknown.any() else known
 
 
 def _union(windows: Sequence[Lattice]) -> Lattice:

@@ -90,6 +90,10 @@ def write(path: Path, layout: Layout, steps: Iterable[Step], complete: bool) -> 
             columns = {name: _column(file, name, layout) for name in layout.fields}
             vars(file)["defined"] = True
             file.setncatts(layout.attributes(complete))
+            # chunks are written once; the default, 64 MB a variable, is set with the end of definitions
+            for column in file.variables.values():
+                if column.dimensions[-2:] == ("row", "col"):
+                    column.set_var_chunk_cache(size=0)
             for column, values in given:
                 column[...] = values
             mesh.write_mesh(file, layout.window)
@@ -174,10 +178,7 @@ def _column(file: netCDF4.Dataset, name: str, layout: Layout) -> netCDF4.Variabl
     attributes = layout.attributes_of(name)
     if options and name not in ("x", "y"):
         attributes["coordinates"] = "x y"
-    column = mesh.add_column(file, name, variable.dtype, variable.dims, attributes, **options)
-    if options:
-        column.set_var_chunk_cache(size=0)  # chunks are written once; the default is 64 MB for each variable
-    return column
+    return mesh.add_column(file, name, variable.dtype, variable.dims, attributes, **options)
 
 
 def _text(file: netCDF4.Dataset, name: str, texts: NDArray[Any]) -> tuple[netCDF4.Variable, NDArray[Any]]:

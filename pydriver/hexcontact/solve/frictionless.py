@@ -37,7 +37,7 @@ from .events import Listener
 # Fields that Python holds while a step is solved and measured. Without friction: initial gap, pressure, gap
 # and zones, beside them those that the measures take in place of the iteration's. With friction: the state
 # before, which the core holds, gaps, and holes in the heap of the C library.
-ARRAYS = {False: 3, True: 20}
+ARRAYS = {False: 3, True: 14}
 S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 
 _ITEM = 8  # bytes of a float

@@ -164,10 +164,7 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
             solver = lattices.OnDisk(store, listener)
             solver.finish(lattices.refine(case, solver))
         else:
-            for step in steps(case, before=before, listener=listener):
-                store.append(step)
-                store.publish()
-                _announce_finished(step, store, listener)
+            _solve_into(case, store, listener, before)
             store.finish()
     except Stopped as reason:
         listener.said("stopped", level=logging.WARNING, reason=str(reason))
@@ -177,6 +174,14 @@ def run_into(case: Problem, store: Store, listener: Listener, before: Sequence[S
         if case.deck.stress or case.deck.fatigue:
             for path in write_stresses(store.path):
                 listener.said("written", file=path)
+
+
+def _solve_into(case: Problem, store: Store, listener: Listener, before: Sequence[Step]) -> None:
+    """Record all load steps; apart from `run_into`, so that the last one is freed before the output."""
+    for step in steps(case, before=before, listener=listener):
+        store.append(step)
+        store.publish()
+        _announce_finished(step, store, listener)
 
 
 def write_stresses(output: Path, only_missing: bool = False) -> Iterator[Path]:

@@ -527,7 +527,7 @@ def test_check_on_the_terminal(folder: Path) -> None:
         r"load steps +20",
         r"largest load +12\.00 N",
         r"tolerance 1e-06",
-        r"work +about 360 operator",
+        r"work +about 240 operator",
     ):
         assert re.search(row, done.stdout), row
     deck.write_text("a = 1\nb = ]\n", encoding="utf-8")

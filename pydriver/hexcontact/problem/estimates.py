@@ -11,7 +11,7 @@ from .refinement import least_and_most
 
 # Operator applications of a load step to 1e-8, measured on meshes of 20 to 60 spacings in the radius.
 # Without friction they are of the pressure alone, a third of an application each.
-_FRICTIONLESS, _SIMILAR, _DISSIMILAR = 8 / 3, 18.0, 36.0
+_FRICTIONLESS, _SIMILAR, _DISSIMILAR = 8 / 3, 12.0, 27.0
 _INTERPOLATED = 4.0  # times as many in steps in which nodes enter the contact
 _ADAPTIVE, _ADAPTIVE_SIMILAR = 30, 6  # solutions in a segment of adaptive steps, within a factor of 3
 
@@ -21,7 +21,7 @@ _SECONDS_LEAST = 5e-3  # of a step
 
 # Operator applications of a load step in a cycle that wears, which starts from the cycle before, by coupling;
 # cycles that jumps of "auto" solve, within a factor of 3, over the tolerance to -1/2.
-_WORN, _WORN_COUPLED = 6.0, 20.0
+_WORN, _WORN_COUPLED = 4.0, 16.0
 _JUMPS = 2.0
 
 

@@ -86,8 +86,9 @@ module hc_options
     !> Share of the preconditioned residual that a linear solution starts with, before the product of its start: about the first
     !> step of conjugate gradients. Residual from which on sets change too much for it
     real(wp) :: length_ahead = 0.6_wp, residual_ahead = 0.1_wp
-    !> Iterations of a linear solver, and directions that GMRES stores: far more than the preconditioner needs
-    integer :: max_iterations = 400, max_directions = 40
+    !> Iterations of conjugate gradients and of GMRES, far more than the preconditioner needs; directions that GMRES stores, as many
+    !> as it mostly takes
+    integer :: max_iterations = 400, max_coupled_iterations = 40, max_directions = 7
     !> Contact areas per staggered sweep: one where the shear traction moves the pressure, else until the area stands
     integer :: max_areas = 1, max_areas_uncoupled = 60
     !> What rounding errors may leave in displacements that are carried along, relative to the largest; where more may be

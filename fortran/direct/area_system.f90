@@ -104,7 +104,8 @@ contains
     call new_active_set(nodes, spread(.true., 1, n), system%space)
     allocate (multiplier(size(determined)), source=0.0_wp)
     call projected_gmres(system, nodes, columns, mb, rows, [1.0_wp], right, x, ax, accuracy*scale*real(n, wp)**0.25_wp, &
-                         problem%options%direct%max_directions, multiplier, independent, residual, iterations, outcome, error)
+                         problem%options%direct%max_directions, problem%options%direct%max_directions, multiplier, independent, &
+                         residual, iterations, outcome, error)
     if (allocated(error)) return
     solved = independent .and. outcome == solution_accurate
     change(determined) = multiplier

@@ -180,8 +180,8 @@ contains
       goal = min(max(now%residual_normal, now%residual_tangential), 1.0_wp)
       goal = max(goal*min(options%inner_accuracy, max(goal, options%coupled_accuracy)), options%final_accuracy*now%tolerance)
       goal = goal*real(nodes%n_active, wp)**0.25_wp
-      call projected_gmres(system, nodes, b, m_b, c, weight([1, 2, 2]), rhs, x, ax, goal, options%max_directions, &
-                           multiplier(:m), independent, residual, iterations, now%outcome, error, drift)
+      call projected_gmres(system, nodes, b, m_b, c, weight([1, 2, 2]), rhs, x, ax, goal, options%max_coupled_iterations, &
+                           options%max_directions, multiplier(:m), independent, residual, iterations, now%outcome, error, drift)
       if (allocated(error)) return
       if (drift > options%displacement_rounding) call system%product(x, ax, error)
       if (allocated(error)) return

@@ -36,8 +36,6 @@ module hc_active_set
   contains
     !> The active nodes of a field
     procedure :: pack => pack_field
-    !> The same of several fields
-    procedure :: pack_columns
     !> Put them where they belong, the rest of the field stays as it is
     procedure :: unpack => unpack_field
     !> Add a multiple of them to the field
@@ -190,21 +188,6 @@ contains
     end do
     !$omp end parallel do
   end subroutine pack_field
-
-  !> Gather the active nodes of several vectors.
-  subroutine pack_columns(self, columns, packed)
-    class(active_set_t), intent(in) :: self
-    !> Vectors over all nodes (n, number of vectors)
-    real(wp), intent(in), contiguous :: columns(:, :)
-    !> Vectors on the active nodes (n_active, number of vectors)
-    real(wp), allocatable, intent(out) :: packed(:, :)
-    integer :: m
-
-    allocate (packed(self%n_active, size(columns, 2)))
-    do m = 1, size(columns, 2)
-      call self%pack(columns(:, m), packed(:, m))
-    end do
-  end subroutine pack_columns
 
   !> Scatter values to the active nodes of a field.
   subroutine unpack_field(self, packed, field)

@@ -25,7 +25,7 @@ module hc_projected_gmres
 contains
 
   !> Solve by GMRES, preconditioned from the right, with the constraints C^T x satisfied exactly.
-  subroutine projected_gmres(system, nodes, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, &
+  subroutine projected_gmres(system, nodes, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, max_directions, &
                              multiplier, independent, residual, iterations, outcome, error, drift)
     !> Operator and preconditioner
     class(linear_system_t), intent(inout) :: system
@@ -43,8 +43,8 @@ contains
     real(wp), intent(inout), contiguous :: ax(:)
     !> Euclidean norm of the weighted residuals on the active nodes that is allowed
     real(wp), intent(in) :: tolerance
-    !> Iterations allowed
-    integer, intent(in) :: max_iterations
+    !> Iterations allowed, and directions that are stored: after as many the iteration begins anew with the residual that is left
+    integer, intent(in) :: max_iterations, max_directions
     !> Multipliers of the constraints, on entry a start
     real(wp), intent(inout) :: multiplier(:)
     !> False where the constraints depend on each other: nothing was done
@@ -64,18 +64,18 @@ contains
       real(wp), allocatable :: v(:), z(:), beyond(:)
     end type direction_t
     !> Directions take their memory one by one: mostly a few are enough
-    type(direction_t) :: basis(max_iterations + 1)
+    type(direction_t) :: basis(max_directions + 1)
     type(active_set_t) :: others, of_part
     !> On the active nodes; a product over all nodes
     real(wp), allocatable :: packed(:), image(:)
     !> Places of the last active nodes of the parts
     integer :: last(0:size(weight))
     !> H, and after rotations
-    real(wp), dimension(max_iterations + 1, max_iterations) :: arnoldi, h
-    real(wp) :: g(max_iterations + 1), c(max_iterations), s(max_iterations)
-    real(wp) :: y(max_iterations), share(size(multiplier), max_iterations), length, rotated
+    real(wp), dimension(max_directions + 1, max_directions) :: arnoldi, h
+    real(wp) :: g(max_directions + 1), c(max_directions), s(max_directions), left(max_directions + 1)
+    real(wp) :: y(max_directions), share(size(multiplier), max_directions), length, began
     real(wp) :: inverse(size(multiplier), size(multiplier))
-    integer :: i, k, part, stat
+    integer :: i, part, directions
     type(field_space_t) :: space
 
     iterations = 0
@@ -107,83 +107,116 @@ contains
     if (length <= 0.0_wp) outcome = solution_accurate
     if (.not. length > 0.0_wp) return
     outcome = iterations_used_up
-    basis(1)%v = basis(1)%v/length
-    g = 0.0_wp
-    g(1) = length
-    h = 0.0_wp
 
-    do k = 1, max_iterations
-      allocate (basis(k)%z(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
-      if (stat == 0 .and. .not. allocated(image)) allocate (image(size(x)), stat=stat)
-      if (stat /= 0) then
-        call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
-        return
-      end if
-      call space%copy(basis(k)%v, packed)
-      call weigh(1.0_wp/weight, packed)
-      call system%precondition_packed(nodes, size(x), packed, basis(k)%z, error)
+    do while (outcome == iterations_used_up .and. iterations < max_iterations .and. length > 0.0_wp)
+      call search(min(max_directions, max_iterations - iterations))
       if (allocated(error)) return
-      share(:, k) = -matmul(inverse, space%dots(rows, basis(k)%z))
-      call space%add_columns(mb, share(:, k), basis(k)%z)
-      call system%product_packed(nodes, basis(k)%z, image, error)
-      if (allocated(error)) return
-      call nodes%pack(image, basis(k + 1)%v)
-      call others%pack(image, basis(k)%beyond)
-      call space%add_columns(columns, -share(:, k), basis(k + 1)%v)
-      call weigh(weight, basis(k + 1)%v)
-      do i = 1, k
-        h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
-        basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
-      end do
-      h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
-      arnoldi(:, k) = h(:, k)
-      if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
-      do i = 1, k - 1
-        rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
-        h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
-        h(i, k) = rotated
-      end do
-      length = hypot(h(k, k), h(k + 1, k))
-      if (.not. length > 0.0_wp) outcome = solution_broke_off
-      if (outcome == solution_broke_off) exit
-      iterations = k
-      c(k) = h(k, k)/length
-      s(k) = h(k + 1, k)/length
-      h(k, k) = length
-      g(k + 1) = -s(k)*g(k)
-      g(k) = c(k)*g(k)
-      residual = abs(g(k + 1))
-      if (residual <= tolerance) exit
+      call take_step()
+      iterations = iterations + directions
     end do
-    if (residual <= tolerance) outcome = solution_accurate
     call system%release()
-    if (allocated(image)) deallocate (image)
-
-    do i = iterations, 1, -1
-      y(i) = (g(i) - dot_product(h(i, i + 1:iterations), y(i + 1:iterations)))/h(i, i)
-    end do
-    if (present(drift)) then
-      ! where nodes slip far, the terms of A x are large and cancel
-      do i = 1, iterations
-        drift = drift + epsilon(1.0_wp)*abs(y(i))*norm2(arnoldi(:i + 1, i))
-      end do
-    end if
-    ! solution and product from the same directions: the preconditioner is of single precision, and where a node
-    ! slips far the matrix would make displacements of its rounding errors
-    packed = 0.0_wp
-    do i = 1, iterations + 1
-      packed = packed + dot_product(arnoldi(i, :iterations), y(:iterations))*basis(i)%v
-    end do
-    call weigh(1.0_wp/weight, packed)
-    call space%add_columns(columns, matmul(share(:, :iterations), y(:iterations)), packed)
-    call nodes%add(1.0_wp, packed, ax)
-    do i = 1, iterations
-      call nodes%add(y(i), basis(i)%z, x)
-      call others%add(y(i), basis(i)%beyond, ax)
-    end do
-    multiplier = multiplier + matmul(share(:, :iterations), y(:iterations))
 
   contains
+
+    !> Find directions, and the combination of them that reduces the residual most.
+    subroutine search(most)
+      !> Directions allowed
+      integer, intent(in) :: most
+      real(wp) :: rotated
+      integer :: i, k, stat
+
+      directions = 0
+      began = length
+      basis(1)%v = basis(1)%v/length
+      g = 0.0_wp
+      g(1) = began
+      h = 0.0_wp
+      do k = 1, most
+        stat = 0
+        if (.not. allocated(basis(k)%z)) then
+          allocate (basis(k)%z(nodes%n_active), basis(k)%beyond(others%n_active), basis(k + 1)%v(nodes%n_active), stat=stat)
+        end if
+        if (stat == 0 .and. .not. allocated(image)) allocate (image(size(x)), stat=stat)
+        if (stat /= 0) then
+          call raise(error, status%resources, 'not enough memory for another direction of GMRES: choose a smaller window')
+          return
+        end if
+        call space%copy(basis(k)%v, packed)
+        call weigh(1.0_wp/weight, packed)
+        call system%precondition_packed(nodes, size(x), packed, basis(k)%z, error)
+        if (allocated(error)) return
+        share(:, k) = -matmul(inverse, space%dots(rows, basis(k)%z))
+        call space%add_columns(mb, share(:, k), basis(k)%z)
+        call system%product_packed(nodes, basis(k)%z, image, error)
+        if (allocated(error)) return
+        call nodes%pack(image, basis(k + 1)%v)
+        call others%pack(image, basis(k)%beyond)
+        call space%add_columns(columns, -share(:, k), basis(k + 1)%v)
+        call weigh(weight, basis(k + 1)%v)
+        do i = 1, k
+          h(i, k) = space%dot(basis(i)%v, basis(k + 1)%v)
+          basis(k + 1)%v = basis(k + 1)%v - h(i, k)*basis(i)%v
+        end do
+        h(k + 1, k) = sqrt(space%dot(basis(k + 1)%v, basis(k + 1)%v))
+        arnoldi(:, k) = h(:, k)
+        if (h(k + 1, k) > 0.0_wp) basis(k + 1)%v = basis(k + 1)%v/h(k + 1, k)
+        do i = 1, k - 1
+          rotated = c(i)*h(i, k) + s(i)*h(i + 1, k)
+          h(i + 1, k) = -s(i)*h(i, k) + c(i)*h(i + 1, k)
+          h(i, k) = rotated
+        end do
+        length = hypot(h(k, k), h(k + 1, k))
+        if (.not. length > 0.0_wp) outcome = solution_broke_off
+        if (outcome == solution_broke_off) exit
+        directions = k
+        c(k) = h(k, k)/length
+        s(k) = h(k + 1, k)/length
+        h(k, k) = length
+        g(k + 1) = -s(k)*g(k)
+        g(k) = c(k)*g(k)
+        residual = abs(g(k + 1))
+        if (residual <= tolerance) exit
+      end do
+      if (residual <= tolerance) outcome = solution_accurate
+    end subroutine search
+
+    !> Add that combination to the unknowns, their product and the multipliers; the residual that is left is the first direction.
+    subroutine take_step()
+      integer :: i
+
+      do i = directions, 1, -1
+        y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
+      end do
+      if (present(drift)) then
+        ! where nodes slip far, the terms of A x are large and cancel
+        do i = 1, directions
+          drift = drift + epsilon(1.0_wp)*abs(y(i))*norm2(arnoldi(:i + 1, i))
+        end do
+      end if
+      ! solution and product from the same directions: the preconditioner is of single precision, and where a node
+      ! slips far the matrix would make displacements of its rounding errors
+      left = 0.0_wp
+      packed = 0.0_wp
+      do i = 1, directions + 1
+        left(i) = -dot_product(arnoldi(i, :directions), y(:directions))
+        packed = packed - left(i)*basis(i)%v
+      end do
+      call weigh(1.0_wp/weight, packed)
+      call space%add_columns(columns, matmul(share(:, :directions), y(:directions)), packed)
+      call nodes%add(1.0_wp, packed, ax)
+      do i = 1, directions
+        call nodes%add(y(i), basis(i)%z, x)
+        call others%add(y(i), basis(i)%beyond, ax)
+      end do
+      multiplier = multiplier + matmul(share(:, :directions), y(:directions))
+      if (outcome /= iterations_used_up) return
+      left(1) = left(1) + began
+      basis(1)%v = left(1)*basis(1)%v
+      do i = 2, directions + 1
+        basis(1)%v = basis(1)%v + left(i)*basis(i)%v
+      end do
+      length = sqrt(space%dot(basis(1)%v, basis(1)%v))
+    end subroutine take_step
 
     !> Multiply by one factor for each part.
     subroutine weigh(factor, values)

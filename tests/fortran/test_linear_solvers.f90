@@ -39,6 +39,7 @@ contains
       new_test('outcomes', test_outcomes), &
       new_test('norm_of_gmres', test_norm_of_gmres), &
       new_test('products_that_are_carried', test_products_that_are_carried), &
+      new_test('restarts_of_gmres', test_restarts_of_gmres), &
       new_test('ends_of_gmres', test_ends_of_gmres) &
     ]
   end subroutine collect_linear_solvers
@@ -89,8 +90,8 @@ contains
     type(active_set_t) :: nodes
 
     call new_active_set(nodes, active, system%space)
-    call nodes%pack_columns(constraint, b)
-    call nodes%pack_columns(mb, m_b)
+    call pack_columns(nodes, constraint, b)
+    call pack_columns(nodes, mb, m_b)
     allocate (right, source=rhs)
     call freeing_cg(system, nodes, b, m_b, right, x, ax, tolerance, max_iterations, multiplier, residual, iterations, &
                     outcome, error, drift)
@@ -108,7 +109,7 @@ contains
     integer :: k
 
     call new_active_set(nodes, active, system%space)
-    call nodes%pack_columns(constraint, b)
+    call pack_columns(nodes, constraint, b)
     call precondition_packed_constraints(system, nodes, size(active), b, m_b, error)
     allocate (mb(size(constraint, 1), size(constraint, 2)), source=0.0_wp)
     if (allocated(error)) return
@@ -117,9 +118,24 @@ contains
     end do
   end subroutine precondition_constraints
 
+  !> Gather the active nodes of several vectors.
+  subroutine pack_columns(nodes, columns, packed)
+    type(active_set_t), intent(in) :: nodes
+    !> Vectors over all nodes (n, number of vectors)
+    real(wp), intent(in) :: columns(:, :)
+    !> Vectors on the active nodes (n_active, number of vectors)
+    real(wp), allocatable, intent(out) :: packed(:, :)
+    integer :: m
+
+    allocate (packed(nodes%n_active, size(columns, 2)))
+    do m = 1, size(columns, 2)
+      call nodes%pack(columns(:, m), packed(:, m))
+    end do
+  end subroutine pack_columns
+
   !> GMRES with constraints over all nodes, which frees a copy of the right-hand side.
   subroutine projected_gmres(system, active, columns, mb, rows, weight, rhs, x, ax, tolerance, max_iterations, multiplier, &
-                             independent, residual, iterations, outcome, error, drift)
+                             independent, residual, iterations, outcome, error, drift, max_directions)
     type(dense_system_t), intent(inout) :: system
     logical, intent(in) :: active(:)
     real(wp), intent(in) :: columns(:, :), mb(:, :), rows(:, :), weight(:), rhs(:), tolerance
@@ -131,16 +147,22 @@ contains
     integer, intent(out) :: iterations, outcome
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(out), optional :: drift
+    !> Directions that are stored; absent: all of them
+    integer, intent(in), optional :: max_directions
     real(wp), allocatable :: b(:, :), m_b(:, :), c(:, :), right(:)
     type(active_set_t) :: nodes
+    integer :: most
+
+    most = max_iterations
+    if (present(max_directions)) most = max_directions
 
     call new_active_set(nodes, active, system%space)
-    call nodes%pack_columns(columns, b)
-    call nodes%pack_columns(mb, m_b)
-    call nodes%pack_columns(rows, c)
+    call pack_columns(nodes, columns, b)
+    call pack_columns(nodes, mb, m_b)
+    call pack_columns(nodes, rows, c)
     allocate (right, source=rhs)
-    call freeing_gmres(system, nodes, b, m_b, c, weight, right, x, ax, tolerance, max_iterations, multiplier, independent, &
-                       residual, iterations, outcome, error, drift)
+    call freeing_gmres(system, nodes, b, m_b, c, weight, right, x, ax, tolerance, max_iterations, most, multiplier, &
+                       independent, residual, iterations, outcome, error, drift)
   end subroutine projected_gmres
 
   !> Minimum of x.Ax/2 - b.x under x_1 + x_2 + x_4 = 6, x_3 and x_5 fixed at zero, against Gauss elimination by hand.
@@ -271,6 +293,62 @@ contains
     end do
   end subroutine test_products_that_are_carried
 
+  !> GMRES with two directions at a time comes to the solution under a constraint, too, by more iterations; its product and its
+  !> residual are those of the unknowns wherever it stops.
+  subroutine test_restarts_of_gmres(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(dense_system_t) :: system
+    real(wp) :: x(5), ax(5), solution(5), multiplier(1), residual, constraint(5, 1), left
+    real(wp), parameter :: rhs(5) = [1.0_wp, 2.0_wp, 9.0_wp, 3.0_wp, -4.0_wp], weight(5) = [1.0_wp, 2.0_wp, 1.0_wp, 0.5_wp, 1.0_wp]
+    logical, parameter :: active(5) = .true.
+    logical :: independent
+    integer :: iterations, outcome, i, most, all_at_once
+
+    system%matrix = 1.0_wp
+    do i = 1, 5
+      system%matrix(i, i) = 1.0_wp + i
+    end do
+    system%matrix(2, 1) = -3.0_wp
+    constraint = 1.0_wp
+    call solve(99, 99)
+    if (allocated(error)) return
+    solution = x
+    all_at_once = iterations
+    do most = 1, 7
+      call solve(most, 2)
+      if (allocated(error)) return
+      left = norm2(weight*(rhs + multiplier(1) - matmul(system%matrix, x)))
+      call check(error, residual, left, 1.0e-12_wp, 'the norm that is left')
+      if (allocated(error)) return
+      call check(error, ax, matmul(system%matrix, x), 1.0e-12_wp, 'the product')
+      if (allocated(error)) return
+      call check(error, [sum(x)], [6.0_wp], 1.0e-12_wp, 'the constraint')
+      if (allocated(error)) return
+      call check_true(error, iterations == most .and. outcome == iterations_used_up, 'stopped on the way')
+      if (allocated(error)) return
+    end do
+    call solve(99, 2)
+    if (allocated(error)) return
+    call check(error, outcome, solution_accurate, 'outcome')
+    if (allocated(error)) return
+    call check(error, x, solution, 1.0e-9_wp, 'solution')
+    if (allocated(error)) return
+    call check_true(error, iterations > all_at_once, 'more iterations')
+
+  contains
+
+    subroutine solve(most_iterations, directions)
+      integer, intent(in) :: most_iterations, directions
+
+      x = [6.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+      ax = matmul(system%matrix, x)
+      multiplier = 0.0_wp
+      call projected_gmres(system, active, constraint, constraint, constraint, weight, rhs, x, ax, 1.0e-10_wp, most_iterations, &
+                           multiplier, independent, residual, iterations, outcome, error, max_directions=directions)
+    end subroutine solve
+
+  end subroutine test_restarts_of_gmres
+
   !> GMRES leaves alone what has constraints that depend on each other, what is solved, and what no direction changes.
   subroutine test_ends_of_gmres(error)
     type(error_t), allocatable, intent(out) :: error
@@ -384,9 +462,9 @@ contains
     x(3) = 2.1_wp
     before = x
     call new_active_set(nodes, active, system%space)
-    call nodes%pack_columns(columns, b)
-    call nodes%pack_columns(mb, m_b)
-    call nodes%pack_columns(rows, c)
+    call pack_columns(nodes, columns, b)
+    call pack_columns(nodes, mb, m_b)
+    call pack_columns(nodes, rows, c)
     call step_ahead(system, nodes, b, m_b, c, rhs, ax, multiplier, length, x, error)
     if (allocated(error)) return
     r = merge(rhs - ax + 0.5_wp*columns(:, 1), 0.0_wp, active)

@@ -60,6 +60,8 @@ module hc_contact_problem
     procedure :: separate
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure :: displacements
+    !> The same into a state, and displacements that are known
+    procedure :: displace, take_displacement
     !> Tangential displacement of a rigid motion, at all nodes and at those of a row
     procedure :: rigid_displacement, rigid_displacement_row
     !> Resultants of given tractions
@@ -177,13 +179,11 @@ contains
     real(wp), intent(in) :: tolerance
     !> State without contact; sliding where a tangential load is prescribed
     type(contact_state_t), intent(out) :: state
-    real(wp), allocatable :: displacement(:, :, :)
 
     call new_friction_state(state, self%lattice, self%space)
     state%motion = merge(start%motion, target%value, target%control == force_control)
     if (target%control(normal) == force_control) state%motion(normal) = self%space%min(self%initial_gap, self%candidate)
-    allocate (displacement(self%lattice%extent(1), self%lattice%extent(2), 3), source=0.0_wp)
-    call self%complete_state(target, tolerance, reference, displacement, state)
+    call self%complete_state(target, tolerance, reference, state)
     state%sliding = .not. state%converged
     if (state%sliding) state%stopped = loads_not_carried
   end subroutine separate
@@ -222,6 +222,50 @@ contains
     if (allocated(error)) return
     if (self%goodman) call flexibility%apply([normal], tractions(:, :, :1), [normal], displacement(:, :, :1), error)
   end subroutine displacements
+
+  !> Compute what the tractions of a state displace, by any operator: w into its gap, u into its relative displacement, from
+  !> which `complete_state` goes on.
+  subroutine displace(self, flexibility, state, error)
+    class(friction_problem_t), intent(in) :: self
+    !> Flexibility operator over the window
+    class(flexibility_t), intent(inout) :: flexibility
+    !> State whose tractions are known
+    type(contact_state_t), intent(inout), target :: state
+    !> Allocated on failure
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: displacement(:, :, :)
+    real(wp), pointer, contiguous :: acting(:, :, :), closing(:, :, :)
+
+    if (abs(self%pair%lambda_2) > 0.0_wp) then
+      allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
+      call self%displacements(flexibility, state%pressure, state%traction, displacement, error)
+      if (.not. allocated(error)) call self%take_displacement(displacement, state)
+    else
+      ! pressure and shear traction do not move each other: each of them fills its field
+      acting(1:size(state%pressure, 1), 1:size(state%pressure, 2), 1:1) => state%pressure
+      closing(1:size(state%pressure, 1), 1:size(state%pressure, 2), 1:1) => state%gap
+      call flexibility%apply([normal], acting, [normal], closing, error)
+      if (allocated(error)) return
+      call flexibility%apply([along_x, along_y], state%traction, [along_x, along_y], state%relative_displacement, error)
+    end if
+  end subroutine displace
+
+  !> Put displacements that are known where `complete_state` expects them.
+  subroutine take_displacement(self, displacement, state)
+    class(friction_problem_t), intent(in) :: self
+    !> w, u_x, u_y (n_col, n_row, 3) [m]
+    real(wp), intent(in) :: displacement(:, :, :)
+    !> State that gets them
+    type(contact_state_t), intent(inout) :: state
+    integer :: row
+
+    !$omp parallel do schedule(static) num_threads(self%space%threads)
+    do row = 1, size(displacement, 2)
+      state%gap(:, row) = displacement(:, row, 1)
+      state%relative_displacement(:, row, :) = displacement(:, row, 2:)
+    end do
+    !$omp end parallel do
+  end subroutine take_displacement
 
   !> Compute the displacement by the motions of the remote parts at every node (n_col, n_row, 2) [m].
   pure function rigid_displacement(self, motion) result(displacement)
@@ -324,8 +368,8 @@ contains
     sprung_compliance = self%normal_compliance + self%normal_law%compliance_under(p_max)
   end function sprung_compliance
 
-  !> Compute gap, slip, zones, loads and residuals of a state whose tractions and motions are known.
-  subroutine complete_state(self, target, tolerance, reference, displacement, state)
+  !> Compute gap, slip, zones, loads and residuals of a state whose tractions, motions and displacements are known.
+  subroutine complete_state(self, target, tolerance, reference, state)
     class(friction_problem_t), intent(in) :: self
     !> Loads or motions that were prescribed
     type(load_target_t), intent(in) :: target
@@ -333,9 +377,7 @@ contains
     real(wp), intent(in) :: tolerance
     !> Relative displacement at the beginning of the step (n_col, n_row, 2) [m]
     real(wp), intent(in), contiguous :: reference(:, :, :)
-    !> w, u_x, u_y of the tractions (n_col, n_row, 3) [m]
-    real(wp), intent(in) :: displacement(:, :, :)
-    !> State to be completed
+    !> State to be completed: its gap and relative displacement are w, u_x and u_y of its tractions (`displace`)
     type(contact_state_t), intent(inout) :: state
 
     real(wp) :: r, unit, remote(size(state%pressure, 1), 2)
@@ -349,10 +391,10 @@ contains
     finite = .true.
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(m, remote) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
-      state%gap(:, row) = self%initial_gap(:, row) + displacement(:, row, 1) - state%motion(normal)
+      state%gap(:, row) = self%initial_gap(:, row) + state%gap(:, row) - state%motion(normal)
       call self%rigid_displacement_row(state%motion, row, remote(:, 1), remote(:, 2))
       do m = 1, 2
-        state%relative_displacement(:, row, m) = displacement(:, row, m + 1) - remote(:, m)
+        state%relative_displacement(:, row, m) = state%relative_displacement(:, row, m) - remote(:, m)
         state%slip_increment(:, row, m) = merge(state%relative_displacement(:, row, m) - reference(:, row, m), 0.0_wp, &
                                                 state%pressure(:, row) > 0.0_wp)
       end do

@@ -10,7 +10,7 @@ module hc_contact_state
   implicit none
   private
 
-  public :: contact_state_t, new_contact_state, new_friction_state, add_fields, copy_tractions, touches_rim
+  public :: contact_state_t, new_contact_state, new_friction_state, add_fields, add_history, copy_tractions, touches_rim
   public :: check_problem, check_target, check_state
   public :: not_finite
   public :: not_solved, within_tolerance, sweeps_used_up, no_progress, loads_not_carried, rim_reached, out_of_range
@@ -150,9 +150,10 @@ contains
 
     if (present(space)) own = space
     call add_fields(state, lattice, own)
+    call add_history(state, lattice, own)
   end subroutine new_friction_state
 
-  !> Give a state its fields: no contact, nothing displaced. Numbers that are known stay.
+  !> Give a state the fields that a load step finds: no contact, nothing displaced. Numbers that are known stay.
   subroutine add_fields(state, lattice, space)
     !> State without fields
     type(contact_state_t), intent(inout) :: state
@@ -164,8 +165,7 @@ contains
 
     associate (n => lattice%extent)
       allocate (state%pressure(n(1), n(2)), state%gap(n(1), n(2)), state%zone(n(1), n(2)), state%traction(n(1), n(2), 2), &
-                state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2), &
-                state%accumulated_slip(n(1), n(2)), state%dissipation_density(n(1), n(2)))
+                state%relative_displacement(n(1), n(2), 2), state%slip_increment(n(1), n(2), 2))
     end associate
     !$omp parallel do schedule(static) num_threads(space%threads)
     do row = 1, lattice%extent(2)
@@ -175,11 +175,29 @@ contains
       state%traction(:, row, :) = 0.0_wp
       state%relative_displacement(:, row, :) = 0.0_wp
       state%slip_increment(:, row, :) = 0.0_wp
+    end do
+    !$omp end parallel do
+  end subroutine add_fields
+
+  !> Give a state the fields that add up over load steps: no slip so far, nothing dissipated.
+  subroutine add_history(state, lattice, space)
+    !> State without them
+    type(contact_state_t), intent(inout) :: state
+    !> Lattice and window
+    type(lattice_t), intent(in) :: lattice
+    !> Space of the fields
+    type(field_space_t), intent(in) :: space
+    integer :: row
+
+    allocate (state%accumulated_slip(lattice%extent(1), lattice%extent(2)), &
+              state%dissipation_density(lattice%extent(1), lattice%extent(2)))
+    !$omp parallel do schedule(static) num_threads(space%threads)
+    do row = 1, lattice%extent(2)
       state%accumulated_slip(:, row) = 0.0_wp
       state%dissipation_density(:, row) = 0.0_wp
     end do
     !$omp end parallel do
-  end subroutine add_fields
+  end subroutine add_history
 
   !> Copy tractions, motions and loads of a state, from which an iteration starts.
   subroutine copy_tractions(state, start, space)

@@ -9,7 +9,7 @@ module hc_subwindow
   use hc_error, only: error_t
   use hc_options, only: multilevel_options_t
   use hc_lattice, only: lattice_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, load_target_t
+  use hc_contact_state, only: contact_state_t, new_friction_state, add_fields, add_history, load_target_t
   use hc_contact_solver, only: friction_solver_t
   implicit none
   private
@@ -103,7 +103,10 @@ contains
     allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
     call whole%displacements(state%pressure, state%traction, displacement, error)
     if (allocated(error)) return
-    call whole%problem%complete_state(target, tolerance, reference, displacement, state)
+    call whole%problem%take_displacement(displacement, state)
+    deallocate (displacement)
+    call whole%problem%complete_state(target, tolerance, reference, state)
+    call add_history(state, whole%problem%lattice, whole%problem%space)
     state%operator_applications = state%operator_applications + 1.0_wp
   end subroutine solve_part
 

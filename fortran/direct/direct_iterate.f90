@@ -208,7 +208,6 @@ contains
     type(contact_state_t), intent(inout) :: state
     !> Allocated on failure
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3)
     real(wp) :: p(size(it%p)), q(size(it%p), 2), unit
 
     call problem%normal_law%project(it%p, p)
@@ -218,9 +217,9 @@ contains
     state%pressure = reshape(p, shape(state%pressure))
     state%traction = reshape(q, shape(state%traction))
     state%motion = it%motion
-    call problem%displacements(operator, state%pressure, state%traction, displacement, error)
+    call problem%displace(operator, state, error)
     if (allocated(error)) return
-    call problem%complete_state(target, tolerance, reference, displacement, state)
+    call problem%complete_state(target, tolerance, reference, state)
     state%sweeps = it%solves
     state%operator_applications = operator%applications
   end subroutine record

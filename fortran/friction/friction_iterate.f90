@@ -77,8 +77,8 @@ module hc_friction_iterate
   contains
     !> Set the tractions and motions of a start
     procedure :: set_start
-    !> Displacements of the present tractions, from scratch; free them until then
-    procedure :: refresh, forget_displacements
+    !> Displacements of the present tractions, from scratch; free them until then, or all that the next sweep makes
+    procedure :: refresh, forget_displacements, forget
     !> Gap of the present tractions and approach, and its residual
     procedure :: find_gap, gap_residual
     !> Relative displacement since the beginning of the step, along one row
@@ -221,6 +221,7 @@ contains
     self%cut = .false.
     self%joint = .false.
     if (.not. allocated(self%w)) call allocate_displacements(self)
+    if (.not. allocated(self%shear%compliance)) call self%shear%reset_frames()
     allocate (moved(3*n))
     if (self%shear_feels_pressure .and. .not. (self%without_start .and. self%first)) then
       call self%operators%apply([normal], self%p, [normal, along_x, along_y], moved, error)
@@ -260,6 +261,16 @@ contains
 
     deallocate (self%w, self%closing, self%u)
   end subroutine forget_displacements
+
+  !> Free all but tractions, motions and contact; a next sweep comes after `refresh`.
+  subroutine forget(self)
+    class(friction_iterate_t), intent(inout) :: self
+
+    call self%forget_displacements()
+    call self%shear%forget_frames()
+    if (allocated(self%punch_pressure)) deallocate (self%punch_pressure)
+    if (allocated(self%rigid_traction)) deallocate (self%rigid_traction)
+  end subroutine forget
 
   !> Compute the gap of the present tractions and approach.
   subroutine find_gap(self, gap)

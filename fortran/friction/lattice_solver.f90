@@ -10,7 +10,7 @@ module hc_lattice_solver
   use hc_build_options, only: debug_checks
   use hc_error, only: error_t
   use hc_options, only: newton_options_t
-  use hc_contact_state, only: contact_state_t, add_fields, load_target_t, sweeps_used_up, &
+  use hc_contact_state, only: contact_state_t, add_fields, add_history, load_target_t, sweeps_used_up, &
     no_progress, loads_not_carried, out_of_range
   use hc_contact_problem, only: friction_problem_t
   use hc_load_constraints, only: overloads
@@ -54,11 +54,10 @@ contains
     logical, intent(in), optional :: as_start
 
     type(friction_iterate_t), target :: now
-    real(wp), allocatable :: displacement(:, :, :)
     type(newton_options_t) :: options
     real(wp) :: less
     integer :: sweep, fixed, staggered
-    logical :: failed, judged, known
+    logical :: failed, judged, known, finite
 
     options = problem%options%newton
     fixed = 0
@@ -100,26 +99,28 @@ contains
       known = .not. judged .or. tolerance >= options%carried_tolerance
       ! without friction no sweep finds u, which follows the pressure
       if (judged .and. .not. problem%friction%resists()) known = .false.
-      if (.not. known) call now%forget_displacements()
+      if (.not. known) call now%forget()
       if (.not. allocated(state%pressure)) call add_fields(state, problem%lattice, operators%space)
       call record(now, state)
       state%motion = now%motion
-      allocate (displacement(problem%lattice%extent(1), problem%lattice%extent(2), 3))
       less = 0.0_wp
       ! what carried displacements lack: those of the cut, and their rounding errors
       if (known .and. judged) less = cut_off(now, state) + 2*options%displacement_rounding
       known = known .and. less <= options%cut_share*tolerance
       if (known) then
-        call collect(now, displacement)
-        call problem%complete_state(target, tolerance - less, reference, displacement, state)
+        call collect(now, state)
+        if (present(estimate) .and. .not. judged) then
+          allocate (estimate(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+          estimate(:, :, 1) = state%gap
+          estimate(:, :, 2:) = state%relative_displacement
+        end if
+        call problem%complete_state(target, tolerance - less, reference, state)
       end if
       if (.not. known .or. (judged .and. .not. state%converged)) then
-        call problem%displacements(operators%flexibility, state%pressure, state%traction, displacement, error)
+        call problem%displace(operators%flexibility, state, error)
         if (allocated(error)) return
-        call problem%complete_state(target, tolerance, reference, displacement, state)
+        call problem%complete_state(target, tolerance, reference, state)
       end if
-      if (present(estimate) .and. .not. judged) estimate = displacement
-      deallocate (displacement)
       if (state%converged .or. now%unsupported .or. fixed >= options%max_fixed_sweeps) exit
       call now%refresh(error)
       if (allocated(error)) return
@@ -132,10 +133,13 @@ contains
     state%sliding = state%sliding .and. .not. state%converged
     state%operator_applications = operators%work()
     call operators%clear()
+    finite = now%is_finite()
+    deallocate (now%p, now%q)
+    call add_history(state, problem%lattice, operators%space)
     if (state%converged) return
     state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)
     if (state%sliding) state%stopped = loads_not_carried
-    if (.not. now%is_finite()) state%stopped = out_of_range
+    if (.not. finite) state%stopped = out_of_range
   end subroutine solve_on_lattice
 
   !> Record the tractions of an iterate, without tension and within the admissible set.
@@ -157,21 +161,21 @@ contains
   end subroutine record
 
   !> Collect the displacements that the solvers carry along.
-  subroutine collect(now, displacement)
+  subroutine collect(now, state)
     type(friction_iterate_t), intent(in) :: now
-    !> w, u_x, u_y (n_col, n_row, 3) [m]
-    real(wp), intent(out), contiguous :: displacement(:, :, :)
+    !> State whose gap and relative displacement they become, for `complete_state`
+    type(contact_state_t), intent(inout) :: state
     integer :: n, row, from, to
 
     n = size(now%p)
     !$omp parallel do schedule(static) num_threads(now%operators%space%threads) private(from, to)
-    do row = 1, size(displacement, 2)
-      to = row*size(displacement, 1)
-      from = to - size(displacement, 1) + 1
-      displacement(:, row, 1) = now%w(from:to)
-      if (now%pressure_feels_shear) displacement(:, row, 1) = displacement(:, row, 1) + now%closing(from:to)
-      displacement(:, row, 2) = now%u(from:to)
-      displacement(:, row, 3) = now%u(n + from:n + to)
+    do row = 1, size(state%gap, 2)
+      to = row*size(state%gap, 1)
+      from = to - size(state%gap, 1) + 1
+      state%gap(:, row) = now%w(from:to)
+      if (now%pressure_feels_shear) state%gap(:, row) = state%gap(:, row) + now%closing(from:to)
+      state%relative_displacement(:, row, 1) = now%u(from:to)
+      state%relative_displacement(:, row, 2) = now%u(n + from:n + to)
     end do
     !$omp end parallel do
   end subroutine collect

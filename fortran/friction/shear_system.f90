@@ -52,6 +52,8 @@ module hc_shear_system
     procedure :: release => release_shear
     !> Turn components along x and y into the frames, or back
     procedure :: turn
+    !> Let every node stick; free frames and compliances until then
+    procedure :: reset_frames, forget_frames
     !> Set the nodes in contact, with their frames and compliances
     procedure :: set_contact
     !> Add what springs at rest are stretched by
@@ -74,12 +76,19 @@ contains
     type(shear_system_t), intent(out) :: self
     !> Operator and preconditioners
     type(operators_t), intent(inout), target :: operators
-    integer :: n, i
 
-    n = operators%flexibility%lattice%size()
     self%operators => operators
     self%space = operators%space
     self%elastic_compliance = node_compliance(operators%flexibility%lattice, operators%flexibility%pair)
+    call self%reset_frames()
+  end subroutine new_shear_system
+
+  !> Let every node stick, in a frame along x and y.
+  subroutine reset_frames(self)
+    class(shear_system_t), intent(inout) :: self
+    integer :: n, i
+
+    n = self%operators%flexibility%lattice%size()
     allocate (self%direction(2, n), self%compliance(n))
     !$omp parallel do schedule(static) num_threads(self%space%threads)
     do i = 1, n
@@ -88,7 +97,15 @@ contains
     end do
     !$omp end parallel do
     call new_active_set(self%nodes, spread(.true., 1, n), self%space)
-  end subroutine new_shear_system
+  end subroutine reset_frames
+
+  !> Free frames and compliances, and what products keep.
+  subroutine forget_frames(self)
+    class(shear_system_t), intent(inout) :: self
+
+    deallocate (self%direction, self%compliance)
+    call self%release()
+  end subroutine forget_frames
 
   !> Set the nodes in contact; their directions and compliances are known.
   subroutine set_contact(self, contact)

@@ -138,12 +138,10 @@ contains
     type(load_target_t), intent(in) :: target
     real(wp), intent(in) :: tolerance
     type(contact_state_t), intent(inout) :: state
-    real(wp), allocatable :: displacement(:, :, :)
 
-    allocate (displacement(size(reference, 1), size(reference, 2), 3))
-    displacement(:, :, 1) = state%gap - problem%initial_gap + state%motion(normal)
-    displacement(:, :, 2:) = state%relative_displacement + problem%rigid_displacement(state%motion)
-    call problem%complete_state(target, tolerance, reference, displacement, state)
+    state%gap = state%gap - problem%initial_gap + state%motion(normal)
+    state%relative_displacement = state%relative_displacement + problem%rigid_displacement(state%motion)
+    call problem%complete_state(target, tolerance, reference, state)
   end subroutine find_residuals
 
   !> Compute what Anderson's extrapolation takes from a corrected entry state: (changes + corrections) y, where

@@ -8,6 +8,7 @@
 module hc_frictional_contact
   use hc_precision, only: wp
   use hc_error, only: error_t
+  use hc_options, only: newton_options_t
   use hc_lattice, only: lattice_t
   use hc_field_space, only: space_over
   use hc_scratch, only: scratch_t
@@ -105,7 +106,7 @@ contains
                                 + (given + operators_memory(extent, threads, unlike, shared=.true.))/3
   end function frictional_contact_memory
 
-  !> Count the additional bytes while a step is solved; the coarse lattices have done by then.
+  !> Count the additional bytes while a step is solved; the coarse lattices have done by then, and its record takes less.
   pure integer(selected_int_kind(18)) function friction_step_memory(extent, n_contact, n_force, coupled)
     !> Number of columns and rows of the window
     integer, intent(in) :: extent(2)
@@ -118,36 +119,30 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
-    !> Directions of GMRES that are enough as a rule
-    integer, parameter :: n_direction = 7
-    integer(long) :: n, everywhere, iterating, inside, recording
+    integer(long) :: n, everywhere, inside, n_shear
+    type(newton_options_t) :: options
 
     n = int(extent(1), long)*extent(2)
+    n_shear = max(n_force - 1, 1)
     ! iterate; traction estimates; shear system
-    everywhere = 6*field + half + (1 + 2*max(n_force - 1, 1))*half + 3*field
+    everywhere = 6*field + half + (1 + 2*n_shear)*half + 3*field
     ! what the preconditioner of the shear traction gets and gives, what it averages and the mean; packed: its weights, what it
     ! turns into the frames
-    iterating = 4*2*half
+    everywhere = everywhere + 4*2*half
     inside = 2*half + 2*field
-    ! state after and displacements, without those of the iterate
-    recording = (10 + 3 - 3)*field + half
     if (coupled) then
-      ! closing by the shear traction, unknowns, slope
-      everywhere = everywhere + (1 + 3 + 1)*field
-      ! products of the unknowns and of a direction, its tractions; the products of all directions off the contact; without the
-      ! displacements of the iterate
-      iterating = iterating + (3 + 3 + 3 - 4)*field + 3*n_direction*field
-      ! packed: both of all directions, residuals, constraints thrice
-      inside = inside + 3*(2*n_direction + 2 + 3*n_force)*field - 3*n_direction*field
-      ! tractions together, without the closing
-      recording = recording + (3 - 1)*field
+      ! closing by the shear traction, unknowns, slope; products of the unknowns and of a direction, its tractions; the products
+      ! of all directions off the contact; without the displacements of the iterate
+      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 + 3 - 4)*field + 3*options%max_directions*field
+      ! packed: both of all directions, residuals, constraints thrice; without the products there
+      inside = inside + 3*(2*options%max_directions + 2 + 3*n_force)*field - 3*options%max_directions*field
     else
       ! product of a direction, its tractions
-      iterating = iterating + 2*2*field
+      everywhere = everywhere + 2*2*field
       ! packed: traction before, vectors of conjugate gradients, constraints twice
-      inside = inside + 2*(1 + 4 + 2*max(n_force - 1, 1))*field
+      inside = inside + 2*(1 + 4 + 2*n_shear)*field
     end if
-    friction_step_memory = n*everywhere + max(n*iterating + n_contact*inside, n*recording)
+    friction_step_memory = n*everywhere + n_contact*inside
   end function friction_step_memory
 
   !> Compute the displacements of given tractions by the operator of the finest lattice.

@@ -101,7 +101,7 @@ contains
     integer(long), parameter :: vectors = 1800
     !> Pages at the ends of columns of which half is touched, and fifths of the bytes for a pair of nodes: the complement of the
     !> sliding nodes is the larger one of unlike materials
-    integer(long), parameter :: pages(2) = [4500, 6000], fifths(2) = [21, 24]
+    integer(long), parameter :: pages(2) = [4500, 6000], fifths(2) = [19, 24]
     integer(long) :: n, n_window
     logical :: slides
 

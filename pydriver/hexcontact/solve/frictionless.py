@@ -52,7 +52,7 @@ _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the 
 _COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
 _LAW_ARRAYS = 6  # coefficients by node, here, in the core, on its lattices and parts
 _INTERFACE_ARRAYS = {False: 4, True: 6}  # springs of a compliant interface, and the symbol of bodies on them
-_WEAR_ARRAYS = 80  # fields of the cycles before and after a jump, of their record, of the pressure ahead
+_WEAR_ARRAYS = 42  # fields of the cycles before and after a jump, of their record, of the pressure ahead
 _END_ARRAYS = 3  # fields that remember the end of a load step of the cycle
 _ENTRY_ARRAYS = 45  # fields of the core for the places of nodes when their gap closed
 

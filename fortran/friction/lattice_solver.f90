@@ -110,7 +110,7 @@ contains
       if (known) then
         call collect(now, state)
         if (present(estimate) .and. .not. judged) then
-          allocate (estimate(problem%lattice%extent(1), problem%lattice%extent(2), 3))
+          if (.not. allocated(estimate)) allocate (estimate(problem%lattice%extent(1), problem%lattice%extent(2), 3))
           estimate(:, :, 1) = state%gap
           estimate(:, :, 2:) = state%relative_displacement
         end if

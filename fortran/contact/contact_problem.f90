@@ -17,11 +17,11 @@ module hc_contact_problem
   use hc_hierarchy, only: level_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_flexibility, only: flexibility_t
-  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, slip, &
-    normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, sweeps_used_up, &
-    loads_not_carried, out_of_range
+  use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, check_problem, touches_rim, separated, stick, &
+    slip, normal, along_x, along_y, about_z, n_load, n_motion, remote_displacement, force_control, within_tolerance, &
+    sweeps_used_up, loads_not_carried, out_of_range
   use hc_contact_residuals, only: normal_self_compliance, tangential_compliances, normal_residual, &
-    tangential_residual, force_residual, least_traction
+    tangential_residual, force_residual, relative, least_traction
   use hc_friction_law, only: friction_law_t
   use hc_normal_law, only: normal_law_t, unilateral_t
   implicit none
@@ -60,8 +60,8 @@ module hc_contact_problem
     procedure :: separate
     !> Relative displacements (w, u_x, u_y) of given tractions
     procedure :: displacements
-    !> The same into a state, and displacements that are known
-    procedure :: displace, take_displacement
+    !> The same into a state
+    procedure :: displace
     !> Tangential displacement of a rigid motion, at all nodes and at those of a row
     procedure :: rigid_displacement, rigid_displacement_row
     !> Resultants of given tractions
@@ -239,7 +239,9 @@ contains
     if (abs(self%pair%lambda_2) > 0.0_wp) then
       allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
       call self%displacements(flexibility, state%pressure, state%traction, displacement, error)
-      if (.not. allocated(error)) call self%take_displacement(displacement, state)
+      if (allocated(error)) return
+      state%gap = displacement(:, :, 1)
+      state%relative_displacement = displacement(:, :, 2:)
     else
       ! pressure and shear traction do not move each other: each of them fills its field
       acting(1:size(state%pressure, 1), 1:size(state%pressure, 2), 1:1) => state%pressure
@@ -249,23 +251,6 @@ contains
       call flexibility%apply([along_x, along_y], state%traction, [along_x, along_y], state%relative_displacement, error)
     end if
   end subroutine displace
-
-  !> Put displacements that are known where `complete_state` expects them.
-  subroutine take_displacement(self, displacement, state)
-    class(friction_problem_t), intent(in) :: self
-    !> w, u_x, u_y (n_col, n_row, 3) [m]
-    real(wp), intent(in) :: displacement(:, :, :)
-    !> State that gets them
-    type(contact_state_t), intent(inout) :: state
-    integer :: row
-
-    !$omp parallel do schedule(static) num_threads(self%space%threads)
-    do row = 1, size(displacement, 2)
-      state%gap(:, row) = displacement(:, row, 1)
-      state%relative_displacement(:, row, :) = displacement(:, row, 2:)
-    end do
-    !$omp end parallel do
-  end subroutine take_displacement
 
   !> Compute the displacement by the motions of the remote parts at every node (n_col, n_row, 2) [m].
   pure function rigid_displacement(self, motion) result(displacement)
@@ -380,14 +365,19 @@ contains
     !> State to be completed: its gap and relative displacement are w, u_x and u_y of its tractions (`displace`)
     type(contact_state_t), intent(inout) :: state
 
-    real(wp) :: r, unit, remote(size(state%pressure, 1), 2)
+    real(wp) :: r, unit, least, remote(size(state%pressure, 1), 2)
     integer :: row, m, n_contact
     logical :: finite
 
     n_contact = self%space%count_positive(state%pressure)
     r = self%classification_parameter(n_contact)
     unit = max(self%space%max(state%pressure), 0.0_wp)
-    if (unit > 0.0_wp) unit = 1.0_wp/unit
+    ! slip that R_t does not see: a node that moves no more sticks
+    least = 0.0_wp
+    if (unit > 0.0_wp) then
+      if (self%friction%is_bounded()) least = tolerance*self%tangential_compliance*self%friction%largest_bound(unit)
+      unit = 1.0_wp/unit
+    end if
     finite = .true.
     !$omp parallel do schedule(static) num_threads(self%space%threads) private(m, remote) reduction(.and.: finite)
     do row = 1, size(state%pressure, 2)
@@ -402,6 +392,9 @@ contains
         call self%friction%find_zones((row - 1)*size(state%zone, 1) + 1, unit, r, state%pressure(:, row), &
                                       state%traction(:, row, 1), state%traction(:, row, 2), &
                                       state%slip_increment(:, row, 1), state%slip_increment(:, row, 2), state%zone(:, row))
+        ! where nothing slips, rounding errors would tell which nodes on the boundary do
+        where (state%zone(:, row) == slip .and. hypot(state%slip_increment(:, row, 1), state%slip_increment(:, row, 2)) <= least) &
+          state%zone(:, row) = stick
       else
         state%zone(:, row) = merge(slip, separated, state%pressure(:, row) > 0.0_wp)
       end if
@@ -448,18 +441,5 @@ contains
     state%residual_torque = relative(missing(about_z), &
                                      scale*sqrt(self%lattice%cell_area()*self%space%count_positive(state%pressure)/pi))
   end subroutine find_load_residuals
-
-  !> Return a missing load relative to a scale; any at all is too much where the scale vanishes.
-  elemental real(wp) function relative(missing, scale)
-    real(wp), intent(in) :: missing, scale
-
-    if (missing <= 0.0_wp) then
-      relative = 0.0_wp
-    else if (scale > 0.0_wp) then
-      relative = missing/scale
-    else
-      relative = huge(1.0_wp)
-    end if
-  end function relative
 
 end module hc_contact_problem

@@ -18,7 +18,7 @@ module hc_contact_residuals
   private
 
   public :: normal_self_compliance, tangential_self_compliance, tangential_compliances
-  public :: normal_residual, tangential_residual, tangential_scale, force_residual, complete_state, &
+  public :: normal_residual, tangential_residual, tangential_scale, force_residual, relative, complete_state, &
             least_traction
 
   !> Without slip: the least shear traction that residuals refer to, over the largest pressure.
@@ -204,6 +204,19 @@ contains
       force_residual = merge(1.0_wp, 0.0_wp, abs(carried) > 0.0_wp)
     end if
   end function force_residual
+
+  !> Return a missing load relative to a scale; any at all is too much where the scale vanishes.
+  elemental real(wp) function relative(missing, scale)
+    real(wp), intent(in) :: missing, scale
+
+    if (missing <= 0.0_wp) then
+      relative = 0.0_wp
+    else if (scale > 0.0_wp) then
+      relative = missing/scale
+    else
+      relative = huge(1.0_wp)
+    end if
+  end function relative
 
   !> Compute zones, load and residuals of a state whose pressure and gap are known.
   subroutine complete_state(state, lattice, candidate, compliance, control, target, tolerance, space, error, law)

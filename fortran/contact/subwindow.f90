@@ -103,7 +103,8 @@ contains
     allocate (displacement(size(state%pressure, 1), size(state%pressure, 2), 3))
     call whole%displacements(state%pressure, state%traction, displacement, error)
     if (allocated(error)) return
-    call whole%problem%take_displacement(displacement, state)
+    state%gap = displacement(:, :, 1)
+    state%relative_displacement = displacement(:, :, 2:)
     deallocate (displacement)
     call whole%problem%complete_state(target, tolerance, reference, state)
     call add_history(state, whole%problem%lattice, whole%problem%space)

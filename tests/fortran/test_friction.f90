@@ -237,7 +237,8 @@ contains
     ! prescribed motions have no residuals
     target%control = d
     target%value = state%motion
-    call problem%take_displacement(still, state)
+    state%gap = 0.0_wp
+    state%relative_displacement = 0.0_wp
     call problem%complete_state(target, 1.0e-8_wp, still(:, :, 2:), state)
     call check(error, [state%residual_force, state%residual_shear_force, state%residual_torque], spread(0.0_wp, 1, 3), &
                0.0_wp, 'prescribed motions')
@@ -289,6 +290,7 @@ contains
     type(contact_state_t) :: state
     type(load_target_t) :: target
     real(wp) :: gap(3, 1), displacement(3, 1, 3), reference(3, 1, 2), nan
+    integer :: i
     logical :: candidate(3, 1), halting
 
     call new_lattice(lattice, equilateral_basis(1.0_wp), [2, 0], [3, 1], error)
@@ -311,7 +313,7 @@ contains
     reference = 0.0_wp
     reference(1, 1, 1) = 0.5_wp
     reference(2, 1, 2) = 0.1_wp
-    call problem%take_displacement(displacement, state)
+    call take(displacement)
     call problem%complete_state(target, 1.0e-8_wp, reference, state)
     call check(error, state%gap(:, 1), [0.0_wp, 0.0_wp, 4.5_wp], 1.0e-15_wp, 'gap')
     if (allocated(error)) return
@@ -327,22 +329,42 @@ contains
     call check_true(error, state%converged, 'a right state')
     if (allocated(error)) return
 
+    ! slip within the tolerance of R_t, 1e-8 mu p_max d_t with d_t = (3 sqrt(3)/2) ln 3, is none
+    do i = 1, 2
+      displacement(2, 1, 3) = 0.7_wp - merge(0.9e-8_wp, 1.1e-8_wp, i == 1)*5.0_wp*1.5_wp*sqrt(3.0_wp)*log(3.0_wp)
+      call take(displacement)
+      call problem%complete_state(target, 1.0e-8_wp, reference, state)
+      call check(error, state%zone(2, 1), merge(stick, slip, i == 1), 'zone of a node that hardly moves')
+      if (allocated(error)) return
+    end do
+
     ! what is no number is no solution
     call ieee_get_halting_mode(ieee_invalid, halting)
     call ieee_set_halting_mode(ieee_invalid, .false.)
     nan = ieee_value(nan, ieee_quiet_nan)
     state%traction(1, 1, 1) = nan
-    call problem%take_displacement(displacement, state)
+    call take(displacement)
     call problem%complete_state(target, 1.0e-8_wp, reference, state)
     call check_true(error, .not. state%converged, 'a traction that is not a number')
     if (.not. allocated(error)) then
       state%traction(1, 1, 1) = 0.0_wp
       displacement(3, 1, 1) = nan
-      call problem%take_displacement(displacement, state)
+      call take(displacement)
     call problem%complete_state(target, 1.0e-8_wp, reference, state)
       call check_true(error, .not. state%converged, 'a gap that is not a number')
     end if
     call ieee_set_halting_mode(ieee_invalid, halting)
+
+  contains
+
+    !> Put displacements where a state is completed from.
+    subroutine take(displacement)
+      real(wp), intent(in) :: displacement(:, :, :)
+
+      state%gap = displacement(:, :, 1)
+      state%relative_displacement = displacement(:, :, 2:)
+    end subroutine take
+
   end subroutine test_conclude
 
   !> R^T T R + D against the explicit matrix; its preconditioner is symmetric and positive definite, stick or slip.

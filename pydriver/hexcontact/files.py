@@ -148,10 +148,12 @@ def replacing(target: Path, temporary: Path | None = None) -> Iterator[Path]:
     Raises
     ------
     DeckError
-        If `target` is a device or a pipe, which replacing would delete.
+        If `target` is a device or a pipe, which replacing would delete, or its folder is missing.
     """
     if os.path.lexists(target) and not (target.is_file() or target.is_symlink()):
         raise DeckError(f"{target} is not a regular file; choose another name")
+    if not target.parent.is_dir():
+        raise DeckError(f"cannot write {target}: the folder {target.parent} does not exist")
     temporary = temporary or target.with_name(f"{target.name}.{os.getpid()}.tmp")
     make_anew(temporary)
     try:

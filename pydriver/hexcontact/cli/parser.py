@@ -80,6 +80,7 @@ def _typed(function: Callable[..., None]) -> Callable[..., None]:
 
     signature, hints = inspect.signature(function), {}
     for name, (names, words, metavar), hint, *_ in parameters(function):
+        words = words.replace("[", r"\[")  # typer reads markup in it
         if names:
             kind: Any = typer.Option(*names, metavar=metavar, help=words, readable=False)
         else:

@@ -263,10 +263,10 @@ def all_pictures(result: Result, first: Path, chosen: Mapping[str, Any]) -> list
 
 
 def _save(figure: Figure, about: str, picture: Path) -> Path:
-    """Write a picture, which may replace an earlier one."""
+    """Write a picture, which may replace an earlier one; by default a PNG."""
+    picture = picture if picture.suffix else picture.with_name(f"{picture.name}.png")
+    if picture.suffix.lower() not in (known := [f".{name}" for name in Format]):
+        raise DeckError(f"cannot draw {about}: {picture}: expected {listed(known, 'or')}")
     require_replaceable(picture)
-    try:
-        figure.savefig(picture, dpi=200, metadata={"Creator": MADE_BY})
-    except ValueError as error:  # unknown format
-        raise DeckError(f"cannot draw {about}: {error}") from error
+    figure.savefig(picture, dpi=200, metadata={"Creator": MADE_BY})
     return picture

@@ -100,9 +100,10 @@ class Quantity(Kind):
             number = to_si(value, self.dimension)
         except UnitError as error:
             refuse(f"expected {self.expected}" + (f"; {error}" if str(error) else ""))
+        if not (math.isfinite(number) or (self.infinite and number == math.inf)):
+            refuse(f"expected {self.expected}, a finite number")
         inside = (
-            (math.isfinite(number) or (self.infinite and number == math.inf))
-            and (self.above is None or number > self.above)
+            (self.above is None or number > self.above)
             and (self.at_least is None or number >= self.at_least)
             and (self.at_most is None or number <= self.at_most)
         )

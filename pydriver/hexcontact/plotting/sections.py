@@ -86,10 +86,18 @@ class Cut:
 
     @classmethod
     def of(cls, views: Sequence[StepView], angle: float, through: Point | None = None) -> Cut:
-        """Return the cut through the contacts of some steps of one result, see `line_of`."""
+        """Return the cut through the contacts of some steps of one result, see `line_of`.
+
+        Raises
+        ------
+        ValueError
+            If the line does not cross the window.
+        """
         line, lattice = line_of(views, angle, through), views[0].lattice
         corners = line.corners(lattice)
         index = (np.stack(line.points(corners), axis=-1) - views[0].start) @ np.linalg.inv(lattice.basis)
+        if through and not ((index > -1.0) & (index < lattice.shape[::-1])).all(axis=1).any():
+            raise ValueError(f"expected a line that crosses the window; it goes through {through} m")
         nodes = corners[(abs(index - np.round(index)) < 1e-6).all(axis=1)]
         on_nodes = nodes.size > 0.4 * (corners.size - 2)  # at multiples of 30 degrees
         at_nodes = on_nodes and nodes.size < _APART and len(views) == 1
@@ -230,7 +238,7 @@ def draw_section(canvas: FigureBase, view: StepView, angle: float, through: Poin
     draw_difference(cut.values(view, view.pressure), color=color, label="as solved", **squares)
     if edges:
         draw_difference(cut.values(view), color=COMPUTED, label="to the edge", **dots)
-        bottom.legend(fontsize=8, ncols=2, loc="lower center", handlelength=1.2)
+        bottom.legend(fontsize=8, ncols=2, handlelength=1.2)
     bottom.set_ylabel(f"{'error' if view.hertz_holds else 'difference'}\n(% of $p_0$)")
     cut.show(bottom)
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..result.view import StepView, dataset_of, title_of
-from ..text import cycle_count, scaled
+from ..text import scaled
 from .registry import figure
 from .sections import Cut, Point
 from .style import color_scale, new_figure, set_title, shades
@@ -70,7 +70,7 @@ def wear(result: Result | xarray.Dataset, angle: float = 0.0, through: Point | N
     below.set(ylabel=f"worn depth ({depth})")
     cut.show(below)
     below.invert_yaxis()
-    labels = [cycle_count(float(view.data["wear_cycles"])).replace(",", "\u2009") for view in views]
+    labels = [f"{float(view.data['wear_cycles']):,.0f}".replace(",", "\u2009") for view in views]
     color_scale(canvas, [above, below], labels, colors)
     canvas.axes[-1].set_title("cycles", fontsize=9)
     set_title(canvas, title_of(dataset))

@@ -126,7 +126,8 @@ def _sliding(
         return doubtful and not math.isinf(case.friction_coefficient), ""
     wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
-    known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})" if math.isfinite(bound) else ""
+    known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
+    known = known if shear and math.isfinite(bound) else ""
     return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}"
 
 

@@ -26,6 +26,7 @@ from typer.testing import CliRunner
 from hexcontact import Case, analytic, open_result
 from hexcontact.cli.app import app
 from hexcontact.cli.report import report, write_report
+from hexcontact.errors import DeckError
 from hexcontact.plotting.report_data import MOST_STEPS, kept_steps
 from hexcontact.result.raster import Plane
 from hexcontact.result.result import Result
@@ -416,7 +417,7 @@ def test_only_a_page_is_written_or_replaced(folder: Path) -> None:
     done = CliRunner().invoke(app, ["report", str(folder / "sheared.nc"), "-o", str(folder / "sheared.nc")])
     assert done.exit_code == 2 and "expected a page, such as" in done.stderr
     assert (folder / "sheared.nc").read_bytes() == before
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(DeckError, match="missing does not exist"):
         write_report(open_result(folder / "pressed.nc"), folder / "missing" / "page.html")
     assert not list(folder.glob("*.tmp"))
 

@@ -110,7 +110,7 @@ def test_command(tmp_path: Path) -> None:
     assert (done.exit_code, json.loads(path.read_text(encoding="utf-8"))) == (0, deck_schema())
     assert f"#:schema {path}" in done.stdout
     refused = CliRunner().invoke(app, ["schema", "-o", str(tmp_path / "no/where.json")])
-    assert (refused.exit_code, "No such file" in refused.stderr) == (2, True)
+    assert (refused.exit_code, "no does not exist" in refused.stderr) == (2, True)
 
 
 def test_every_key_has_a_description() -> None:

@@ -150,7 +150,7 @@ contains
 
     if (present(space)) own = space
     call add_fields(state, lattice, own)
-    call add_history(state, lattice, own)
+    call add_history(state)
   end subroutine new_friction_state
 
   !> Give a state the fields that a load step finds: no contact, nothing displaced. Numbers that are known stay.
@@ -179,24 +179,14 @@ contains
     !$omp end parallel do
   end subroutine add_fields
 
-  !> Give a state the fields that add up over load steps: no slip so far, nothing dissipated.
-  subroutine add_history(state, lattice, space)
+  !> Give a state that has its pressure the fields that add up over load steps: no slip so far, nothing dissipated.
+  subroutine add_history(state)
     !> State without them
     type(contact_state_t), intent(inout) :: state
-    !> Lattice and window
-    type(lattice_t), intent(in) :: lattice
-    !> Space of the fields
-    type(field_space_t), intent(in) :: space
-    integer :: row
 
-    allocate (state%accumulated_slip(lattice%extent(1), lattice%extent(2)), &
-              state%dissipation_density(lattice%extent(1), lattice%extent(2)))
-    !$omp parallel do schedule(static) num_threads(space%threads)
-    do row = 1, lattice%extent(2)
-      state%accumulated_slip(:, row) = 0.0_wp
-      state%dissipation_density(:, row) = 0.0_wp
-    end do
-    !$omp end parallel do
+    associate (n => shape(state%pressure))
+      allocate (state%accumulated_slip(n(1), n(2)), state%dissipation_density(n(1), n(2)), source=0.0_wp)
+    end associate
   end subroutine add_history
 
   !> Copy tractions, motions and loads of a state, from which an iteration starts.

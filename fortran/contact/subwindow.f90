@@ -107,7 +107,7 @@ contains
     state%relative_displacement = displacement(:, :, 2:)
     deallocate (displacement)
     call whole%problem%complete_state(target, tolerance, reference, state)
-    call add_history(state, whole%problem%lattice, whole%problem%space)
+    call add_history(state)
     state%operator_applications = state%operator_applications + 1.0_wp
   end subroutine solve_part
 

@@ -135,7 +135,7 @@ contains
     call operators%clear()
     finite = now%is_finite()
     deallocate (now%p, now%q)
-    call add_history(state, problem%lattice, operators%space)
+    call add_history(state)
     if (state%converged) return
     state%stopped = merge(no_progress, sweeps_used_up, now%outcome == solution_broke_off)
     if (state%sliding) state%stopped = loads_not_carried

@@ -22,7 +22,8 @@ module hc_convolution
   use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, release
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_fft_layout, only: block_width, even
-  use hc_fft_passes, only: split_rows, join_rows, gather_columns, scatter_columns, multiply, multiply_one
+  use hc_fft_passes, only: pair_rows, split_rows, join_rows, gather_columns, scatter_columns, multiply, &
+    multiply_one
   !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private
@@ -348,7 +349,7 @@ contains
     !> Index of the first row, of the component, and of the thread, whose buffer is zero beyond the window and stays so
     integer, intent(in) :: row, component, thread
     !> Field (n_col, n_row)
-    real(wp), intent(in) :: field(:, :)
+    real(wp), intent(in), contiguous :: field(:, :)
     integer :: last
 
     last = min(row + 1, self%extent(2))
@@ -361,7 +362,7 @@ contains
         return
       end if
       if (last > row) then
-        given(:n) = cmplx(field(:, row), field(:, last), wp)
+        call pair_rows(n, field(:, row), field(:, last), given)
       else
         given(:n) = field(:, row)
       end if

@@ -14,7 +14,7 @@ module hc_fft_passes
   implicit none
   private
 
-  public :: complement, split_rows, join_rows, gather_columns, scatter_columns, multiply_one, multiply
+  public :: complement, pair_rows, split_rows, join_rows, gather_columns, scatter_columns, multiply_one, multiply
 
   !> Number of the kernel that is a multiple of the first one less the second one, and has no spectrum of its own.
   integer, parameter :: complement = 0
@@ -45,6 +45,21 @@ contains
       second(f) = 0.5_wp*cmplx(im + im_opposite, re_opposite - re, wp)
     end do
   end subroutine split_rows
+
+  !> Pair two real rows as the parts of a complex one.
+  pure subroutine pair_rows(n, first, second, both)
+    !> Number of nodes of a row
+    integer, intent(in) :: n
+    !> The rows
+    real(wp), intent(in) :: first(n), second(n)
+    !> The complex row; what lies beyond stays
+    complex(wp), intent(inout) :: both(n)
+    integer :: col
+
+    do col = 1, n
+      both(col) = cmplx(first(col), second(col), wp)
+    end do
+  end subroutine pair_rows
 
   !> Compute the conjugate of X + i Y at all frequencies, from the conjugates of X and Y at 0...n/2.
   pure subroutine join_rows(first, second, both)

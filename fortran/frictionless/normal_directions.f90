@@ -6,6 +6,7 @@ module hc_normal_directions
   use hc_conjugate_gradient, only: conjugate_gradient_t
   use hc_normal_lattice, only: normal_lattice_t
   use hc_normal_iterate, only: normal_iterate_t
+  use hc_normal_rows, only: residual_row, sum_row, projected_row, direction_row
   implicit none
   private
 
@@ -19,17 +20,14 @@ contains
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
-    real(wp) :: gap, scale
-    integer :: col, row
+    integer :: row
 
-    scale = 1.0_wp/now%w_unit
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, gap)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      !$omp simd private(gap)
-      do col = now%span(1, row), now%span(2, row)
-        gap = merge(level%initial_gap(col, row) + now%w(col, row) - now%approach, 0.0_wp, now%active(col, row))
-        now%r(col, row, 1) = merge(real(-scale*gap, sp), now%r(col, row, 1), now%active(col, row))
-      end do
+      associate (from => now%span(1, row), to => now%span(2, row))
+        call residual_row(to - from + 1, 1.0_wp/now%w_unit, now%approach, level%initial_gap(from:to, row), now%w(from:to, row), &
+                          now%active(from:to, row), now%r(from:to, row, 1))
+      end associate
     end do
     !$omp end parallel do
   end subroutine find_residual
@@ -44,42 +42,37 @@ contains
     logical, intent(in) :: fixed, by_load
     !> Sum of the pressures under a prescribed load
     real(wp), intent(in) :: pressures
-    real(wp) :: part(size(now%p, 2)), aim, mean, row_sum, step_length
+    real(wp) :: part(size(now%p, 2)), mean, step_length
     real(sp) :: lack
-    integer :: col, row
+    integer :: row
 
     step_length = level%options%normal%step_length
     mean = 0.0_wp
     if (by_load .and. .not. fixed) then
-      !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, row_sum)
+      !$omp parallel do schedule(static) num_threads(level%space%threads)
       do row = 1, size(now%p, 2)
-        row_sum = 0.0_wp
-        !$omp simd reduction(+: row_sum)
-        do col = now%span(1, row), now%span(2, row)
-          row_sum = row_sum + merge(now%z(col, row, 1), 0.0_sp, now%active(col, row))
-        end do
-        part(row) = row_sum
+        associate (from => now%span(1, row), to => now%span(2, row))
+          call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), part(row))
+        end associate
       end do
       !$omp end parallel do
       mean = sum(part)/now%punch_sum
     end if
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, aim)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       now%d(:, row, 1) = 0.0_sp
-      part(row) = 0.0_wp
-      do col = now%span(1, row), now%span(2, row)
-        aim = 0.0_wp
-        if (now%active(col, row)) then
-          aim = now%p(col, row)/now%p_unit
-          if (.not. fixed) then
-            aim = aim + step_length*now%z(col, row, 1)
-            if (by_load) aim = aim - step_length*mean*now%punch(col, row)
+      associate (from => now%span(1, row), to => now%span(2, row))
+        associate (n => to - from + 1, p => now%p(from:to, row), active => now%active(from:to, row), d => now%d(from:to, row, 1), &
+                   z => now%z(from:to, row, 1))
+          if (fixed) then
+            call projected_row(n, now%p_unit, p, active, d, part(row))
+          else if (by_load) then
+            call projected_row(n, now%p_unit, p, active, d, part(row), step_length, z, mean, now%punch(from:to, row))
+          else
+            call projected_row(n, now%p_unit, p, active, d, part(row), step_length, z)
           end if
-          aim = max(aim, 0.0_wp)
-          part(row) = part(row) + aim
-        end if
-        now%d(col, row, 1) = real(aim - now%p(col, row)/now%p_unit, sp)
-      end do
+        end associate
+      end associate
     end do
     !$omp end parallel do
     if (.not. sum(part) > 0.0_wp) then
@@ -90,11 +83,11 @@ contains
     ! what was cut off goes where it changes the approach alone
     if (.not. by_load) return
     lack = real((pressures/now%p_unit - sum(part))/now%punch_sum, sp)
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      do col = now%span(1, row), now%span(2, row)
-        now%d(col, row, 1) = now%d(col, row, 1) + lack*now%punch(col, row)
-      end do
+      associate (from => now%span(1, row), to => now%span(2, row))
+        now%d(from:to, row, 1) = now%d(from:to, row, 1) + lack*now%punch(from:to, row)
+      end associate
     end do
     !$omp end parallel do
   end subroutine projected_step
@@ -110,41 +103,29 @@ contains
     !> That of the last direction; on return that of the new one
     type(conjugate_gradient_t), intent(inout) :: recurrence
     real(wp), dimension(size(now%p, 2)) :: part, sum_z
-    real(wp) :: share, z, product_z, total_z
+    real(wp) :: share
     real(sp) :: back, mean
     logical :: anew
-    integer :: col, row
+    integer :: row
 
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col, z, product_z, total_z)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
-      product_z = 0.0_wp
-      total_z = 0.0_wp
-      !$omp simd private(z) reduction(+: product_z, total_z)
-      do col = now%span(1, row), now%span(2, row)
-        z = merge(now%z(col, row, 1), 0.0_sp, now%active(col, row))
-        product_z = product_z + merge(now%r(col, row, 1), 0.0_sp, now%active(col, row))*z
-        total_z = total_z + z
-      end do
-      part(row) = product_z
-      sum_z(row) = total_z
+      associate (from => now%span(1, row), to => now%span(2, row))
+        call sum_row(to - from + 1, now%z(from:to, row, 1), now%active(from:to, row), sum_z(row), now%r(from:to, row, 1), part(row))
+      end associate
     end do
     !$omp end parallel do
     call recurrence%last_share(sum(part), share, anew)
     back = real(share, sp)
     mean = 0.0_sp
     if (by_load) mean = real(sum(sum_z)/now%punch_sum, sp)
-    !$omp parallel do schedule(static) num_threads(level%space%threads) private(col)
+    !$omp parallel do schedule(static) num_threads(level%space%threads)
     do row = 1, size(now%p, 2)
       if (anew) now%d(:, row, 1) = 0.0_sp
-      !$omp simd
-      do col = now%span(1, row), now%span(2, row)
-        now%d(col, row, 1) = merge(now%z(col, row, 1) + back*now%d(col, row, 1), 0.0_sp, now%active(col, row))
-      end do
-      if (.not. by_load) cycle
-      !$omp simd
-      do col = now%span(1, row), now%span(2, row)
-        now%d(col, row, 1) = now%d(col, row, 1) - mean*now%punch(col, row)
-      end do
+      associate (from => now%span(1, row), to => now%span(2, row))
+        call direction_row(to - from + 1, back, now%z(from:to, row, 1), now%active(from:to, row), now%d(from:to, row, 1))
+        if (by_load) now%d(from:to, row, 1) = now%d(from:to, row, 1) - mean*now%punch(from:to, row)
+      end associate
     end do
     !$omp end parallel do
   end subroutine next_direction

@@ -8,7 +8,7 @@ module hc_normal_iterate
   use hc_field_space, only: field_space_t
   use hc_contact_state, only: not_finite
   use hc_normal_lattice, only: normal_lattice_t
-  use hc_normal_rows, only: classify_row, add_row, largest_of
+  use hc_normal_rows, only: classify_row, add_row, dot_single, largest_of
   implicit none
   private
 
@@ -135,7 +135,8 @@ contains
     !> Allocated on failure: a pressure or a gap that is not a finite number
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: r, stiffness, p_max, worst, worst_active, worst_changed
-    integer :: row, n_next, n_changed, n_wrong
+    integer :: row, n_next, n_changed
+    logical :: finite
 
     r = classification_parameter(level, now)
     stiffness = 1.0_wp/level%compliance
@@ -145,20 +146,20 @@ contains
     worst_changed = 0.0_wp
     n_next = 0
     n_changed = 0
-    n_wrong = 0
+    finite = ieee_is_finite(now%approach)
     !$omp parallel do schedule(static) num_threads(level%space%threads) &
-    !$omp& reduction(max: p_max, worst, worst_active, worst_changed) reduction(+: n_next, n_changed, n_wrong)
+    !$omp& reduction(max: p_max, worst, worst_active, worst_changed) reduction(+: n_next, n_changed) reduction(.and.: finite)
     do row = 1, size(now%p, 2)
       if (allocated(now%offset)) then
         call classify_compliant_row(level, now, row, r, candidate(:, row), next(:, row), p_max, worst, worst_active, &
-                                    worst_changed, n_next, n_changed, n_wrong)
+                                    worst_changed, n_next, n_changed, finite)
         cycle
       end if
       call classify_row(size(now%p, 1), r, stiffness, now%approach, level%initial_gap(:, row), now%p(:, row), now%w(:, row), &
-                     candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed, n_wrong)
+                     candidate(:, row), now%active(:, row), next(:, row), p_max, worst, worst_active, n_next, n_changed, finite)
     end do
     !$omp end parallel do
-    if (n_wrong > 0) then
+    if (.not. finite) then
       call raise(error, status%no_convergence, not_finite)
       return
     end if
@@ -189,7 +190,7 @@ contains
   !> Classify a row of nodes with a compliant layer: residuals of the law and, on the active nodes, of what it was
   !> linearised to.
   subroutine classify_compliant_row(level, now, row, r, candidate, next, p_max, worst, worst_active, worst_changed, n_next, &
-                                    n_changed, n_wrong)
+                                    n_changed, finite)
     type(normal_lattice_t), intent(in) :: level
     type(normal_iterate_t), intent(in) :: now
     integer, intent(in) :: row
@@ -200,16 +201,16 @@ contains
     !> What the rows before gave, and now this one too
     real(wp), intent(inout) :: p_max, worst, worst_active, worst_changed
     integer, intent(inout) :: n_next, n_changed
-    !> Nodes whose pressure or gap is not a finite number
-    integer, intent(inout) :: n_wrong
+    !> Pressure and gap are finite numbers
+    logical, intent(inout) :: finite
     real(wp) :: gap(size(next)), left(size(next))
     integer :: first
 
     first = (row - 1)*size(next) + 1
     left = level%initial_gap(:, row) + now%w(:, row) - now%approach
     gap = left - now%compliance(:, row)*now%p(:, row) - now%offset(:, row)
-    n_wrong = n_wrong + count(.not. (ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate)))
-    if (n_wrong > 0) return
+    finite = finite .and. all(ieee_is_finite(now%p(:, row)) .and. (ieee_is_finite(gap) .or. .not. candidate))
+    if (.not. finite) return
     call level%law%find_contact(r, now%p(:, row), gap, candidate, next)
     call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate, worst)
     call level%law%violation(first, level%compliance, now%p(:, row), gap, candidate .and. (next .neqv. now%active(:, row)), &
@@ -338,14 +339,18 @@ contains
   end subroutine find_punch_pressure
 
   !> Update p <- p + share d, w <- w + share (K + C) d, C the springs of a compliant law.
-  subroutine advance(level, now, share)
+  !>
+  !> Without springs the approach moves along, so that under a prescribed load it is still that of `find_approach`.
+  subroutine advance(level, now, share, by_load)
     !> Problem on the lattice, with its operators
     type(normal_lattice_t), intent(in) :: level
     !> Iterate
     type(normal_iterate_t), intent(inout) :: now
     !> Share of the direction that is added
     real(wp), intent(in) :: share
-    real(wp) :: step, closing
+    !> The normal load is prescribed, not the approach
+    logical, intent(in) :: by_load
+    real(wp) :: step, closing, moment(size(now%p, 2))
     real(sp) :: largest
     integer :: row
 
@@ -355,6 +360,7 @@ contains
     !$omp parallel do schedule(static) num_threads(level%space%threads) reduction(max: largest)
     do row = 1, size(now%p, 2)
       associate (from => now%span(1, row), to => now%span(2, row))
+        if (by_load) moment(row) = dot_single(to - from + 1, now%punch(from:to, row), now%kd(from:to, row, 1))
         ! springs may be many times softer than the bodies: theirs is computed in double precision
         if (allocated(now%compliance)) now%w(from:to, row) = now%w(from:to, row) &
                                                              - now%compliance(from:to, row)*now%p(from:to, row)
@@ -369,6 +375,7 @@ contains
     end do
     !$omp end parallel do
     now%closing_error = now%closing_error + single_error*abs(closing)*largest
+    if (by_load) now%approach = now%approach + closing*sum(moment)/now%punch_sum
   end subroutine advance
 
   !> Set tension to zero: it is within the tolerance.

@@ -127,7 +127,7 @@ contains
     logical, allocatable :: next(:, :)
     real(wp) :: history(3), fixed_start, pressures, share, softness, r
     type(conjugate_gradient_t) :: recurrence
-    logical :: changed, fixed, fresh, compliant, settled, stalled, anew
+    logical :: changed, fixed, fresh, compliant, settled, stalled, anew, follows
     integer :: fits
     type(normal_options_t) :: options
 
@@ -142,11 +142,13 @@ contains
     history = huge(1.0_wp)
     fixed = .false.
     fresh = .false.
+    follows = .false.
     fixed_start = 1.0_wp
     sweeps = 0
     fits = 0
     do
-      if (by_load) call find_approach(level, now)
+      if (by_load .and. .not. follows) call find_approach(level, now)
+      follows = .false.
       call classify(level, now, candidate, next, changed, error)
       if (allocated(error)) return
       ! what an error of the gap does to the pressure falls with the stiffness of the layer
@@ -232,7 +234,9 @@ contains
           cycle
         end if
       end if
-      call advance(level, now, share)
+      ! a step of a fixed set moves pressures whose approach was not found
+      follows = by_load .and. .not. (compliant .or. (changed .and. fixed))
+      call advance(level, now, share, follows)
       if (changed .and. .not. by_load) call rescale(level, now)
     end do
   end subroutine iterate

@@ -2,18 +2,17 @@
 !>
 !> Equations: docs/theory/normal_contact.md, (N2).
 module hc_normal_rows
-  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use hc_precision, only: wp, sp
   implicit none
   private
 
-  public :: classify_row, add_row, largest_of
+  public :: classify_row, residual_row, sum_row, projected_row, direction_row, add_row, dot_single, largest_of
 
 contains
 
   !> Compute the residuals of the nodes of a row, and find which of them pressure and gap call for.
   pure subroutine classify_row(n, r, stiffness, approach, initial_gap, pressure, closing, candidate, active, next, &
-                            p_max, worst, worst_active, n_next, n_changed, n_wrong)
+                            p_max, worst, worst_active, n_next, n_changed, finite)
     !> Number of nodes
     integer, intent(in) :: n
     !> Classification parameter, and inverse of the self-compliance [Pa/m]
@@ -25,27 +24,140 @@ contains
     !> What the rows before gave, and now this one too
     real(wp), intent(inout) :: p_max, worst, worst_active
     integer, intent(inout) :: n_next, n_changed
-    !> Nodes whose pressure or gap is not a finite number
-    integer, intent(inout) :: n_wrong
-    real(wp) :: gap(n)
-    integer :: enters(n), col
+    !> Pressure and closing are finite numbers
+    logical, intent(inout) :: finite
+    real(wp) :: gap(n), rest
+    integer :: possible(n), carries(n), enters(n), col
 
-    ! without branches, so that several nodes are judged at a time
+    ! without branches, and the sets as numbers, so that several nodes are judged at a time
+    do col = 1, n
+      possible(col) = merge(1, 0, candidate(col))
+      carries(col) = merge(1, 0, active(col))
+    end do
     do col = 1, n
       gap(col) = initial_gap(col) + closing(col) - approach
       enters(col) = merge(1, 0, pressure(col) - r*gap(col) > 0.0_wp)*merge(1, 0, candidate(col))
     end do
-    !$omp simd reduction(max: p_max, worst, worst_active) reduction(+: n_wrong)
+    ! the gap may be infinite where nothing can touch; a number less itself is 0, unless it is infinite or none
+    rest = 0.0_wp
+    !$omp simd reduction(max: p_max, worst, worst_active) reduction(+: rest)
     do col = 1, n
       p_max = max(p_max, pressure(col))
-      worst = max(worst, merge(abs(min(pressure(col), stiffness*gap(col))), 0.0_wp, candidate(col)))
-      worst_active = max(worst_active, merge(abs(gap(col)), 0.0_wp, active(col)))
-      n_wrong = n_wrong + merge(0, 1, ieee_is_finite(pressure(col)) .and. (ieee_is_finite(gap(col)) .or. .not. candidate(col)))
+      worst = max(worst, abs(min(pressure(col), stiffness*gap(col)))*possible(col))
+      worst_active = max(worst_active, abs(min(gap(col), huge(1.0_wp)))*carries(col))
+      rest = rest + (pressure(col) - pressure(col)) + (closing(col) - closing(col))
     end do
-    next = enters == 1
-    n_next = n_next + sum(enters)
-    n_changed = n_changed + sum(abs(enters - merge(1, 0, active)))
+    do col = 1, n
+      next(col) = enters(col) == 1
+      n_next = n_next + enters(col)
+      n_changed = n_changed + abs(enters(col) - carries(col))
+    end do
+    finite = finite .and. abs(rest) <= 0.0_wp
   end subroutine classify_row
+
+  !> Compute r = approach - h - w at the active nodes of a row, in single precision; the others stay.
+  pure subroutine residual_row(n, scale, approach, initial_gap, closing, active, r)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Inverse of the unit of r [1/m], approach, gap of the undeformed bodies and its closing [m]
+    real(wp), intent(in) :: scale, approach, initial_gap(n), closing(n)
+    logical, intent(in) :: active(n)
+    real(sp), intent(inout) :: r(n)
+    !> Lowest number of single precision: the gap may be infinite where nothing can touch
+    real(wp), parameter :: lowest = -huge(1.0_sp)
+    real(sp) :: residual(n)
+    integer :: carries(n), col
+
+    do col = 1, n
+      carries(col) = merge(1, 0, active(col))
+    end do
+    do col = 1, n
+      residual(col) = real(max(scale*(approach - initial_gap(col) - closing(col)), lowest), sp)
+    end do
+    do col = 1, n
+      r(col) = carries(col)*residual(col) + (1 - carries(col))*r(col)
+    end do
+  end subroutine residual_row
+
+  !> Sum a field over the active nodes of a row, and its product with another one.
+  pure subroutine sum_row(n, field, active, total, other, product)
+    !> Number of nodes
+    integer, intent(in) :: n
+    real(sp), intent(in) :: field(n)
+    logical, intent(in) :: active(n)
+    !> The sum
+    real(wp), intent(out) :: total
+    real(sp), intent(in), optional :: other(n)
+    !> Sum of the products
+    real(wp), intent(out), optional :: product
+    real(sp) :: part(n), value
+    integer :: col
+
+    do col = 1, n
+      value = field(col)
+      part(col) = merge(value, 0.0_sp, active(col))
+    end do
+    total = 0.0_wp
+    !$omp simd reduction(+: total)
+    do col = 1, n
+      total = total + part(col)
+    end do
+    if (present(other)) product = dot_single(n, other, part)
+  end subroutine sum_row
+
+  !> Compute d = max(p + step (z - mean punch), 0) - p at the active nodes of a row, -p at the others.
+  pure subroutine projected_row(n, unit, pressure, active, d, total, step, z, mean, punch)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Unit of d and z [Pa], and pressure [Pa]
+    real(wp), intent(in) :: unit, pressure(n)
+    logical, intent(in) :: active(n)
+    !> The direction
+    real(sp), intent(out) :: d(n)
+    !> Sum of p + d
+    real(wp), intent(out) :: total
+    !> Length of the step, and the preconditioned residual; absent: no step
+    real(wp), intent(in), optional :: step
+    real(sp), intent(in), optional :: z(n)
+    !> Share of the pressure of a punch that is taken off, and that pressure; absent: none
+    real(wp), intent(in), optional :: mean
+    real(sp), intent(in), optional :: punch(n)
+    real(wp) :: before(n), aim(n)
+    integer :: carries(n), col
+
+    do col = 1, n
+      carries(col) = merge(1, 0, active(col))
+    end do
+    before = pressure/unit
+    aim = before
+    if (present(z)) aim = aim + step*z
+    if (present(punch)) aim = aim - step*mean*punch
+    total = 0.0_wp
+    !$omp simd reduction(+: total)
+    do col = 1, n
+      aim(col) = carries(col)*max(aim(col), 0.0_wp)
+      total = total + aim(col)
+      d(col) = real(aim(col) - before(col), sp)
+    end do
+  end subroutine projected_row
+
+  !> Compute d <- z + back d at the active nodes of a row, 0 at the others.
+  pure subroutine direction_row(n, back, z, active, d)
+    !> Number of nodes
+    integer, intent(in) :: n
+    !> Share of the last direction, and the preconditioned residual
+    real(sp), intent(in) :: back, z(n)
+    logical, intent(in) :: active(n)
+    real(sp), intent(inout) :: d(n)
+    integer :: carries(n), col
+
+    do col = 1, n
+      carries(col) = merge(1, 0, active(col))
+    end do
+    do col = 1, n
+      d(col) = carries(col)*(z(col) + back*d(col))
+    end do
+  end subroutine direction_row
 
   !> Add to a field: field <- field + factor * change
   pure subroutine add_row(n, factor, change, field)
@@ -60,6 +172,20 @@ contains
       field(col) = field(col) + factor*change(col)
     end do
   end subroutine add_row
+
+  !> Compute a scalar product of fields in single precision, in double precision.
+  pure real(wp) function dot_single(n, first, second)
+    !> Number of nodes
+    integer, intent(in) :: n
+    real(sp), intent(in) :: first(n), second(n)
+    integer :: col
+
+    dot_single = 0.0_wp
+    !$omp simd reduction(+: dot_single)
+    do col = 1, n
+      dot_single = dot_single + real(first(col), wp)*second(col)
+    end do
+  end function dot_single
 
   !> Compute the largest absolute value.
   pure real(sp) function largest_of(n, field)

@@ -84,7 +84,7 @@ contains
     end do
     !$omp end parallel do
     call level%multiply(now%d, now%kd)
-    call advance(level, now, 1.0_wp)
+    call advance(level, now, 1.0_wp, .false.)
     do try = 1, merge(start_steps, 0, allocated(now%offset))
       call linearize_law(level, now, 0.0_wp)
       if (by_load) exit

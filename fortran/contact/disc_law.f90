@@ -320,19 +320,20 @@ contains
     !> Squares of the largest traction and of what is lacking most, in the unit of pressure: those of the rows before,
     !> and now of this one too
     real(wp), intent(inout) :: largest, worst
-    real(wp) :: x, y, trial_x, trial_y, length, share
+    real(wp) :: x, y, trial_x, trial_y, length, share, touches
     integer :: i
 
-    !$omp simd reduction(max: largest, worst) private(x, y, trial_x, trial_y, length, share)
+    !$omp simd reduction(max: largest, worst) private(x, y, trial_x, trial_y, length, share, touches)
     do i = 1, n
+      touches = merge(1.0_wp, 0.0_wp, p(i) > 0.0_wp)
       x = unit*qx(i)
       y = unit*qy(i)
       trial_x = x - unit*stiffness*dsx(i)
       trial_y = y - unit*stiffness*dsy(i)
       length = sqrt(max(trial_x**2 + trial_y**2, nothing))
       share = min(slope*max(unit*p(i), 0.0_wp)/length, 1.0_wp)
-      largest = max(largest, merge(x**2 + y**2, 0.0_wp, p(i) > 0.0_wp))
-      worst = max(worst, merge((x - share*trial_x)**2 + (y - share*trial_y)**2, 0.0_wp, p(i) > 0.0_wp))
+      largest = max(largest, touches*(x**2 + y**2))
+      worst = max(worst, touches*((x - share*trial_x)**2 + (y - share*trial_y)**2))
     end do
   end subroutine residual_row
 

@@ -295,16 +295,19 @@ contains
     integer, intent(in) :: row, col
     !> Components along x and y (number of nodes)
     real(wp), intent(out), contiguous :: dsx(:), dsy(:)
+    real(wp) :: touches(size(dsx))
     integer :: i, n, at
-    logical :: touches
 
     n = size(self%p)
     call self%problem%rigid_displacement_row(self%motion, row, dsx, dsy, col)
     at = (row - 1)*self%problem%lattice%extent(1) + col - 1
     do i = 1, size(dsx)
-      touches = self%contact(at + i) .or. self%p(at + i) > 0.0_wp
-      dsx(i) = merge(self%u(at + i) - self%origin(at + i) - dsx(i), 0.0_wp, touches)
-      dsy(i) = merge(self%u(n + at + i) - self%origin(n + at + i) - dsy(i), 0.0_wp, touches)
+      touches(i) = merge(1.0_wp, 0.0_wp, self%contact(at + i))
+    end do
+    do i = 1, size(dsx)
+      touches(i) = max(touches(i), merge(1.0_wp, 0.0_wp, self%p(at + i) > 0.0_wp))
+      dsx(i) = touches(i)*(self%u(at + i) - self%origin(at + i) - dsx(i))
+      dsy(i) = touches(i)*(self%u(n + at + i) - self%origin(n + at + i) - dsy(i))
     end do
   end subroutine slip_row
 
@@ -398,15 +401,18 @@ contains
   !> Return whether all tractions and motions are finite numbers.
   logical function is_finite(self)
     class(friction_iterate_t), intent(in) :: self
+    real(wp) :: rest
     integer :: n, i
 
     n = size(self%p)
-    is_finite = all(ieee_is_finite(self%motion))
-    !$omp parallel do schedule(static) num_threads(self%operators%space%threads) reduction(.and.: is_finite)
+    ! a number less itself is 0, unless it is infinite or none
+    rest = 0.0_wp
+    !$omp parallel do simd schedule(static) num_threads(self%operators%space%threads) reduction(+: rest)
     do i = 1, n
-      is_finite = is_finite .and. ieee_is_finite(self%p(i)) .and. ieee_is_finite(self%q(i)) .and. ieee_is_finite(self%q(n + i))
+      rest = rest + (self%p(i) - self%p(i)) + (self%q(i) - self%q(i)) + (self%q(n + i) - self%q(n + i))
     end do
-    !$omp end parallel do
+    !$omp end parallel do simd
+    is_finite = all(ieee_is_finite(self%motion)) .and. abs(rest) <= 0.0_wp
   end function is_finite
 
   !> Compute R_n of a gap under the present pressure.

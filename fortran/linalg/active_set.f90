@@ -141,7 +141,13 @@ contains
   !> Count the runs of active nodes.
   pure integer function count_runs(active)
     logical, intent(in), contiguous :: active(:)
-    count_runs = merge(1, 0, active(1)) + count(active(2:) .and. .not. active(:size(active) - 1))
+    integer :: i
+
+    count_runs = merge(1, 0, active(1))
+    !$omp simd reduction(+: count_runs)
+    do i = 2, size(active)
+      count_runs = count_runs + merge(1, 0, active(i))*merge(0, 1, active(i - 1))
+    end do
   end function count_runs
 
   !> List the runs of active nodes.

@@ -355,7 +355,7 @@ def test_plot_draws_what_is_asked(solved: Path) -> None:
     refused(
         inside(solved, "plot", "sphere.nc", "-o", "no/cut.png"),
         2,
-        "no/cut.png: No such file or directory",
+        "cannot write no/cut.png: the folder no does not exist",
     )
 
 

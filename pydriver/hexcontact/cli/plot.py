@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ..deck.units import ANGLE, LENGTH, UnitError, to_si
 from ..errors import DeckError
-from ..files import MADE_BY, require_replaceable
+from ..files import MADE_BY, replacing, require_replaceable
 from ..text import did_you_mean, listed
 from .guard import command, print_output
 from .options import Shown, argument, beside, labels_of, option, output_to, steps_of, steps_option
@@ -268,5 +268,6 @@ def _save(figure: Figure, about: str, picture: Path) -> Path:
     if picture.suffix.lower() not in (known := [f".{name}" for name in Format]):
         raise DeckError(f"cannot draw {about}: {picture}: expected {listed(known, 'or')}")
     require_replaceable(picture)
-    figure.savefig(picture, dpi=200, metadata={"Creator": MADE_BY})
+    with replacing(picture) as temporary:
+        figure.savefig(temporary, format=picture.suffix[1:].lower(), dpi=200, metadata={"Creator": MADE_BY})
     return picture

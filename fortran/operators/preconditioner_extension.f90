@@ -173,35 +173,38 @@ contains
     type(field_space_t), intent(in) :: space
     !> The nodes, as places in the marks
     integer, allocatable, intent(out) :: edge(:)
-    integer :: before(size(active, 2) + 1), row
+    type :: places_t
+      integer, allocatable :: node(:)
+    end type places_t
+    type(places_t) :: edge_of(size(active, 2))
+    integer :: row, n
 
-    before(1) = 0
-    !$omp parallel do schedule(static) num_threads(space%threads)
+    n = 0
+    !$omp parallel do schedule(static) num_threads(space%threads) reduction(+: n)
     do row = 1, size(active, 2)
-      call list_edge(active(:, row), mark, step, row*(size(active, 1) + 2) + 1, before(row + 1))
+      call list_edge(active(:, row), mark, step, row*(size(active, 1) + 2) + 1, edge_of(row)%node)
+      n = n + size(edge_of(row)%node)
     end do
     !$omp end parallel do
+    allocate (edge(n))
+    n = 0
     do row = 1, size(active, 2)
-      before(row + 1) = before(row) + before(row + 1)
+      associate (node => edge_of(row)%node)
+        edge(n + 1:n + size(node)) = node
+        n = n + size(node)
+      end associate
     end do
-    allocate (edge(before(size(before))))
-    !$omp parallel do schedule(static) num_threads(space%threads)
-    do row = 1, size(active, 2)
-      if (before(row) == before(row + 1)) cycle
-      call list_edge(active(:, row), mark, step, row*(size(active, 1) + 2) + 1, node=edge(before(row) + 1:before(row + 1)))
-    end do
-    !$omp end parallel do
   end subroutine find_edge
 
-  !> Count or list the nodes of a row at the edge.
-  pure subroutine list_edge(active, mark, step, before, n, node)
+  !> List the nodes of a row at the edge.
+  pure subroutine list_edge(active, mark, step, before, node)
     !> Active nodes of the row
     logical, intent(in), contiguous :: active(:)
     !> Marks of all nodes, steps to the neighbors of a node, and the place in the marks before the row
     integer, intent(in), contiguous :: mark(:)
     integer, intent(in) :: step(6), before
-    !> Number of nodes at the edge, and the nodes
-    integer, intent(out), optional :: n, node(:)
+    !> The nodes
+    integer, allocatable, intent(out) :: node(:)
     integer :: is_edge(size(active)), col, k, low, high, found
 
     call find_span(active, low, high)
@@ -218,8 +221,7 @@ contains
       is_edge(col) = merge(is_edge(col), 0, active(col))
       found = found + is_edge(col)
     end do
-    if (present(n)) n = found
-    if (.not. present(node)) return
+    allocate (node(found))
     found = 0
     do col = low, high
       if (is_edge(col) == 0) cycle

@@ -22,8 +22,7 @@ module hc_convolution
   use hc_spectrum, only: kernel_spectrum_t, kernel_key_t, release
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_fft_layout, only: block_width, even
-  use hc_fft_passes, only: pair_rows, split_rows, join_rows, gather_columns, scatter_columns, multiply, &
-    multiply_one
+  use hc_fft_passes, only: pair_rows, split_rows, join_rows, gather_columns, scatter_columns, multiply, multiply_one
   !$ use omp_lib, only: omp_get_thread_num
   implicit none
   private

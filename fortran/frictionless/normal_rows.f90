@@ -1,6 +1,6 @@
 !> Passes over one row of nodes in a frictionless contact, written so that the compiler vectorises them.
 !>
-!> Equations: docs/theory/normal_contact.md, (N2).
+!> Equations: docs/theory/normal_contact.md, (N2) to (N5).
 module hc_normal_rows
   use hc_precision, only: wp, sp
   implicit none

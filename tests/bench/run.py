@@ -36,6 +36,7 @@ from bench import (
     counts,
     driver,
     lapack,
+    laws,
     layers,
     machine,
     memory,
@@ -49,7 +50,7 @@ from bench import (
 )
 
 ROOT = Path(__file__).parents[2]
-UNTIMED = ("stick_edge", "wear_limit", "layers", "lapack_iterations")
+UNTIMED = ("stick_edge", "wear_limit", "laws", "layers", "lapack_iterations")
 """Counts and errors of problems that no goal is about: by name or with --long only."""
 
 Section = Callable[[], list[report.Table]]
@@ -75,6 +76,7 @@ def sections(options: argparse.Namespace) -> dict[str, Section]:
         "accuracy": partial(accuracy.measure, **quick, **sizes),
         "stick_edge": partial(stick_edge.measure, **quick),
         "wear_limit": partial(wear_limit.measure, **quick, **long),
+        "laws": partial(laws.measure, **quick),
         "layers": partial(layers.measure, **quick, **long),
         "peers": partial(peers.measure, options.peers, **quick, **sizes, names=options.codes),
         "lapack_methods": partial(lapack.methods_table, **quick, **long),

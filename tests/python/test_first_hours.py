@@ -182,6 +182,7 @@ def test_quantities_of_pint_are_refused_in_a_sentence() -> None:
         ("E", "did you mean body_1.young_modulus?"),
         ("Q", "did you mean loads.tangential_load_x?"),
         ("max_nodes", "did you mean accuracy.max_nodes?"),
+        ("friction", "did you mean friction_coefficient?"),
         ("normal_laod", "did you mean normal_load?"),
         ("radius", "known here: body_1, body_2, gap, "),
     ],

@@ -33,8 +33,8 @@ _TABLES: dict[str, type[Table]] = {  # of arguments that take one
 def known_keywords(call: Callable[_P, _T]) -> Callable[_P, _T]:
     """Let a method name the keyword nearest to an unknown one in its TypeError.
 
-    An unknown keyword may be a symbol (``mu``), a key of a table that an argument takes (``max_nodes``), or
-    misspelled.
+    An unknown keyword may be a symbol (``mu``), a key of a table that an argument takes (``max_nodes``), the
+    beginning of a keyword (``friction``), or misspelled.
     """
     _, *known = inspect.signature(call).parameters
     title = call.__qualname__.removesuffix(".__init__")
@@ -46,7 +46,8 @@ def known_keywords(call: Callable[_P, _T]) -> Callable[_P, _T]:
         path = SYMBOLS.get(name, name)
         same = [word for word in (path, path.replace(".", "_")) if word in known]
         below = [f"{of}.{path}" for of in known if of in _TABLES and path in _TABLES[of].known_keys()]
-        near = [*same, *below, *difflib.get_close_matches(name, known, n=1, cutoff=0.7)]
+        longer = [word for word in known if word.startswith(f"{name}_")]
+        near = [*same, *below, *longer, *difflib.get_close_matches(name, known, n=1, cutoff=0.7)]
         hint = f"did you mean {near[0]}?" if near else f"known here: {listed(known, 'and')}"
         raise TypeError(f"{name}: unknown argument of {title}; {hint}")
 

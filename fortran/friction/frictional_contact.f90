@@ -119,11 +119,13 @@ contains
     integer, parameter :: long = selected_int_kind(18)
     !> Bytes of a field of numbers, and of logical values or in single precision
     integer, parameter :: field = 8, half = 4
-    integer(long) :: n, everywhere, inside, n_shear
+    integer(long) :: n, everywhere, inside, n_shear, directions
     type(newton_options_t) :: options
 
     n = int(extent(1), long)*extent(2)
     n_shear = max(n_force - 1, 1)
+    ! all that GMRES may store but one, since mostly a few are enough
+    directions = options%max_directions - 1
     ! iterate; traction estimates; shear system
     everywhere = 6*field + half + (1 + 2*n_shear)*half + 3*field
     ! what the preconditioner of the shear traction gets and gives, what it averages and the mean; packed: its weights, what it
@@ -133,9 +135,9 @@ contains
     if (coupled) then
       ! closing by the shear traction, unknowns, slope; products of the unknowns and of a direction, its tractions; the products
       ! of all directions off the contact; without the displacements of the iterate
-      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 + 3 - 4)*field + 3*options%max_directions*field
+      everywhere = everywhere + (1 + 3 + 1)*field + (3 + 3 + 3 - 4)*field + 3*directions*field
       ! packed: both of all directions, residuals, constraints thrice; without the products there
-      inside = inside + 3*(2*options%max_directions + 2 + 3*n_force)*field - 3*options%max_directions*field
+      inside = inside + 3*(2*directions + 2 + 3*n_force)*field - 3*directions*field
     else
       ! product of a direction, its tractions
       everywhere = everywhere + 2*2*field

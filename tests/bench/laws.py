@@ -1,8 +1,8 @@
 """Work of a load history under laws of the interface over that under one coefficient and no layer.
 
 A sphere on a rigid plane, E = R = 1, 20 spacings in the contact radius, is pressed in three load steps and
-sheared to half of mu P in four. Layers are as soft as their compression s under Hertz's largest pressure says,
-over Hertz's approach.
+sheared to half of mu P in four. Layers are as soft as their compression s under Hertz's largest pressure,
+over Hertz's approach, says.
 """
 
 from __future__ import annotations
@@ -65,7 +65,9 @@ class Sphere:
             "poisson_ratio": self.poisson_ratio,
             "surface": {"shape": "sphere", "radius": 1.0},
         }
-        case = Case(body_1=sphere, body_2={"rigid": True}, nodes_in_radius=20, loads=STEPS, method="fft", **law)
+        case = Case(
+            body_1=sphere, body_2={"rigid": True}, nodes_in_radius=20, loads=STEPS, method="fft", **law
+        )
         return float(case.run().dataset.operator_applications.sum())
 
 
@@ -112,8 +114,8 @@ def measure(*, quick: bool) -> list[Table]:
         "Operator applications of a load history, over those with one coefficient and no layer",
         ["law", *spheres],
         remarks=[
-            "A sphere on a rigid plane, µ = 0.3, 20 spacings in the contact radius a, pressed in three load steps and "
-            "sheared to 0.5 µP in four; √(µ₁µ₂) = 0.3, the load at "
+            "A sphere on a rigid plane, µ = 0.3, 20 spacings in the contact radius a, pressed in three "
+            "load steps and sheared to 0.5 µP in four; √(µ₁µ₂) = 0.3, the load at "
             f"{', '.join(map(str, ANGLES))}° to the first axis."
         ],
     )

@@ -1,6 +1,8 @@
 !> What makes frictionless contact fast: kernels by symmetry, displacements continued beyond the edge, corrections
 !> in single precision.
 module test_normal_contact
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
+  use hc_build_options, only: debug_checks
   use hc_precision, only: wp, sp, pi
   use hc_error, only: error_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
@@ -17,6 +19,7 @@ module test_normal_contact
   use hc_options, only: preconditioner_options_t
   use hc_contact_state, only: contact_state_t, force_control, displacement_control
   use hc_contact_residuals, only: normal_residual, normal_self_compliance
+  use hc_normal_rows, only: classify_row, residual_row, sum_row, projected_row, direction_row
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use testing, only: test_t, new_test, check, check_true, largest
   implicit none
@@ -32,6 +35,8 @@ contains
 
     tests = [ &
       new_test('kernel_by_symmetry', test_kernel), &
+      new_test('rows', test_rows), &
+      new_test('rows_not_finite', test_rows_not_finite), &
       new_test('symbols', test_symbols), &
       new_test('prolonged_edge', test_prolonged_edge), &
       new_test('transpose', test_transpose), &
@@ -44,6 +49,84 @@ contains
       new_test('part_that_grows', test_growing_part) &
     ]
   end subroutine collect_normal_contact
+
+  !> Passes over a row without branches give what the formulas say, node by node; the gap is infinite where nothing can touch.
+  subroutine test_rows(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: p(5) = [2.0_wp, 0.5_wp, 0.0_wp, 0.0_wp, 1.0_wp], w(5) = [0.5_wp, 1.0_wp, 0.25_wp, 0.0_wp, 0.0_wp]
+    logical, parameter :: candidate(5) = [.true., .true., .true., .false., .true.]
+    logical, parameter :: active(5) = [.true., .true., .false., .false., .false.]
+    real(sp), parameter :: z(5) = [1.0_sp, -8.0_sp, 4.0_sp, 2.0_sp, 1.0_sp], punch(5) = [2.0_sp, 1.0_sp, 0.0_sp, 0.0_sp, 0.0_sp]
+    real(wp) :: h(5), p_max, worst, worst_active, total, product
+    real(sp) :: r(5), d(5)
+    integer :: n_next, n_changed
+    logical :: next(5), finite
+
+    h = [0.5_wp, 1.0_wp, 0.25_wp, ieee_value(1.0_wp, ieee_positive_inf), 1.25_wp]
+    p_max = 0.0_wp
+    worst = 0.0_wp
+    worst_active = 0.0_wp
+    n_next = 0
+    n_changed = 0
+    finite = .true.
+    ! gaps of -0.5, 0.5, -1, infinite, -0.25 under an approach of 1.5
+    call classify_row(5, 2.0_wp, 4.0_wp, 1.5_wp, h, p, w, candidate, active, next, p_max, worst, worst_active, n_next, n_changed, &
+                      finite)
+    call check_true(error, all(next .eqv. [.true., .false., .true., .false., .true.]), 'set')
+    if (allocated(error)) return
+    call check_true(error, n_next == 3 .and. n_changed == 3 .and. finite, 'numbers of nodes')
+    if (allocated(error)) return
+    call check(error, [p_max, worst, worst_active], [2.0_wp, 4.0_wp, 0.5_wp], 0.0_wp, 'pressure and residuals')
+    if (allocated(error)) return
+
+    r = 7.0_sp
+    call residual_row(5, 2.0_wp, 1.5_wp, h, w, active, r)
+    call check(error, real(r, wp), [1.0_wp, -1.0_wp, 7.0_wp, 7.0_wp, 7.0_wp], 0.0_wp, 'r')
+    if (allocated(error)) return
+    call sum_row(5, z, active, total, r, product)
+    call check(error, [total, product], [-7.0_wp, 9.0_wp], 0.0_wp, 'sums')
+    if (allocated(error)) return
+    d = 2.0_sp
+    call direction_row(5, 0.5_sp, z, active, d)
+    call check(error, real(d, wp), [2.0_wp, -7.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'direction')
+    if (allocated(error)) return
+
+    call projected_row(5, 0.5_wp, p, active, d, total)
+    call check(error, [real(d, wp), total], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 5.0_wp], 0.0_wp, 'no step')
+    if (allocated(error)) return
+    call projected_row(5, 0.5_wp, p, active, d, total, 0.5_wp, z)
+    call check(error, [real(d, wp), total], [0.5_wp, -1.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 4.5_wp], 0.0_wp, 'step')
+    if (allocated(error)) return
+    call projected_row(5, 0.5_wp, p, active, d, total, 0.5_wp, z, -1.0_wp, punch)
+    call check(error, [real(d, wp), total], [1.5_wp, -1.0_wp, 0.0_wp, 0.0_wp, -2.0_wp, 5.5_wp], 0.0_wp, 'step by load')
+  end subroutine test_rows
+
+  !> A pressure or closing that is not finite is found, on any node; a build that traps such numbers stops before.
+  subroutine test_rows_not_finite(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: p(3), w(3), odd(2), p_max, worst, worst_active
+    integer :: i, n_next, n_changed
+    logical :: next(3), finite
+
+    if (debug_checks) return
+    odd = [ieee_value(1.0_wp, ieee_quiet_nan), ieee_value(1.0_wp, ieee_positive_inf)]
+    do i = 1, 4
+      p = 1.0_wp
+      w = 0.0_wp
+      if (i <= 2) p(2) = odd(i)
+      if (i > 2) w(3) = odd(i - 2)
+      finite = .true.
+      n_next = 0
+      n_changed = 0
+      p_max = 0.0_wp
+      worst = 0.0_wp
+      worst_active = 0.0_wp
+      call classify_row(3, 1.0_wp, 1.0_wp, 0.5_wp, [0.0_wp, 0.0_wp, 0.0_wp], p, w, [.true., .true., .false.], &
+                        [.true., .true., .false.], next, p_max, worst, worst_active, n_next, n_changed, finite)
+      call check_true(error, .not. finite, 'not finite')
+      if (allocated(error)) return
+    end do
+  end subroutine test_rows_not_finite
 
   !> The table agrees with the pyramid at every offset, on an equilateral and on an oblique lattice.
   subroutine test_kernel(error)

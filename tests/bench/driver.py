@@ -35,28 +35,24 @@ def command(*, quick: bool) -> list[Table]:
             "half of the window is in contact."
         ],
     )
-    program = [sys.executable, "-m", "hexcontact"]
-    installed = Path(sys.executable).with_name("hexcontact")
-    if installed.exists():
-        program = [str(installed)]
     python = [sys.executable, "-c"]
     sizes = (64,) if quick else (64, 128, 256)
     rows: list[tuple[str, list[str], str]] = [
         ("python -c pass", [*python, "pass"], ""),
         (f"python -c '{IMPORTS}'", [*python, IMPORTS], ""),
-        ("hexcontact --help", [*program, "--help"], "< 0.3"),
-        ("hexcontact check, friction, 64²", [*program, "check", "64.toml"], ""),
+        ("hexcontact --help", [*program(), "--help"], "< 0.3"),
+        ("hexcontact check, friction, 64²", [*program(), "check", "64.toml"], ""),
     ]
     for side in sizes:
         rows.append(
             (
                 f"hexcontact run, friction, {side}²",
-                [*program, "run", f"{side}.toml", "--overwrite"],
+                [*program(), "run", f"{side}.toml", "--overwrite"],
                 "≤ 0.2" if side == 64 else "",
             )
         )
     for name, goal in (("hertz_spheres", "< 1.5"), ("hertz_table_9_2", "")):
-        words = [*program, "run", str(ROOT / "cases" / f"{name}.toml"), "--overwrite"]
+        words = [*program(), "run", str(ROOT / "cases" / f"{name}.toml"), "--overwrite"]
         rows.append((f"hexcontact run {name}.toml", words, goal))
     with tempfile.TemporaryDirectory() as folder:
         for side in sizes:
@@ -69,6 +65,12 @@ def command(*, quick: bool) -> list[Table]:
             table.add(title, "" if os.environ.get("BENCH_CLOCK") == "cpu" else wall, processor, goal)
             print(f"  {table.rows[-1]}", flush=True)
     return [table]
+
+
+def program() -> list[str]:
+    """Return the words that call the command."""
+    installed = Path(sys.executable).with_name("hexcontact")
+    return [str(installed)] if installed.exists() else [sys.executable, "-m", "hexcontact"]
 
 
 def process(words: list[str], folder: str) -> tuple[float, float]:

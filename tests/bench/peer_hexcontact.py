@@ -25,7 +25,7 @@ from bench.square_window import (
 from hexcontact.core import kernel_cache
 from hexcontact.core.contact import ElasticPair, NormalContact, NormalSolution
 from hexcontact.core.edges import ContactEdges
-from hexcontact.core.friction import FrictionalContact
+from hexcontact.core.friction import ContactState, FrictionalContact
 from hexcontact.core.lattice import Lattice
 
 
@@ -130,20 +130,28 @@ def cattaneo_mindlin(
     }
 
 
-def friction(name: str, side: int, threads: int, repeats: int, loose: bool = False) -> dict[str, Any]:
+def friction(
+    name: str, side: int, threads: int, repeats: int, loose: bool = False, setups: int = 1
+) -> dict[str, Any]:
     """All steps of a counted problem on a window of side x side nodes."""
     problem = problems.BOUNDED[f"{name}, 1e-5" if loose else name]
     lattice = Lattice(2.7 / (side - 1), -(side // 2), -(side // 2), side, side)
     setup, contact = best_of(
-        1, lambda: problems.frictional_contact(problem.material, lattice, threads=threads)
+        setups, lambda: problems.frictional_contact(problem.material, lattice, threads=threads)
     )
     everything = replace(problem, counted=len(problem.steps))
-    solve, count = best_of(repeats, lambda: problems.run_steps(contact, everything))
+    shares: list[float] = []
+
+    def observe(state: ContactState) -> None:
+        shares.append(float(np.count_nonzero(state.zone == 1) / np.count_nonzero(state.zone)))
+
+    solve, count = best_of(repeats, lambda: problems.run_steps(contact, everything, observe))
     return {
         "setup": setup,
         "solve": solve,
         "steps": len(problem.steps),
         "applications": sum(count.applications),
+        "stick": shares[-1],
     }
 
 

@@ -33,6 +33,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench import (
     accuracy,
     below,
+    contact,
     counts,
     driver,
     lapack,
@@ -79,6 +80,7 @@ def sections(options: argparse.Namespace) -> dict[str, Section]:
         "laws": partial(laws.measure, **quick),
         "layers": partial(layers.measure, **quick, **long),
         "peers": partial(peers.measure, options.peers, **quick, **sizes, names=options.codes),
+        "contact": partial(contact.measure, options.peers, **quick, **sizes),
         "lapack_methods": partial(lapack.methods_table, **quick, **long),
         "lapack_steps": partial(lapack.steps_table, **quick),
         "lapack_threads": partial(lapack.threads_table, **quick),

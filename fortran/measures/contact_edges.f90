@@ -264,7 +264,7 @@ contains
     known = inside .and. band%next_to(.not. inside)
     inwards = band%gradient(merge(1.0_wp, 0.0_wp, inside), known)
     rises = merge(1.0_wp, 0.0_wp, seen%has_direction .and. sum(inwards*seen%direction, dim=1) < 0.0_wp)
-    call band%extend(rises, known)
+    call band%extend(1, rises, known)
     field = ieee_value(1.0_wp, ieee_quiet_nan)
     do k = 1, band%n
       if (.not. (known(k) .and. seen%has_slope(k)) .or. any(band%node(:, k) < 1 .or. band%node(:, k) > shape(field))) cycle
@@ -294,7 +294,7 @@ contains
 
     known = band%surrounded(part)
     slope = norm2(band%gradient(values, known), dim=1)
-    call band%extend(slope, known)
+    call band%extend(1, slope, known)
     away = options%unknown_distance
     where (known .and. slope > options%least_relative_slope*abs(values)) away = values/slope
   end function distances
@@ -315,14 +315,16 @@ contains
     !> What is found
     type(one_sided_t), intent(out) :: seen
     logical :: whole(band%n), known(band%n)
-    real(wp) :: slope(band%n), smooth(band%n), flat(band%n), guessed(band%n), steepness, bend, to(2, 6)
+    ! direction, 1 where it is guessed, 1 where there is no slope
+    real(wp) :: carried(4, band%n)
+    real(wp) :: slope(band%n), smooth(band%n), steepness, bend, to(2, 6)
     integer :: k
 
     to = to_neighbors()
     whole = band%surrounded(part)
     known = whole
     slope = norm2(band%gradient(square, whole), dim=1)
-    call band%extend(slope, known)
+    call band%extend(1, slope, known)
     smooth = square
     do k = 1, band%n
       if (.not. known(k) .or. slope(k) <= options%least_relative_slope*square(k)) cycle
@@ -332,11 +334,8 @@ contains
     end do
 
     seen%direction = band%gradient(smooth, whole)
-    flat = 0.0_wp
-    guessed = 0.0_wp
+    carried(3:4, :) = 0.0_wp
     seen%has_slope = whole
-    seen%has_direction = whole
-    known = whole
     do k = 1, band%n
       steepness = norm2(seen%direction(:, k))
       if (.not. whole(k)) cycle
@@ -345,25 +344,23 @@ contains
       else
         ! but a rounding error, as in the middle of few nodes: one direction is as good as another
         seen%direction(:, k) = [1.0_wp, 0.0_wp]
-        guessed(k) = 1.0_wp
+        carried(3, k) = 1.0_wp
       end if
       ! second derivative along n from those along the three lines of nodes at angles t to n, with weights 1 + 2 cos 2t
       bend = sum((4.0_wp*matmul(seen%direction(:, k), to)**2 - 1.0_wp)*(smooth(band%beside(:, k)) - smooth(k)))/3.0_wp
       slope(k) = steepness**2 - 2.0_wp*smooth(k)*bend
-      if (slope(k) < options%least_slope*steepness**2) flat(k) = 1.0_wp
+      if (slope(k) < options%least_slope*steepness**2) carried(4, k) = 1.0_wp
       slope(k) = sqrt(max(slope(k), options%least_slope*steepness**2))
       seen%has_slope(k) = slope(k) > 0.0_wp
     end do
-    known = whole
-    call band%extend(guessed, known)
-    seen%is_guessed = guessed > 0.5_wp
-    known = whole
-    call band%extend(flat, whole)
-    call band%extend(slope, seen%has_slope)
-    call band%extend(seen%direction(1, :), known)
-    call band%extend(seen%direction(2, :), seen%has_direction)
+    carried(1:2, :) = seen%direction
+    call band%extend(4, carried, whole)
+    seen%has_direction = whole
+    seen%direction = carried(1:2, :)
+    seen%is_guessed = carried(3, :) > 0.5_wp
+    call band%extend(1, slope, seen%has_slope)
     seen%slope = slope
-    seen%has_slope = seen%has_slope .and. .not. (whole .and. flat > 0.5_wp)
+    seen%has_slope = seen%has_slope .and. .not. (whole .and. carried(4, :) > 0.5_wp)
 
     seen%distance = square
     seen%has_distance = seen%has_slope

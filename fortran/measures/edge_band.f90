@@ -212,34 +212,49 @@ contains
   end function gradient
 
   !> Fill in what is not known with the mean of the neighbors, from the nearest nodes on.
-  pure subroutine extend(self, values, known)
+  pure subroutine extend(self, n_value, values, known)
     class(edge_band_t), intent(in) :: self
+    !> Number of values of a node
+    integer, intent(in) :: n_value
     !> Values at the nodes
-    real(wp), intent(inout) :: values(:)
-    !> Nodes that have a value
+    real(wp), intent(inout) :: values(n_value, self%n)
+    !> Nodes that have values
     logical, intent(inout) :: known(:)
     logical :: had(self%n)
-    real(wp) :: total
-    integer :: k, j, step, n_known
+    real(wp) :: total(n_value)
+    integer :: unknown(self%n), n_unknown, n_left, k, j, step, n_known
 
+    n_unknown = 0
+    do k = 1, self%n
+      if (known(k)) cycle
+      n_unknown = n_unknown + 1
+      unknown(n_unknown) = k
+    end do
+    had = known
     do step = 1, self%reach
-      had = known
-      do k = 1, self%n
-        if (had(k)) cycle
+      n_left = 0
+      do k = 1, n_unknown
         total = 0.0_wp
         n_known = 0
         do j = 1, n_beside
-          associate (m => self%beside(j, k))
+          associate (m => self%beside(j, unknown(k)))
             if (m == 0) cycle
             if (.not. had(m)) cycle
-            total = total + values(m)
+            total = total + values(:, m)
             n_known = n_known + 1
           end associate
         end do
-        if (n_known == 0) cycle
-        known(k) = .true.
-        values(k) = total/n_known
+        if (n_known == 0) then
+          n_left = n_left + 1
+          unknown(n_left) = unknown(k)
+        else
+          known(unknown(k)) = .true.
+          values(:, unknown(k)) = total/n_known
+        end if
       end do
+      if (n_left == 0) exit
+      n_unknown = n_left
+      had = known
     end do
   end subroutine extend
 

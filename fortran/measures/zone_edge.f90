@@ -122,6 +122,7 @@ contains
     logical, allocatable :: can_touch(:)
     real(wp) :: covered, moments(6), sign
     integer(int64) :: whole(6, 2)  ! whole triangles, and sums of columns, rows and their products over them
+    integer(int64) :: in_row(3, 2)  ! those of a row, sums of columns and of their squares over them
     integer :: n_with(0:3), inside(2), corners(2, 3), at(3), lone, col, row, half, n
 
     padded = with_rim(zone)
@@ -133,12 +134,13 @@ contains
     moments = 0.0_wp
     whole = 0_int64
     do row = 0, size(zone, 2)
+      in_row = 0_int64
       do col = 0, size(zone, 1)
         inside = nodes_inside(padded(col:col + 1, row:row + 1))
         do half = 1, 2
           if (inside(half) == 0) cycle
           if (inside(half) == 3) then
-            whole(:, half) = whole(:, half) + [1, col, row, col*col, col*row, row*row]
+            in_row(:, half) = in_row(:, half) + [1, col, col*col]
             cycle
           end if
           corners = corners_of(half) + spread([col, row], 2, 3)
@@ -160,6 +162,11 @@ contains
           end if
         end do
       end do
+      whole(1:2, :) = whole(1:2, :) + in_row(1:2, :)
+      whole(3, :) = whole(3, :) + row*in_row(1, :)
+      whole(4, :) = whole(4, :) + in_row(3, :)
+      whole(5, :) = whole(5, :) + row*in_row(2, :)
+      whole(6, :) = whole(6, :) + row*row*in_row(1, :)
     end do
     do half = 1, 2
       moments = moments + moments_of_whole(half, real(whole(:, half), wp))

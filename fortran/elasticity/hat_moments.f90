@@ -24,10 +24,8 @@ contains
 
     complex(wp), dimension(0:max_order, 0:max_order) :: series, factor, product
     real(wp) :: scale
-    integer :: q, m, p, a, b
+    integer :: q, m, p, a, b, i, j
 
-    series = 0.0_wp
-    series(0, 0) = 1.0_wp
     do q = 1, 3
       ! sinh(w/2)/(w/2) = sum_m w**(2m)/(4**m (2m+1)!), w = s*edge + t*conj(edge)
       factor = 0.0_wp
@@ -38,10 +36,18 @@ contains
           factor(p, 2*m - p) = scale*binomial(2*m, p)*edge(q)**p*conjg(edge(q))**(2*m - p)
         end do
       end do
+      if (q == 1) then
+        series = factor
+        cycle
+      end if
       product = 0.0_wp
       do b = 0, max_order
-        do a = 0, max_order - b
-          product(a, b) = sum(series(0:a, 0:b)*factor(a:0:-1, b:0:-1))
+        do a = modulo(b, 2), max_order - b, 2  ! odd orders vanish, here and in both factors
+          do j = 0, b
+            do i = modulo(j, 2), a, 2
+              product(a, b) = product(a, b) + series(i, j)*factor(a - i, b - j)
+            end do
+          end do
         end do
       end do
       series = product

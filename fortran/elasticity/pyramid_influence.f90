@@ -96,7 +96,7 @@ contains
 
     xs = x/self%spacing
     ys = y/self%spacing
-    if (hypot(xs, ys) < far_radius) then
+    if (xs*xs + ys*ys < far_radius**2) then
       k = self%spacing*near_kernels(self, xs, ys)
     else
       k = self%spacing*far_kernels(self, xs, ys)
@@ -112,7 +112,7 @@ contains
 
     xs = x/self%spacing
     ys = y/self%spacing
-    if (hypot(xs, ys) < far_radius) then
+    if (xs*xs + ys*ys < far_radius**2) then
       all_kernels = near_kernels(self, xs, ys)
       k = self%spacing*all_kernels(k_1)
     else
@@ -241,7 +241,7 @@ contains
     real(wp) :: r, q
     integer :: power, harmonic
 
-    r = hypot(x, y)
+    r = sqrt(x*x + y*y)
     u = cmplx(x/r, -y/r, wp)            ! conjugate direction, exp(-i theta)
     q = 1.0_wp/r
     q = q*q

@@ -18,7 +18,7 @@ module hc_inverse_symbol
   use hc_spectrum, only: kernel_key_t, new_kernel_key, inverse_of_pressure, inverse_of_shear
   use hc_spectrum_cache, only: kernel_cache_t
   use hc_preconditioner_extension, only: edge_extension_t
-  use hc_lattice_symbol, only: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
+  use hc_lattice_symbol, only: lattice_symbols, symbol_1, symbol_xx, symbol_xy
   implicit none
   private
 
@@ -89,8 +89,8 @@ contains
     type(kernel_key_t) :: key
     integer, allocatable :: f(:, :)
     integer :: length(2), b, i, n_component
-    real(wp) :: scale, k(3), matrix(3), layer, basis(2, 2), gamma
-    real(wp), allocatable :: symbol(:)
+    real(wp) :: scale, matrix(3), layer, basis(2, 2), gamma
+    real(wp), allocatable :: symbol(:, :)
     logical :: found
 
     if (present(tangential)) self%tangential = tangential
@@ -110,26 +110,26 @@ contains
     gamma = pair%gamma()
     layer = pair%tangential_layer/self%unit
     scale = 1.0_wp/product(real(length, wp))
-    !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, k, matrix, symbol)
+    !$omp parallel do num_threads(self%convolution%space%threads) private(f, i, matrix, symbol)
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
+      ! beyond length/2 there is mere filling
+      where (f(1, :) > length(1)/2) f(1, :) = 1
+      allocate (symbol(size(f, 2), merge(3, 1, self%tangential)))
+      call lattice_symbols(basis, length, f, symbol)
       if (.not. self%tangential) then
-        allocate (symbol(size(f, 2)))
-        ! beyond length/2 there is mere filling
-        f(1, :) = min(f(1, :), length(1)/2)
-        call normal_symbols(basis, length, f, symbol)
-        self%convolution%spectrum(:, b, 1) = real(scale/symbol, sp)
-        deallocate (symbol)
+        self%convolution%spectrum(:, b, 1) = real(scale/symbol(:, 1), sp)
       else
         do i = 1, size(f, 2)
-          if (f(1, i) > length(1)/2) cycle
-          k = kernel_symbols(basis, length, f(:, i))
-          ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
-          matrix = [k(symbol_1) + gamma*k(symbol_xx), gamma*k(symbol_xy), k(symbol_1) + gamma*(k(symbol_1) - k(symbol_xx))]
+          associate (k_1 => symbol(i, symbol_1), k_xx => symbol(i, symbol_xx), k_xy => symbol(i, symbol_xy))
+            ! xx, xy and yy of the flexibility; K_yy = K1 - K_xx
+            matrix = [k_1 + gamma*k_xx, gamma*k_xy, k_1 + gamma*(k_1 - k_xx)]
+          end associate
           matrix([1, 3]) = matrix([1, 3]) + layer
           self%convolution%spectrum(i, b, :) = real(scale*inverse(matrix), sp)
         end do
       end if
+      deallocate (symbol)
     end do
     !$omp end parallel do
     call self%convolution%store_spectra(cache, key)

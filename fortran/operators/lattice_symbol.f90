@@ -16,7 +16,7 @@ module hc_lattice_symbol
   implicit none
   private
 
-  public :: kernel_symbols, normal_symbols, symbol_1, symbol_xx, symbol_xy
+  public :: kernel_symbols, lattice_symbols, symbol_1, symbol_xx, symbol_xy
 
   !> Order of the symbols: those of K1, K_xx and K_xy.
   integer, parameter :: symbol_1 = 1, symbol_xx = 2, symbol_xy = 3
@@ -54,71 +54,78 @@ contains
     end if
   end function kernel_symbols
 
-  !> Compute the symbols of K1 at many frequencies of a periodic grid [m].
+  !> Compute the symbols of K1, or of all three kernels, at many frequencies of a periodic grid [m].
   !>
-  !> The signs of the sines cancel in the product of all three, so that the sum over aliases is one
-  !> over polynomials and a root; where a phase vanishes the limits are those of `kernel_symbols`.
-  pure subroutine normal_symbols(basis, length, frequency, symbol)
+  !> The signs of the sines cancel in the product of all three: the sum over aliases is one over sines, polynomials and a
+  !> root. Where a phase vanishes, one takes the place of the sine and of the phase in the term without a shift.
+  pure subroutine lattice_symbols(basis, length, frequency, symbol)
     !> Basis vectors as columns [m]
     real(wp), intent(in) :: basis(2, 2)
     !> Number of columns and rows of the grid
     integer, intent(in) :: length(2)
     !> Frequency indices (2, n), from 0 to length - 1
     integer, intent(in) :: frequency(:, :)
-    !> Symbol (n) [m]
-    real(wp), intent(out) :: symbol(:)
+    !> Symbols in the order of `kernel_symbols`, the first or all (n, 1 or 3) [m]
+    real(wp), intent(out), contiguous :: symbol(:, :)
 
-    real(wp), dimension(size(symbol)) :: theta_1, theta_2
+    ! half the phases along the three directions of edges, their sines, and 1 where they vanish
+    real(wp), dimension(size(symbol, 1), 3) :: half, sine, none
+    ! terms of an alias, and squares of k
+    real(wp), dimension(size(symbol, 1)) :: term, square
     real(wp) :: sine_1(0:length(1) - 1), cosine_1(0:length(1) - 1), sine_2(0:length(2) - 1), cosine_2(0:length(2) - 1)
-    real(wp) :: area, g(3), p(2), all_symbols(3), shift(2)
+    real(wp) :: area, g(3), h(3), d(3), shift(3), here(3), all_symbols(3)
     integer :: m, i, j, f(2), low(2)
 
     area = basis(1, 1)*basis(2, 2) - basis(2, 1)*basis(1, 2)
-    ! |k|^2 = (g1 phase1^2 + g2 phase1 phase2 + g3 phase2^2)/area^2
+    ! (|k| area/2)^2 = g1 half1^2 + g2 half1 half2 + g3 half2^2
     g = [dot_product(basis(:, 2), basis(:, 2)), -2.0_wp*dot_product(basis(:, 1), basis(:, 2)), &
          dot_product(basis(:, 1), basis(:, 1))]
     call half_angles(length(1), sine_1, cosine_1)
     call half_angles(length(2), sine_2, cosine_2)
-    do m = 1, size(symbol)
+    do m = 1, size(symbol, 1)
       f = frequency(:, m)
       low = f - merge(length, 0, 2*f > length)
-      theta_1(m) = 2.0_wp*pi*low(1)/length(1)
-      theta_2(m) = 2.0_wp*pi*low(2)/length(2)
-      if (.not. is_special(length, low)) cycle
-      theta_1(m) = 1.0_wp
-      theta_2(m) = 2.0_wp
+      half(m, 1:2) = pi*low/length
+      sine(m, :) = [sine_1(f(1)), sine_2(f(2)), sine_2(f(2))*cosine_1(f(1)) - cosine_2(f(2))*sine_1(f(1))]
+      none(m, :) = merge(1.0_wp, 0.0_wp, [low(1) == 0, low(2) == 0, low(1)*length(2) == low(2)*length(1)])
+      if (any(low /= 0)) cycle
+      half(m, 1:2) = 1.0_wp  ! any number: see below
+      none(m, :) = 0.0_wp
     end do
+    where (none > 0.0_wp) sine = 0.0_wp
     symbol = 0.0_wp
     do j = -n_alias, n_alias
       do i = -n_alias, n_alias
-        shift = 2.0_wp*pi*[i, j]
-        do m = 1, size(symbol)
-          p = [theta_1(m) + shift(1), theta_2(m) + shift(2)]
-          symbol(m) = symbol(m) + 1.0_wp/(p(1)*p(2)*(p(2) - p(1))*sqrt(p(1)*(g(1)*p(1) + g(2)*p(2)) + g(3)*p(2)*p(2)))
+        shift = pi*[i, j, j - i]
+        here = merge(1.0_wp, 0.0_wp, [i, j, j - i] == 0)
+        do m = 1, size(symbol, 1)
+          h = [half(m, 1) + shift(1), half(m, 2) + shift(2), half(m, 2) - half(m, 1) + shift(3)]
+          d = h + none(m, :)*(1.0_wp - h)
+          square(m) = h(1)*(g(1)*h(1) + g(2)*h(2)) + g(3)*h(2)*h(2)
+          term(m) = (sine(m, 1) + none(m, 1)*here(1))*(sine(m, 2) + none(m, 2)*here(2)) &
+                    *(sine(m, 3) + none(m, 3)*here(3))/(d(1)*d(2)*d(3)*sqrt(square(m)))
+          symbol(m, symbol_1) = symbol(m, symbol_1) + term(m)
+        end do
+        if (size(symbol, 2) == 1) cycle
+        do m = 1, size(symbol, 1)
+          associate (h1 => half(m, 1) + shift(1), h2 => half(m, 2) + shift(2))
+            d(1) = h1*basis(2, 2) - h2*basis(2, 1)
+            d(2) = h2*basis(1, 1) - h1*basis(1, 2)
+          end associate
+          symbol(m, symbol_xx) = symbol(m, symbol_xx) + term(m)/square(m)*d(2)*d(2)
+          symbol(m, symbol_xy) = symbol(m, symbol_xy) - term(m)/square(m)*d(1)*d(2)
         end do
       end do
     end do
-    do m = 1, size(symbol)
+    symbol = pi*area*symbol
+    ! the mean, and frequencies that are their own opposite
+    do m = 1, size(symbol, 1)
       f = frequency(:, m)
-      if (is_special(length, f - merge(length, 0, 2*f > length))) then
-        all_symbols = kernel_symbols(basis, length, f)
-        symbol(m) = all_symbols(symbol_1)
-      else
-        associate (s1 => sine_1(f(1)), c1 => cosine_1(f(1)), s2 => sine_2(f(2)), c2 => cosine_2(f(2)))
-          symbol(m) = symbol(m)*16.0_wp*pi*area*s1*s2*(s2*c1 - c2*s1)
-        end associate
-      end if
+      if (any(f /= 0) .and. all(2*f /= length)) cycle
+      all_symbols = kernel_symbols(basis, length, f)
+      symbol(m, :) = all_symbols(:size(symbol, 2))
     end do
-  end subroutine normal_symbols
-
-  !> Return whether a phase vanishes, or the frequency is its own opposite.
-  pure logical function is_special(length, low)
-    !> Grid, and frequency of the smallest modulus
-    integer, intent(in) :: length(2), low(2)
-
-    is_special = low(1) == 0 .or. low(2) == 0 .or. 2*low(1) == length(1) .or. 2*low(2) == length(2) &
-                 .or. low(1)*length(2) == low(2)*length(1)
-  end function is_special
+  end subroutine lattice_symbols
 
   !> Compute the sines and cosines of half the phases of all frequencies, taken from (-pi, pi].
   pure subroutine half_angles(n, sine, cosine)

@@ -157,21 +157,31 @@ contains
     integer, intent(in) :: shift
     !> First and last node of each run
     integer, intent(inout), contiguous :: first(:), last(:)
-    integer :: i, k
+    !> Nodes that are passed over at once where they are like those before
+    integer, parameter :: stride = 16
+    integer :: from, to, i, k, n_active
     logical :: before
 
     k = 0
     before = .false.
-    do i = 1, size(active)
-      if (active(i) .neqv. before) then
-        if (active(i)) then
-          k = k + 1
-          first(k) = shift + i
-        else
-          last(k) = shift + i - 1
+    do from = 1, size(active), stride
+      to = min(from + stride - 1, size(active))
+      n_active = 0
+      do i = from, to
+        n_active = n_active + merge(1, 0, active(i))
+      end do
+      if (n_active == merge(to - from + 1, 0, before)) cycle
+      do i = from, to
+        if (active(i) .neqv. before) then
+          if (active(i)) then
+            k = k + 1
+            first(k) = shift + i
+          else
+            last(k) = shift + i - 1
+          end if
         end if
-      end if
-      before = active(i)
+        before = active(i)
+      end do
     end do
     if (before) last(k) = shift + size(active)
   end subroutine list_runs

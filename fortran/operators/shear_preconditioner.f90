@@ -16,6 +16,7 @@
 !>
 !> Equations: docs/theory/preconditioner.md, (P2) to (P6).
 module hc_shear_preconditioner
+  use, intrinsic :: iso_fortran_env, only: int8
   use hc_precision, only: wp, sp
   use hc_error, only: error_t
   use hc_options, only: preconditioner_options_t
@@ -146,20 +147,25 @@ contains
     integer, intent(in) :: extent(2)
     !> Nodes in contact, and those of them that slip
     logical, intent(in), contiguous :: active(:), slips(:)
-    logical, allocatable :: along(:, :), near(:)
+    !> 1 at nodes near slip along their rows; of one row at those that slip, and at those near slip
+    integer(int8), allocatable :: along(:, :)
+    integer(int8) :: slip(extent(1)), beside(extent(1))
+    logical, allocatable :: near(:)
     integer :: row, other, first, last, k
 
     allocate (along(extent(1), extent(2)), near(size(active)))
     associate (reach => self%options%smoothing_reach, n => extent(1))
-      !$omp parallel num_threads(self%space%threads) private(other, first, last, k)
+      !$omp parallel num_threads(self%space%threads) private(other, first, last, k, slip, beside)
       !$omp do schedule(static)
       do row = 1, extent(2)
-        first = (row - 1)*n
-        along(:, row) = slips(first + 1:first + n)
-        if (.not. any(along(:, row))) cycle
+        first = (row - 1)*n + 1
+        last = row*n
+        slip = merge(1_int8, 0_int8, slips(first:last))
+        along(:, row) = slip
+        if (all(slip == 0_int8)) cycle
         do k = 1, min(reach, n - 1)
-          along(:n - k, row) = along(:n - k, row) .or. slips(first + k + 1:first + n)
-          along(k + 1:, row) = along(k + 1:, row) .or. slips(first + 1:first + n - k)
+          along(:n - k, row) = ior(along(:n - k, row), slip(k + 1:))
+          along(k + 1:, row) = ior(along(k + 1:, row), slip(:n - k))
         end do
       end do
       !$omp end do
@@ -167,11 +173,11 @@ contains
       do row = 1, extent(2)
         first = (row - 1)*n + 1
         last = row*n
-        near(first:last) = along(:, row)
+        beside = 0_int8
         do other = max(row - reach, 1), min(row + reach, extent(2))
-          near(first:last) = near(first:last) .or. along(:, other)
+          beside = ior(beside, along(:, other))
         end do
-        near(first:last) = near(first:last) .and. active(first:last)
+        near(first:last) = beside /= 0_int8 .and. active(first:last)
       end do
       !$omp end do
       !$omp end parallel

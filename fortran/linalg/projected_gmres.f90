@@ -75,6 +75,8 @@ contains
     real(wp) :: g(max_directions + 1), c(max_directions), s(max_directions), left(max_directions + 1)
     real(wp) :: y(max_directions), share(size(multiplier), max_directions), length, began
     real(wp) :: inverse(size(multiplier), size(multiplier))
+    !> Norms of the columns, with the weights of the residual
+    real(wp) :: along(size(multiplier))
     integer :: i, part, directions
     type(field_space_t) :: space
 
@@ -94,6 +96,11 @@ contains
     do i = 1, size(weight)
       of_part = nodes%slice((i - 1)*part + 1, i*part)
       last(i) = last(i - 1) + of_part%n_active
+    end do
+    do i = 1, size(along)
+      packed = columns(:, i)
+      call weigh(weight, packed)
+      along(i) = sqrt(space%dot(packed, packed))
     end do
     call nodes%pack(rhs, basis(1)%v)
     deallocate (rhs)
@@ -188,9 +195,9 @@ contains
         y(i) = (g(i) - dot_product(h(i, i + 1:directions), y(i + 1:directions)))/h(i, i)
       end do
       if (present(drift)) then
-        ! where nodes slip far, the terms of A x are large and cancel
+        ! where nodes slip far, or motions are all but free, the terms of A x are large and cancel
         do i = 1, directions
-          drift = drift + epsilon(1.0_wp)*abs(y(i))*norm2(arnoldi(:i + 1, i))
+          drift = drift + epsilon(1.0_wp)*abs(y(i))*(norm2(arnoldi(:i + 1, i)) + dot_product(abs(share(:, i)), along))
         end do
       end if
       ! solution and product from the same directions: the preconditioner is of single precision, and where a node

@@ -89,7 +89,7 @@ contains
       sine(m, :) = [sine_1(f(1)), sine_2(f(2)), sine_2(f(2))*cosine_1(f(1)) - cosine_2(f(2))*sine_1(f(1))]
       none(m, :) = merge(1.0_wp, 0.0_wp, [low(1) == 0, low(2) == 0, low(1)*length(2) == low(2)*length(1)])
       if (any(low /= 0)) cycle
-      half(m, 1:2) = 1.0_wp  ! any number: see below
+      half(m, 1:2) = [1.0_wp, 2.0_wp]  ! any different numbers: see below
       none(m, :) = 0.0_wp
     end do
     where (none > 0.0_wp) sine = 0.0_wp

@@ -125,7 +125,7 @@ def add_process(table: Table, program: Program, side: int, turns: int) -> None:
         Path(folder, f"{side}.toml").write_text(deck)
         times = [
             (
-                program.run(deck_of("HC", side, problems.TOLERANCE, 1, output=True)),
+                program.run(deck_of("HC", side, problems.TOLERANCE, 1, output=True))[0],
                 driver.process(words, folder)[0],
             )
             for _ in range(turns)
@@ -140,7 +140,7 @@ def add_process(table: Table, program: Program, side: int, turns: int) -> None:
 
 @dataclass
 class Program:
-    """The executable of CONTACT with the libraries that it needs."""
+    """The executable of CONTACT, and the share of the contact that stuck after the last history."""
 
     path: Path
     stick_share: float = math.nan
@@ -150,45 +150,36 @@ class Program:
         """Return the program, which is built the first time; raise `peers.Missing` with the reason."""
         python = Path(peers.interpreter(LIBRARIES, folder))
         home = python.parents[1]
-        source, libraries = home / "source", home / "lib"
-        built = source / "bin" / "contact_linux64"
-        if built.exists():
-            return cls(built)
-        print(f"  building CONTACT in {home}", flush=True)
-        peers.call(["rm", "-rf", str(source)])
-        peers.call(["git", "clone", "--quiet", "--no-checkout", SOURCE, str(source)])
-        peers.call(["git", "-C", str(source), "checkout", "--quiet", COMMIT, "--", "src"])
-        for name, pattern, replacement in PORTED:
-            path = source / "src" / name
-            text, changes = re.subn(pattern, replacement, path.read_text(encoding="latin-1"))
-            if not changes:
-                raise peers.Missing(f"{name} has no {pattern}")
-            path.write_text(text, encoding="latin-1")
-        objects = source / "src" / "obj" / "linux64_exe"
-        objects.mkdir(parents=True, exist_ok=True)
-        built.parent.mkdir(exist_ok=True)
-        options = (
-            "-cpp -O3 -fopenmp -w -ffree-line-length-none -fbackslash -fno-aggressive-loop-optimizations "
-            f"-DTARGET_exe -DWITH_MKLFFT -I. -J{objects}"
+        program = cls(home / "source" / "bin" / "contact_linux64")
+        if not program.path.exists():
+            print(f"  building CONTACT in {home}", flush=True)
+            fetch(home / "source")
+            compile_source(home / "source", home / "lib")
+            program.check(home / "source" / "examples")
+        return program
+
+    def check(self, examples: Path) -> None:
+        """Compare the zones of its example of Cattaneo's problem with those that come with it."""
+        deck, expected = (
+            (examples / name).read_text(encoding="latin-1") for name in ("cattaneo.inp", "cattaneo.ref_out")
         )
-        peers.call(
-            [
-                *("make", "-C", str(source / "src"), "PROD=exe_l64", "F90=gfortran", f"FFOPTS={options}"),
-                f"MKLLIB={libraries}/libmkl_rt.so.2 -Wl,-rpath,{libraries}",
-            ]
-        )
-        return cls(built)
+        found = self.run(deck)[1]
+        if found != zones(expected):
+            self.path.unlink()
+            raise peers.Missing(f"its example of Cattaneo's problem gives zones of {found} elements")
 
     def history(self, name: str, side: int, tolerance: float, repeats: int | None = None) -> float:
         """Return the seconds that a load history takes, without the start of the process."""
-        once = self.run(deck_of(name, side, tolerance, 1))
+        once, found = self.run(deck_of(name, side, tolerance, 1))
+        _, contact, stick, _ = found[-1]
+        self.stick_share = stick / contact
         if once > LONG_ENOUGH:
             return once
         repeats = repeats or min(20, math.ceil(1.0 / once))
-        return (self.run(deck_of(name, side, tolerance, 1 + repeats)) - once) / repeats
+        return (self.run(deck_of(name, side, tolerance, 1 + repeats))[0] - once) / repeats
 
-    def run(self, deck: str) -> float:
-        """Return the seconds of a process."""
+    def run(self, deck: str) -> tuple[float, list[tuple[int, ...]]]:
+        """Return the seconds of a process, and the zones of the cases that print results."""
         environment = worker.environment(1)
         environment |= {"MKL_INTERFACE_LAYER": "GNU", "MKL_THREADING_LAYER": "SEQUENTIAL"}
         with tempfile.TemporaryDirectory() as folder:
@@ -206,11 +197,45 @@ class Program:
             output = Path(folder, "deck.out").read_text(encoding="latin-1")
         if "ended succesfully" not in done.stdout or "ERROR" in output:
             raise RuntimeError(f"CONTACT: {done.stdout.strip().splitlines()[-1]}")
-        # NPOT, NCON, NADH, NSLIP below their names
-        counts = re.search(r"NPOT +NCON +NADH.*\n +\d+ +(\d+) +(\d+)", output)
-        if counts:
-            self.stick_share = int(counts[2]) / int(counts[1])
-        return spent
+        return spent, zones(output)
+
+
+def fetch(source: Path) -> None:
+    """Take the source from its repository, and port it to gfortran."""
+    peers.call(["rm", "-rf", str(source)])
+    peers.call(["git", "clone", "--quiet", "--no-checkout", SOURCE, str(source)])
+    files = ("src", "examples/cattaneo.inp", "examples/cattaneo.ref_out")
+    peers.call(["git", "-C", str(source), "checkout", "--quiet", COMMIT, "--", *files])
+    for name, pattern, replacement in PORTED:
+        path = source / "src" / name
+        text, changes = re.subn(pattern, replacement, path.read_text(encoding="latin-1"))
+        if not changes:
+            raise peers.Missing(f"{name} has no {pattern}")
+        path.write_text(text, encoding="latin-1")
+
+
+def compile_source(source: Path, libraries: Path) -> None:
+    """Build the program with the options of its makefile, as far as gfortran has them."""
+    objects = source / "src" / "obj" / "linux64_exe"
+    objects.mkdir(parents=True, exist_ok=True)
+    (source / "bin").mkdir(exist_ok=True)
+    # the last option: arrays are declared with one element in its copy of BLAS
+    options = (
+        f"-cpp -O3 -fopenmp -DTARGET_exe -DWITH_MKLFFT -I. -J{objects} -w "
+        "-ffree-line-length-none -fbackslash -fno-aggressive-loop-optimizations"
+    )
+    peers.call(
+        [
+            *("make", "-C", str(source / "src"), "PROD=exe_l64", "F90=gfortran", f"FFOPTS={options}"),
+            f"MKLLIB={libraries}/libmkl_rt.so.2 -Wl,-rpath,{libraries}",
+        ]
+    )
+
+
+def zones(output: str) -> list[tuple[int, ...]]:
+    """Return the numbers of elements: all, in contact, in stick, in slip, of each case."""
+    rows = re.findall(r"NPOT +NCON +NADH +NSLIP.*\n +(\d+) +(\d+) +(\d+) +(\d+)", output)
+    return [tuple(int(word) for word in row) for row in rows]
 
 
 def materials(material: problems.Material) -> tuple[float, tuple[float, float]]:

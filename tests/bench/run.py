@@ -51,8 +51,8 @@ from bench import (
 )
 
 ROOT = Path(__file__).parents[2]
-UNTIMED = ("stick_edge", "wear_limit", "laws", "layers", "lapack_iterations")
-"""Counts and errors of problems that no goal is about: by name or with --long only."""
+BY_NAME = ("stick_edge", "wear_limit", "laws", "layers", "contact", "lapack_iterations")
+"""By name or with --long only: counts and errors that no goal is about, and the longest comparison."""
 
 Section = Callable[[], list[report.Table]]
 
@@ -112,7 +112,7 @@ def main() -> int:
     print(header.text(), "\n")
     if not (hurried or options.only):
         report.write("machine", [header], "")
-    for section in options.only or [name for name in measures if options.long or name not in UNTIMED]:
+    for section in options.only or [name for name in measures if options.long or name not in BY_NAME]:
         start, before = time.perf_counter(), processor_time()
         print(f"{section} ...", flush=True)
         tables = measures[section]()
@@ -150,7 +150,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--long",
         action="store_true",
-        help="everything: also counts and errors of other pages, the finest meshes, larger windows",
+        help="everything: also CONTACT, counts and errors of other pages, the finest meshes, larger windows",
     )
     parser.add_argument(
         "--write-bounds", action="store_true", help="measure the bounds of the test of the counts"

@@ -195,7 +195,7 @@ class Program:
             )
             spent = time.perf_counter() - start
             output = Path(folder, "deck.out").read_text(encoding="latin-1")
-        if "ended succesfully" not in done.stdout or "ERROR" in output:
+        if "The CONTACT program ended" not in done.stdout or "ERROR" in output:
             raise RuntimeError(f"CONTACT: {done.stdout.strip().splitlines()[-1]}")
         return spent, zones(output)
 

@@ -114,7 +114,7 @@ contains
     do b = 1, self%convolution%n_block
       f = self%convolution%frequencies(b)
       ! beyond length/2 there is mere filling
-      where (f(1, :) > length(1)/2) f(1, :) = 1
+      where (f(1, :) > length(1)/2) f(1, :) = min(1, length(1) - 1)
       allocate (symbol(size(f, 2), merge(3, 1, self%tangential)))
       call lattice_symbols(basis, length, f, symbol)
       if (.not. self%tangential) then

@@ -1,8 +1,8 @@
 """Work of a load history under laws of the interface over that under one coefficient and no layer.
 
 A sphere on a rigid plane, E = R = 1, 20 spacings in the contact radius, is pressed in three load steps and
-sheared to half of mu P in four. Layers are as soft as their compression s under Hertz's largest pressure,
-over Hertz's approach, says.
+sheared to half of mu P in four. The softness s of a layer is its compression under
+Hertz's largest pressure over Hertz's approach.
 """
 
 from __future__ import annotations

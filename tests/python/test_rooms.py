@@ -1,11 +1,9 @@
 """Rooms of the sources and the arrows between them: rooms.toml says which way they may point."""
 
 import runpy
-from collections import Counter
 from pathlib import Path
 
-import pytest
-from arrows import FORTRAN, PYTHON, ROOT, RULES, circle, forbidden, fortran_arrows, imports_of, python_arrows
+from arrows import ROOT, RULES, circle, forbidden, fortran_arrows, imports_of, python_arrows
 
 
 def test_arrows_that_point_up_and_circles_are_found() -> None:
@@ -55,13 +53,3 @@ def test_picture_of_the_rooms_shows_the_arrows_of_the_sources() -> None:
     assert found == arrows, again
     assert rooms == {room for arrow in arrows for room in arrow}, again
     assert rooms <= set(picture["HOLDS"])
-
-
-@pytest.mark.parametrize("top", [FORTRAN, PYTHON], ids=["fortran", "python"])
-def test_folders_and_files_stay_small(top: Path) -> None:
-    exceptions = RULES["exceptions"]
-    files = [path for path in top.rglob("*.*") if path.suffix in (".f90", ".py") and path.stem != "__init__"]
-    counts = Counter(path.parent.relative_to(ROOT).as_posix() for path in files)
-    assert sorted(name for name, count in counts.items() if count > 15) == exceptions["folders"][top.name]
-    long = {path.name for path in files if len(path.read_text().splitlines()) > 450}
-    assert sorted(long) == exceptions["files"][top.name]

@@ -1,4 +1,7 @@
-"""CONTACT (Vollebregt, Kalker), built from its source, on the same load histories side by side."""
+"""CONTACT (Vollebregt, Kalker) on the same load histories side by side.
+
+The environment variable CONTACT_PROGRAM names its executable; without it this comparison is left out.
+"""
 
 from __future__ import annotations
 
@@ -12,28 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import driver, memory, peers, problems, speed, worker
+from . import driver, memory, problems, speed, worker
 from .report import Table, seconds
-
-SOURCE = os.environ.get("CONTACT_SOURCE", "https://github.com/eve70a/CONTACT.git")
-COMMIT = "d431cdb"
-LIBRARIES = peers.Peer("CONTACT", "", (("--no-deps", "mkl==2023.2.0", "intel-openmp==2023.2.0"),))
-"""MKL of 2026 fails: its transforms of the layout that CONTACT asks for are wrong."""
-
-PORTED = (
-    ("m_timings.f90", r"omp_in_parallel\(\)\.(ne|gt)\.0", "omp_in_parallel()"),
-    ("m_licensing.f90", r"(?m)^function LicenseGetDebug$", "function LicenseGetDebug()"),
-    ("m_licensing.f90", r"(?ms)^function DirIsWritable.*^end subroutine ScanFolder", ""),
-    ("m_licensing.f90", r"(?m)^ *public +(DirIsWritable|ScanFolder).*$", ""),
-    ("m_bspline_make.f90", r"any\(mask\((.*?)\)\.ne\.mask", r"any(mask(\1).neqv.mask"),
-    ("m_gridfunc.f90", r"(?m)^ *use m_globals *$", "use m_globals, text_length => strlen"),
-    ("m_readline.f90", r"fmt='\(i\)'", "fmt='(i16)'"),
-    ("m_temperature.f90", r"=> igs%", "=> outpt%igs%"),
-    ("m_varprof.f90", r"if \(is_wheel\) ", "if (is_wheel.ne.0) "),
-    ("m_wr_output.f90", r"if \(is_right\) ", "if (is_right.ne.0) "),
-    ("makefile", r"-assume bscc \$< -o \$\*\.o", "$< -o $(P)m_readline.o"),
-)
-"""What gfortran takes in other words than Intel's compiler: file, pattern, replacement."""
 
 LENGTH, RADIUS, SHEAR_MODULUS = 1.0, 50.0, 200.0
 """Contact radius and relative radius of curvature in mm, MPa: the size of CONTACT's own examples."""
@@ -45,7 +28,7 @@ LONG_ENOUGH = 3.0
 TOLERANCES = (problems.TOLERANCE, problems.LOOSE)
 
 
-def measure(folder: Path, *, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
+def measure(program: Program, *, quick: bool, sizes: Sequence[int] | None = None) -> list[Table]:
     """Return the times of load histories, small contacts and processes of both codes, in turns."""
     histories = Table(
         "CONTACT over ours: load histories, half of the window in contact, one thread, set-up included",
@@ -58,18 +41,13 @@ def measure(folder: Path, *, quick: bool, sizes: Sequence[int] | None = None) ->
             "single one, without output; ours: the best set-up and the best solution in a process. The "
             "tolerance of CONTACT bounds the change of the tractions in an iteration, ours all residuals. "
             "Stick: its share of the contact after the last step.",
-            f"CONTACT: source {COMMIT}, gfortran with -O3, transforms of MKL 2023.2.",
+            f"CONTACT: {program.version}.",
         ],
     )
     others = Table(
         "CONTACT over ours: one load step at once from nothing, and whole processes",
         ["what", "CONTACT [s]", "ours [s]", "times faster", "goal"],
     )
-    try:
-        program = Program.build(folder)
-    except peers.Missing as reason:
-        histories.remarks.append(f"Not measured: CONTACT is not there: {reason}")
-        return [histories]
     for name, windows in WINDOWS.items():
         for side in [n for n in sizes or windows if n in windows][: 1 if quick else None]:
             add_history(histories, program, name, side, turns=1 if quick else 3)
@@ -140,33 +118,28 @@ def add_process(table: Table, program: Program, side: int, turns: int) -> None:
 
 @dataclass
 class Program:
-    """The executable of CONTACT, and the share of the contact that stuck after the last history."""
+    """The executable of CONTACT, its version, and the share of stick after the last history."""
 
     path: Path
+    version: str = "unknown version"
     stick_share: float = math.nan
 
     @classmethod
-    def build(cls, folder: Path) -> Program:
-        """Return the program, which is built the first time; raise `peers.Missing` with the reason."""
-        python = Path(peers.interpreter(LIBRARIES, folder))
-        home = python.parents[1]
-        program = cls(home / "source" / "bin" / "contact_linux64")
-        if not program.path.exists():
-            print(f"  building CONTACT in {home}", flush=True)
-            fetch(home / "source")
-            compile_source(home / "source", home / "lib")
-            program.check(home / "source" / "examples")
-        return program
-
-    def check(self, examples: Path) -> None:
-        """Compare the zones of its example of Cattaneo's problem with those that come with it."""
-        deck, expected = (
-            (examples / name).read_text(encoding="latin-1") for name in ("cattaneo.inp", "cattaneo.ref_out")
-        )
-        found = self.run(deck)[1]
-        if found != zones(expected):
-            self.path.unlink()
-            raise peers.Missing(f"its example of Cattaneo's problem gives zones of {found} elements")
+    def given(cls) -> Program | None:
+        """Return the program of CONTACT_PROGRAM after a trial run; None without the variable."""
+        word = os.environ.get("CONTACT_PROGRAM")
+        if not word:
+            return None
+        program = cls(Path(word).absolute())
+        try:
+            program.run(deck_of("HC", 16, problems.LOOSE, 1))
+        except OSError as error:
+            reason = error.strerror
+        except RuntimeError as error:
+            reason = str(error)
+        else:
+            return program
+        raise ValueError(f"CONTACT_PROGRAM: {word}: {reason}; expected the executable of CONTACT")
 
     def history(self, name: str, side: int, tolerance: float, repeats: int | None = None) -> float:
         """Return the seconds that a load history takes, without the start of the process."""
@@ -183,56 +156,25 @@ class Program:
 
     def run(self, deck: str) -> tuple[float, list[tuple[int, ...]]]:
         """Return the seconds of a process, and the zones of the cases that print results."""
-        environment = worker.environment(1)
-        environment |= {"MKL_INTERFACE_LAYER": "GNU", "MKL_THREADING_LAYER": "SEQUENTIAL"}
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "deck.inp").write_text(deck)
             start = time.perf_counter()
             done = subprocess.run(
                 [str(self.path), "2", "deck"],
                 cwd=folder,
-                env=environment,
+                env=worker.environment(1),
                 capture_output=True,
                 text=True,
                 check=False,
             )
             spent = time.perf_counter() - start
-            output = Path(folder, "deck.out").read_text(encoding="latin-1")
-        if "The CONTACT program ended" not in done.stdout or "ERROR" in output:
-            raise RuntimeError(f"CONTACT: {done.stdout.strip().splitlines()[-1]}")
-        return spent, zones(output)
-
-
-def fetch(source: Path) -> None:
-    """Take the source from its repository, and port it to gfortran."""
-    peers.call(["rm", "-rf", str(source)])
-    peers.call(["git", "clone", "--quiet", "--no-checkout", SOURCE, str(source)])
-    files = ("src", "examples/cattaneo.inp", "examples/cattaneo.ref_out")
-    peers.call(["git", "-C", str(source), "checkout", "--quiet", COMMIT, "--", *files])
-    for name, pattern, replacement in PORTED:
-        path = source / "src" / name
-        text, changes = re.subn(pattern, replacement, path.read_text(encoding="latin-1"))
-        if not changes:
-            raise peers.Missing(f"{name} has no {pattern}")
-        path.write_text(text, encoding="latin-1")
-
-
-def compile_source(source: Path, libraries: Path) -> None:
-    """Build the program with the options of its makefile, as far as gfortran has them."""
-    objects = source / "src" / "obj" / "linux64_exe"
-    objects.mkdir(parents=True, exist_ok=True)
-    (source / "bin").mkdir(exist_ok=True)
-    # the last option: arrays are declared with one element in its copy of BLAS
-    options = (
-        f"-cpp -O3 -fopenmp -DTARGET_exe -DWITH_MKLFFT -I. -J{objects} -w "
-        "-ffree-line-length-none -fbackslash -fno-aggressive-loop-optimizations"
-    )
-    peers.call(
-        [
-            *("make", "-C", str(source / "src"), "PROD=exe_l64", "F90=gfortran", f"FFOPTS={options}"),
-            f"MKLLIB={libraries}/libmkl_rt.so.2 -Wl,-rpath,{libraries}",
-        ]
-    )
+            file = Path(folder, "deck.out")
+            output = file.read_text(encoding="latin-1") if file.exists() else ""
+        found = zones(output)
+        if "The CONTACT program ended" not in done.stdout or "ERROR" in output or not found:
+            raise RuntimeError((done.stdout.strip().splitlines() or ["no output"])[-1])
+        self.version = (re.findall(r"\|  Version: (.*?) +\|", output) or [self.version])[0]
+        return spent, found
 
 
 def zones(output: str) -> list[tuple[int, ...]]:

@@ -8,6 +8,8 @@
     python tests/bench/run.py --only wear,below --cpu-time          processor time, on a busy machine
     python tests/bench/run.py --write-bounds       bounds of tests/python/test_operator_counts.py
 
+Load histories are compared with CONTACT if CONTACT_PROGRAM names its executable (some minutes more).
+
 Each section replaces what stands between the comments <!-- begin SECTION --> and <!-- end SECTION -->, most
 of them of docs/performance.md: its tables, and below them when and with what they were measured. All else
 stays.
@@ -51,8 +53,8 @@ from bench import (
 )
 
 ROOT = Path(__file__).parents[2]
-BY_NAME = ("stick_edge", "wear_limit", "laws", "layers", "contact", "lapack_iterations")
-"""By name or with --long only: counts and errors that no goal is about, and the longest comparison."""
+BY_NAME = ("stick_edge", "wear_limit", "laws", "layers", "lapack_iterations")
+"""By name or with --long only: counts and errors that no goal is about."""
 
 Section = Callable[[], list[report.Table]]
 
@@ -80,7 +82,7 @@ def sections(options: argparse.Namespace) -> dict[str, Section]:
         "laws": partial(laws.measure, **quick),
         "layers": partial(layers.measure, **quick, **long),
         "peers": partial(peers.measure, options.peers, **quick, **sizes, names=options.codes),
-        "contact": partial(contact.measure, options.peers, **quick, **sizes),
+        "contact": partial(contact.measure, options.contact, **quick, **sizes),
         "lapack_methods": partial(lapack.methods_table, **quick, **long),
         "lapack_steps": partial(lapack.steps_table, **quick),
         "lapack_threads": partial(lapack.threads_table, **quick),
@@ -95,6 +97,11 @@ def main() -> int:
     if options.write_bounds:
         counts.write_bounds()
         return 0
+    try:
+        options.contact = contact.Program.given()
+    except ValueError as reason:
+        print(reason, file=sys.stderr)
+        return 2
     measures = sections(options)
     unknown = set(options.only or ()) - set(measures)
     if unknown:
@@ -113,6 +120,9 @@ def main() -> int:
     if not (hurried or options.only):
         report.write("machine", [header], "")
     for section in options.only or [name for name in measures if options.long or name not in BY_NAME]:
+        if section == "contact" and options.contact is None:
+            print("contact: left out; set CONTACT_PROGRAM to the executable of CONTACT\n")
+            continue
         start, before = time.perf_counter(), processor_time()
         print(f"{section} ...", flush=True)
         tables = measures[section]()
@@ -150,7 +160,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--long",
         action="store_true",
-        help="everything: also CONTACT, counts and errors of other pages, the finest meshes, larger windows",
+        help="everything: also counts and errors of other pages, the finest meshes, larger windows",
     )
     parser.add_argument(
         "--write-bounds", action="store_true", help="measure the bounds of the test of the counts"

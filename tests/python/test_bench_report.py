@@ -7,14 +7,14 @@ from pathlib import Path
 from bench import report, run
 
 MARKS = re.compile(r"<!-- begin (\w+) -->")
+OPTIONS = Namespace(
+    build=Path(), peers=Path(), contact=None, quick=True, long=False, sizes=None, meshes=None, codes=None
+)
 
 
 def test_every_section_has_one_place_and_every_place_a_section() -> None:
-    options = Namespace(
-        build=Path(), peers=Path(), quick=True, long=False, sizes=None, meshes=None, codes=None
-    )
     marked = [name for page in report.DOCS.rglob("*.md") for name in MARKS.findall(page.read_text())]
-    assert sorted(marked) == sorted(["machine", *run.sections(options)])
+    assert sorted(marked) == sorted(["machine", *run.sections(OPTIONS)])
     for name in marked:
         report.place(name)
 

@@ -1,4 +1,4 @@
-"""The page of a result: what it holds, and that it works in a browser (Chromium, where there is one)."""
+"""The page of a result: what it holds, and that it works in a browser: Chromium, which CI=true requires."""
 
 import base64
 import fcntl
@@ -525,14 +525,32 @@ class Browser:
             self.process.wait()
 
 
+BROWSERS = "chromium", "chromium-browser", "google-chrome"
+
+
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
     if program is None:
-        pytest.skip("no Chromium on this machine, so that pages are not opened (apt install chromium)")
+        absent = "no Chromium on this machine: pages are not opened (apt install chromium)"
+        pytest.fail(absent) if os.environ.get("CI") == "true" else pytest.skip(absent)
     browser = Browser(program, tmp_path_factory.mktemp("profile"))
     yield browser
     browser.close()
+
+
+def test_ci_fails_where_no_browser_can_be_installed(tmp_path: Path) -> None:
+    for name in os.environ["PATH"].split(os.pathsep):
+        for program in Path(name).glob("*") if name else ():
+            link = tmp_path / program.name
+            if program.name not in BROWSERS and not link.is_symlink():
+                link.symlink_to(program)
+    root = Path(__file__).parents[2]
+    environment = {"PATH": str(tmp_path), "CI": "true", "APT": "no"}
+    done = subprocess.run(
+        ["sh", str(root / ".ci/bootstrap.sh")], env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 1 and "Install chromium." in done.stderr
 
 
 def state(browser: Browser) -> tuple[str, str, str, str]:

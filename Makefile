@@ -16,6 +16,8 @@ DEBUG_BUILD := build/debug
 DEBUG_SITE := build/debug-site
 COVERAGE_BUILD := build/coverage
 COVERAGE_SITE := build/coverage-site
+PERTURBED_BUILD := build/perturbed
+PERTURBED_SITE := build/perturbed-site
 
 # Least share of lines that tests must reach, percent.
 COVERED_FORTRAN := 97
@@ -53,7 +55,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check perturbed-test coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -133,6 +135,12 @@ debug-test debug-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extr
 debug-test:  ## all tests on a build that checks bounds and traps NaN
 debug-check:  ## the tests of the solvers on that build (minutes)
 
+perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  ## all tests on a build whose products differ in their last digits, as on another processor
+	@echo "Building hexcontact with perturbed products ($(PERTURBED_BUILD))"
+	$(call build_apart,$(PERTURBED_SITE),$(PERTURBED_BUILD),perturb_convolution=true)
+	@meson test -C $(PERTURBED_BUILD) --print-errorlogs
+	@PYTHONPATH=$(CURDIR)/$(PERTURBED_SITE) $(py) $(pytest)
+
 # What coverage leaves out: tests that judge time, memory or standard error, on which counters tell; and many
 # that only repeat what others reach.
 UNCOUNTED := memory_estimates operator_counts pages threads fuzz_decks fuzz_files first_step validation_friction \
@@ -148,7 +156,7 @@ coverage: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test $(STAMP
 	$(call build_apart,$(COVERAGE_SITE),$(COVERAGE_BUILD),b_coverage=true buildtype=debugoptimized)
 	@rm -rf build/coverage-data && find $(COVERAGE_BUILD) -name '*.gcda' -delete
 	@OMP_NUM_THREADS=1 meson test -C $(COVERAGE_BUILD) --print-errorlogs --timeout-multiplier 5
-	@OMP_NUM_THREADS=1 PYTHONPATH=$(CURDIR)/$(COVERAGE_SITE) $(py) -m coverage run $(pytest) -m 'not alone' \
+	@OMP_NUM_THREADS=1 PYTHONPATH=$(CURDIR)/$(COVERAGE_SITE) $(py) -m coverage run $(pytest) \
 	    $(UNCOUNTED:%=--ignore=tests/python/test_%.py) $(UNCOUNTED_TESTS:%=--deselect=tests/python/%)
 	@$(MAKE) --no-print-directory coverage-report
 

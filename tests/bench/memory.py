@@ -35,6 +35,9 @@ import sys
 sys.path.insert(0, {tests!r})
 from bench.square_window import peak_memory
 from hexcontact.cli.app import main
+if sys.argv[1] == "run":  # an interim output at once, as in a run that lasts
+    import hexcontact.result.store
+    hexcontact.result.store.PUBLISH_INTERVAL = 0.0
 try:
     main()
 finally:
@@ -149,7 +152,7 @@ def measure(*, quick: bool, long: bool, sizes: Sequence[int] | None = None) -> l
         goal = 150 if problem == "frictionless" else 350 if side <= 1024 else 300
         table.add(
             f"{problem}, {side}²{', LAPACK' if method == 'direct' else ''}",
-            *(f"{found.peak / 1e6:.0f}", f"{found.estimate / 1e6:.0f}", f"{found.error:+.1%}", "±10 %"),
+            *(f"{found.peak / 1e6:.0f}", f"{found.estimate / 1e6:.0f}", f"{found.error:+.1%}", "≥ −5 %"),
             *(
                 f"{own / 1e6:.0f}",
                 f"{own / side**2:.0f}" if method == "fft" else "",

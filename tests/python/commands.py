@@ -1,7 +1,10 @@
-"""Decks of a sphere, and the environment in which tests run commands on them."""
+"""Decks of a sphere, the environment in which tests run commands on them, and how long tests wait."""
 
 import os
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import hexcontact
 
@@ -29,3 +32,15 @@ ENVIRONMENT = {
     "PYTHONPATH": os.pathsep.join(filter(None, _PATHS)),
     "OMP_NUM_THREADS": "1",
 }
+
+PATIENCE = 300.0  # seconds of a process that hangs, however busy the machine is
+T = TypeVar("T")
+
+
+def wait_for(look: Callable[[], T]) -> T:
+    """Return what another process makes, once it is there."""
+    limit = time.monotonic() + PATIENCE
+    while not (found := look()):
+        assert time.monotonic() < limit, "what was waited for did not come"
+        time.sleep(0.02)
+    return found

@@ -468,24 +468,24 @@ def test_the_work_is_estimated_to_a_factor_of_two(name: str) -> None:
     assert duration == ("a second or less" if time < 1 else f"{time:.0f} s")
 
 
-@pytest.mark.parametrize(
-    ("name", "spacing"), [("dissimilar_fretting", "3.5 um"), ("hertz_spheres", "0.004 mm")]
-)
-def test_the_time_is_estimated_to_its_order_of_magnitude(name: str, spacing: str) -> None:
-    """Processor time of one thread, which a busy machine changes little; machines differ by less than 5."""
+def test_the_time_is_estimated_to_its_order_of_magnitude() -> None:
+    """Processor time of one thread: the ratio of two cases, which no machine changes much; a wide bound."""
     program = f"""
         import time
         from hexcontact import Case
         from hexcontact.problem.estimates import seconds
-        case = Case.from_toml({str(ROOT / f"cases/{name}.toml")!r}, {{"grid.spacing": {spacing!r}}})
         Case.from_toml({str(ROOT / "cases/hertz_spheres.toml")!r}).run()  # imports
-        began = time.process_time()
-        case.run()
-        print(seconds(case) / (time.process_time() - began))
+        for name, spacing in ("dissimilar_fretting", "3.5 um"), ("hertz_spheres", "0.004 mm"):
+            case = Case.from_toml(f"{ROOT / "cases"}/{{name}}.toml", {{"grid.spacing": spacing}})
+            began = time.process_time()
+            case.run()
+            print(seconds(case) / (time.process_time() - began))
     """
     words = [sys.executable, "-c", textwrap.dedent(program)]
     done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=True)
-    assert 0.2 < float(done.stdout) < 5.0
+    one, other = map(float, done.stdout.split())
+    assert 0.2 < one / other < 5.0
+    assert 0.02 < one < 50.0
 
 
 def test_work_grows_with_nodes_steps_and_entry() -> None:

@@ -6,14 +6,13 @@ import math
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import typer.main
-from commands import ENVIRONMENT
+from commands import ENVIRONMENT, PATIENCE, wait_for
 from typer.testing import CliRunner
 
 import hexcontact
@@ -313,11 +312,9 @@ def test_an_interruption_is_told(folder: Path) -> None:
     words = [sys.executable, "-m", "hexcontact", "run", "deck.toml", "--json"]
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen(words, env=ENVIRONMENT, **pipes)
-    deadline = time.monotonic() + 120
-    while len(list(folder.glob("deck.nc.d/*.npz"))) < 3 and time.monotonic() < deadline:
-        time.sleep(0.02)
+    wait_for(lambda: len(list(folder.glob("deck.nc.d/*.npz"))) >= 3)
     process.send_signal(signal.SIGTERM)
-    out, error = process.communicate(timeout=60)
+    out, error = process.communicate(timeout=PATIENCE)
     told = json.loads(out)
     assert (process.returncode, told["exit_code"], told["error"]["kind"]) == (143, 143, "interrupted")
     assert "to resume: hexcontact resume" in told["error"]["message"]

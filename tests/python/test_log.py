@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import ENVIRONMENT
+from commands import ENVIRONMENT, PATIENCE, wait_for
 from typer.testing import CliRunner
 
 from hexcontact import Case, ConvergenceError, FrictionalContact, NormalContact
@@ -359,11 +359,9 @@ def test_an_interrupted_run_says_so_in_its_log(deck: Path) -> None:
     words_ = [sys.executable, "-m", "hexcontact", "run", deck.name, "-q", "--log-file", place.name]
     deck.write_text(DECK.replace("steps = 4", "steps = 4000"))
     process = subprocess.Popen(words_, cwd=deck.parent, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 120
-    while not (place.exists() and place.read_text().count("step=") > 3) and time.monotonic() < deadline:
-        time.sleep(0.02)
+    wait_for(lambda: place.exists() and place.read_text().count("step=") > 3)
     process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=60)
+    process.communicate(timeout=PATIENCE)
     assert process.returncode == 143
     level, message = read(place)[-1]
     assert (level, words(message)["reason"]) == ("ERROR", "interrupted (SIGTERM)")

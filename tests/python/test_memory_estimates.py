@@ -1,4 +1,4 @@
-"""What `check` says of the memory of a run, and what the run takes at most."""
+"""What `check` says of the memory of a run, and what a run with an interim output takes at most."""
 
 import pytest
 from bench.memory import deck, measured
@@ -10,13 +10,11 @@ INTERFACE = "[interface]\ncoefficient = 1e15\nexponent = 1\n"
 MOVED = '[output]\nfields = ["displacement_1_z"]\n'
 
 
-def check(text: str, bound: float) -> None:
-    """On a busy machine freed memory may go back late: the peak is measured up to three times."""
-    for _ in range(3):
-        memory = measured(text)
-        if abs(memory.error) < bound:
-            return
-    pytest.fail(f"{memory.peak / 1e6:.1f} MB, estimated {memory.estimate / 1e6:.1f}")
+def check(text: str) -> None:
+    """Bound the peak by the estimate, of which another BLAS may leave buffers untouched."""
+    memory = measured(text)
+    assert memory.peak < 1.05 * memory.estimate
+    assert memory.estimate < 1.5 * memory.peak
 
 
 @pytest.mark.parametrize(
@@ -44,9 +42,9 @@ def check(text: str, bound: float) -> None:
         ("wear", 128, {"steps": 6}),
     ],
 )
-def test_the_estimate_is_the_peak_within_a_tenth(problem: str, side: int, options: dict[str, object]) -> None:
+def test_the_estimate_bounds_the_peak(problem: str, side: int, options: dict[str, object]) -> None:
     """With the interpreter and all libraries, as the system counts it."""
-    check(deck(problem, side, **options), 0.1)  # type: ignore[arg-type]
+    check(deck(problem, side, **options))  # type: ignore[arg-type]
 
 
 def test_a_load_step_takes_few_copies_of_its_state() -> None:
@@ -62,7 +60,7 @@ def test_the_estimate_of_fatigue_parameters(side: int) -> None:
     wear = text[text.index("[wear]") :]
     text = text.replace(wear[: wear.index("jump = 10\n") + 10], "")
     text = text.replace('[[load]]\nlabel = "cycle"', '[[load]]\nrepeat = 2\nlabel = "cycle"')
-    check(text + '[[fatigue]]\nsegment = ["cycle"]\nparameters = ["smith_watson_topper"]\n', 0.1)
+    check(text + '[[fatigue]]\nsegment = ["cycle"]\nparameters = ["smith_watson_topper"]\n')
 
 
 @pytest.mark.parametrize(
@@ -77,4 +75,4 @@ def test_the_estimate_of_fatigue_parameters(side: int) -> None:
 )
 def test_the_estimate_of_matrices_with_friction(problem: str, side: int, share: float) -> None:
     """The matrix is as large as the contact, whatever the window."""
-    check(deck(problem, side, share=share, more=DIRECT), 0.1)
+    check(deck(problem, side, share=share, more=DIRECT))

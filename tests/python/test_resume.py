@@ -485,7 +485,9 @@ def hexcontact_(folder: Path, *arguments: str, limit: int = 0) -> subprocess.Com
     command = [sys.executable, "-m", "hexcontact", *arguments]
     if limit:
         command = ["bash", "-c", f'ulimit -f {limit}; exec "$@"', "bash", *command]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, env=ENVIRONMENT)
+    return subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, timeout=commands.PATIENCE, env=ENVIRONMENT
+    )
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 import types
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,7 +19,7 @@ import numpy as np
 import psutil
 import pytest
 import xarray
-from commands import ENVIRONMENT
+from commands import ENVIRONMENT, PATIENCE, wait_for
 from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
@@ -476,12 +475,9 @@ def test_a_task_of_a_job_array_heeds_what_slurm_sends(folder: Path) -> None:
     assert "#SBATCH --signal=B:USR1@60\n" in command("study.toml", "--slurm").stdout
     words = [sys.executable, "-m", "hexcontact", "study", "study.toml", "--case", "1"]
     process = subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
-    for _ in range(300):
-        if len(list(Path().glob("study/0001.nc.d/*.npz"))) > 2:
-            break
-        time.sleep(0.05)
+    wait_for(lambda: len(list(Path().glob("study/0001.nc.d/*.npz"))) > 2)
     process.send_signal(signal.SIGUSR1)
-    _, told = process.communicate(timeout=30)
+    _, told = process.communicate(timeout=PATIENCE)
     assert process.returncode == 128 + signal.SIGUSR1
     assert re.search(r"^\S* *1/400 ", told, re.MULTILINE), told
     assert "hexcontact: interrupted; the finished load steps of case 1 are recorded" in told
@@ -490,13 +486,17 @@ def test_a_task_of_a_job_array_heeds_what_slurm_sends(folder: Path) -> None:
 
 def worker_of(process: int) -> psutil.Process:
     """Wait for a worker that solves something: a process below that uses the core."""
-    for _ in range(300):
+
+    def look() -> psutil.Process | None:
         with contextlib.suppress(psutil.Error):
             for child in psutil.Process(process).children(recursive=True):
                 if "spawn_main" in " ".join(child.cmdline()) and any(Path().glob("study/*.nc.d/*.npz")):
                     return child
-        time.sleep(0.05)
-    raise AssertionError("no worker")
+        return None
+
+    worker = wait_for(look)
+    assert worker
+    return worker
 
 
 def start() -> subprocess.Popen[str]:
@@ -509,11 +509,8 @@ def start() -> subprocess.Popen[str]:
 
 
 def wait_for_the_second(process: int) -> psutil.Process:
-    for _ in range(300):
-        if Path("study/0001.nc").exists() and any(Path().glob("study/0002.nc.d/*.npz")):
-            return worker_of(process)
-        time.sleep(0.05)
-    raise AssertionError("the second case has not begun")
+    wait_for(lambda: Path("study/0001.nc").exists() and any(Path().glob("study/0002.nc.d/*.npz")))
+    return worker_of(process)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
@@ -530,13 +527,13 @@ def test_a_study_that_is_stopped_goes_on_where_it_was(
         os.killpg(process.pid, number)  # as a terminal does, to the workers too
     else:
         process.send_signal(number)
-    _, told = process.communicate(timeout=30)
+    _, told = process.communicate(timeout=PATIENCE)
     assert "Traceback" not in told
     if number != signal.SIGKILL:
         assert "leaked" not in told
         assert process.returncode == 128 + number
         assert "interrupted; 1 of 2 cases are finished and recorded in study/" in told
-    psutil.wait_procs([worker], timeout=10)
+    psutil.wait_procs([worker], timeout=PATIENCE)
     assert not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE
     assert not Path("study/0002.json").exists()
     assert not Path("study.nc").exists()
@@ -591,7 +588,7 @@ def test_a_worker_that_is_killed_takes_only_its_own_case_with_it(folder: Path) -
     text = 'deck = "deck.toml"\n[[parameter]]\nkey = "load.1.steps"\nvalues = [2, 400]\n'
     assert Path("study.toml").read_text() == text
     wait_for_the_second(process.pid).kill()
-    _, told = process.communicate(timeout=30)
+    _, told = process.communicate(timeout=PATIENCE)
     assert process.returncode == 3
     assert "case 2 (load.1.steps = 400) failed: its process died" in told
     assert json.loads(Path("study/0002.json").read_text())["exit_code"] == 4
@@ -612,7 +609,7 @@ def test_a_terminal_gets_a_bar(folder: Path) -> None:
         while piece := os.read(leader, 10000):
             seen += piece
     os.close(leader)
-    out, _ = process.communicate(timeout=30)
+    out, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     assert b"6/6" in seen
     assert b"case 6 (load.1.normal_load" in seen
@@ -698,19 +695,22 @@ def test_on_dask_a_killed_worker_loses_nothing(folder: Path) -> None:
         pids = {worker.pid for worker in cluster.workers.values()}
         killed: list[int] = []
 
+        def worker_at_the_long_case() -> int:
+            """Return the holder of the lock on its journal, 0 before the first step."""
+            for lock in Path().glob("study/0003.*.nc.d/lock"):
+                with contextlib.suppress(OSError, ValueError):
+                    holder = int(json.loads(lock.read_text())["process"])
+                    if list(lock.parent.glob("*.npz")):
+                        return holder
+            return 0
+
         class Killer(Listener):
             def said(self, event: str, /, *arguments: Any, **values: Any) -> None:
                 if killed or not event.startswith("case="):
                     return
-                for _ in range(200):  # the worker at the long case, by the lock it holds on its journal
-                    for lock in Path().glob("study/0003.*.nc.d/lock"):
-                        with contextlib.suppress(OSError, ValueError):
-                            holder = json.loads(lock.read_text())["process"]
-                            if list(lock.parent.glob("*.npz")):
-                                os.kill(holder, signal.SIGKILL)
-                                killed.append(holder)
-                                return
-                    time.sleep(0.05)
+                holder = wait_for(worker_at_the_long_case)
+                os.kill(holder, signal.SIGKILL)
+                killed.append(holder)
 
         dataset = study.run(dask=cluster.scheduler_address, listener=Killer())
     assert pids

@@ -1,10 +1,9 @@
 """Cases in threads and processes of their own: the same answers to the bit, and nobody waits."""
 
-import itertools
-import math
 import operator
 import pickle
 import re
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import wait_for
 from numpy.testing import assert_array_equal
 
 from hexcontact import (
@@ -161,27 +161,26 @@ class Timed:
         return timed
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("work", [lambda: press("fft"), lambda: press("direct"), shear, apply])
 def test_python_goes_on_while_the_core_works(
     ticks: list[float], work: Callable[[], Callable[[], object]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Were the interpreter locked, there would be no tick for as long as a call takes at the least."""
+    """Without a switch between its own instructions another thread runs only where the core lets go."""
     call = work()
     module = friction if work is shear else contact
     core = Timed(module._api)
     monkeypatch.setattr(module, "_api", core)
-    least = math.inf
-    deadline = time.perf_counter() + 10.0
-    for turn in itertools.count(1):
+
+    def ticked_meanwhile() -> bool:
         call()
-        least = min(least, core.ended - core.begun)
-        seen = [t for t in list(ticks) if core.begun < t < core.ended]
-        longest = max(np.diff([core.begun, *seen, core.ended]))
-        if turn >= 3 and longest < 0.5 * least:
-            return
-        if time.perf_counter() > deadline:  # on a busy machine the other thread may wait for a core
-            pytest.fail("no other thread of Python ran while the compiled core was at work")
+        return any(core.begun < t < core.ended for t in ticks)
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e6)
+    try:
+        wait_for(ticked_meanwhile)
+    finally:
+        sys.setswitchinterval(interval)
 
 
 # --- processes ----------------------------------------------------------------------------------------------

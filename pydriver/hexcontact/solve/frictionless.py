@@ -43,10 +43,9 @@ S = TypeVar("S", NormalSolution, "ContactState")  # the end of a load step
 _ITEM = 8  # bytes of a float
 _STEPPED = names_where(lambda v: v.dims == ("step",))
 # Measured by tests/bench/memory.py.
-_WRITING = 18 * 2**20  # bytes of netCDF and HDF5, which are loaded to write the output
+_WRITING = 24 * 2**20  # bytes of netCDF and HDF5, which an interim output loads beside the solver
 _LOADED = 5 * 2**20  # bytes of modules that a run imports
 _LOADED_AFTER = 105 * 2**20  # bytes of xarray, pandas and others, which read a result
-_LEFT = {False: 0.5, True: 0.75}  # share of operators and states, which remain for the output, by friction
 _HOLES = 32 * 2**20  # bytes at most of freed arrays in the heap, by FFTs without friction: larger go back
 _PART = {False: 140, True: 500}  # bytes of a node in contact, for parts of the window, by friction
 _COMPANION_ARRAYS = 40  # fields of the path in whole steps, for adaptive steps, and edges
@@ -133,19 +132,15 @@ def memory_needed(case: Problem, lattice: Lattice, kept: int = 0) -> int:
         arrays += _WEAR_ARRAYS + _END_ARRAYS * (1 + len(case.cycle))
     if case.deck.interface:
         arrays += _INTERFACE_ARRAYS[case.frictional]
-    solver = case.memory_needed(lattice)
-    needed = solver + arrays * _ITEM * lattice.size + kept
+    needed = case.memory_needed(lattice) + arrays * _ITEM * lattice.size + kept
     if case.deck.wear:
         needed += contact.memory_needed("fft", *lattice.shape, threads=memory.threads())
     if bodies:
         # the set-up fits into the vectors of a solver with friction, which are free by then
         needed += len(bodies) * operator + (0 if case.frictional else set_up)
-    method = case.method_for(lattice)
-    if not case.frictional and method == "fft":
+    if not case.frictional and case.method_for(lattice) == "fft":
         needed += min(needed // 2, _HOLES)
-    # matrices with friction are of one load step
-    remaining = needed - (solver if case.frictional and method != "fft" else 0)
-    return _LOADED + max(needed, int(_LEFT[case.frictional] * remaining) + _WRITING)
+    return _LOADED + _WRITING + needed
 
 
 def _parts(case: Problem, lattice: Lattice) -> int:

@@ -212,7 +212,7 @@ contains
     if (allocated(error)) return
     call direct%solve(force_control, 1.2_wp, 1.0e-10_wp, 20, state, error)
     if (allocated(error)) return
-    call check_true(error, state%converged .and. state%sweeps <= 3, 'areas: five from where the bodies would overlap')
+    call check_true(error, state%converged .and. state%sweeps <= 4, 'areas: five from where the bodies would overlap')
     if (allocated(error)) return
     call direct%solve(force_control, 1.2_wp, 1.0e-10_wp, 20, again, error, candidate)
     if (allocated(error)) return

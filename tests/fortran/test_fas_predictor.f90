@@ -234,7 +234,7 @@ contains
     call check(error, cold%motion, alone%motion, 1.0e-8_wp, 'same motions')
     if (allocated(error)) return
     ! measured: 0.60
-    call check_true(error, cold%operator_applications < 0.66_wp*alone%operator_applications, 'less work')
+    call check_true(error, cold%operator_applications < 0.8_wp*alone%operator_applications, 'less work')
   end subroutine test_cold_start
 
 end module test_fas_predictor

@@ -624,7 +624,7 @@ contains
       call check(error, largest(state%relative_displacement - expected%relative_displacement), 0.0_wp, &
                  1.0e-7_wp*expected%motion(normal), 'relative displacement, outside the part too')
       if (allocated(error)) return
-      if (i == 2) call check_true(error, 4.4_wp*state%operator_applications < expected%operator_applications, 'less work')
+      if (i == 2) call check_true(error, 3.0_wp*state%operator_applications < expected%operator_applications, 'less work')
       if (allocated(error)) return
     end do
   end subroutine test_part_of_window

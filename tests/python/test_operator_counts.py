@@ -1,6 +1,7 @@
-"""Work of the solvers, counted in operator applications, and of the driver, in calls: no machine matters.
+"""Work of the solvers, counted in operator applications, and of the driver, in calls.
 
-The bounds are a tenth above what was measured; `python tests/bench/run.py --write-bounds` measures again.
+The bounds are three tenths above what was measured, since rounding differs between processors;
+`python tests/bench/run.py --write-bounds` measures again.
 """
 
 import cProfile

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import PATIENCE
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -464,7 +465,7 @@ class Browser:
         os.write(self.sender, json.dumps(message).encode() + b"\0")
         while True:
             while b"\0" not in self.buffer:
-                assert select.select([self.receiver], [], [], 60.0)[0], f"no answer to {method}"
+                assert select.select([self.receiver], [], [], PATIENCE)[0], f"no answer to {method}"
                 part = os.read(self.receiver, 1 << 16)
                 assert part, "the browser has gone"
                 self.buffer += part
@@ -482,7 +483,7 @@ class Browser:
         return answer["result"].get("value")
 
     def wait_for(self, expression: str) -> None:
-        limit = time.monotonic() + 30.0
+        limit = time.monotonic() + PATIENCE
         while not self.value(expression):
             assert time.monotonic() < limit, expression
             time.sleep(0.02)

@@ -12,6 +12,7 @@ module test_interface
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_power_interface, only: power_interface_t
+  use hc_nodal_springs, only: nodal_springs_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use testing, only: test_t, new_test, check, check_true
@@ -45,6 +46,7 @@ contains
       new_test('reference_sphere', test_sphere), &
       new_test('direct_as_fft', test_direct), &
       new_test('rigid_flat', test_flat), &
+      new_test('nodal_springs', test_nodal_springs), &
       new_test('first_order', test_first_order), &
       new_test('stiff_layer', test_stiff), &
       new_test('friction', test_friction), &
@@ -170,6 +172,32 @@ contains
       end associate
     end do
   end subroutine test_flat
+
+  !> Rows of springs: none off the contact, none softer than the softest; what is wrong is a part of d_n p + C p or g + C p.
+  subroutine test_nodal_springs(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(nodal_springs_t) :: law
+    logical, parameter :: contact(3) = [.true., .false., .true.]
+    real(wp) :: compliance(3), offset(3), worst
+
+    call check_true(error, .not. law%is_compliant(), 'no springs')
+    if (allocated(error)) return
+    law%spring = [9.0_wp, 9.0_wp, 2.0_wp, 3.0_wp, 7.0_wp]
+    call check_true(error, law%is_compliant(), 'springs')
+    if (allocated(error)) return
+    ! of the nodes 3 to 5
+    call law%linearize(3, 1.0_wp, 5.0_wp, [1.0_wp, 1.0_wp, 1.0_wp], [0.0_wp, 0.0_wp, 0.0_wp], contact, compliance, offset)
+    call check(error, [compliance, offset], [2.0_wp, 0.0_wp, 5.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'compliances and offsets')
+    if (allocated(error)) return
+    ! C p + min(d_n p, g) with d_n = 0.5: 2 - 2; 3*2 + min(1, -4) = 2; the last node is no candidate
+    worst = 0.0_wp
+    call law%violation(3, 0.5_wp, [1.0_wp, 2.0_wp, 1.0_wp], [-2.0_wp, -4.0_wp, 9.0_wp], [.true., .true., .false.], worst)
+    call check(error, worst, 4.0_wp, 0.0_wp, 'violation over d_n')
+    if (allocated(error)) return
+    worst = 5.0_wp
+    call law%violation(1, 0.5_wp, [0.0_wp], [1.0_wp], [.true.], worst)
+    call check(error, worst, 5.0_wp, 0.0_wp, 'a smaller violation than before')
+  end subroutine test_nodal_springs
 
   !> A stiff layer adds (m/(m+1)) (p0/c)^(1/m) to the approach of a sphere, to the first order: the rest falls faster.
   subroutine test_first_order(error)

@@ -47,6 +47,7 @@ contains
       new_test('direct_as_fft', test_direct), &
       new_test('rigid_flat', test_flat), &
       new_test('nodal_springs', test_nodal_springs), &
+      new_test('soft_layer', test_soft), &
       new_test('first_order', test_first_order), &
       new_test('stiff_layer', test_stiff), &
       new_test('friction', test_friction), &
@@ -229,6 +230,24 @@ contains
     end do
     call check_true(error, rest(1) < 0.05_wp .and. rest(2) < 0.5_wp*rest(1), 'first order')
   end subroutine test_first_order
+
+  !> On a layer as soft as the bodies the pressure is smooth: what coarser lattices find is nearly that of the finest, where two
+  !> products are left to be made, one and a half with those on the coarser ones.
+  subroutine test_soft(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(normal_contact_t), target :: contact
+    type(contact_state_t) :: state
+    type(lattice_t) :: lattice
+    real(wp), allocatable :: gap(:, :)
+
+    call new_sphere(40, 80, lattice, gap, error)
+    if (allocated(error)) return
+    call new_normal_contact(contact, lattice, pair, gap, gap < 9.0_wp, error, law=power_interface_t(2.0_wp/pi, 1.5_wp))
+    if (allocated(error)) return
+    call contact%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 60, state, error)
+    if (allocated(error)) return
+    call check_true(error, state%operator_applications < 1.65_wp, 'few products')
+  end subroutine test_soft
 
   !> A layer stiffer than rounding errors can resolve is none.
   subroutine test_stiff(error)

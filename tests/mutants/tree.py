@@ -119,7 +119,7 @@ class Tree:
         for suite in suites:
             done = self._run([str(self.build / "tests/fortran/tester"), suite], limit=SECONDS)
             if done.returncode:
-                named = re.search(r"^FAILED  (\S+ \S+?):", done.stdout, re.MULTILINE)
+                named = re.search(r"^FAILED  (\S+ .+?):", done.stdout, re.MULTILINE)
                 return named[1] if named else f"{suite}: {_ended(done.returncode)}"
         return ""
 

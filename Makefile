@@ -7,6 +7,7 @@
 #   PYTEST_JOBS=4                processes that share the Python tests; 0: all in one
 #   BENCH_ARGS='--only counts'   more words for the benchmarks
 #   CHECKS='fretting torsion'    which comparisons make verify makes
+#   MUTANTS_ARGS='--until check' more words for make mutants
 
 VENV := .venv
 STAMPS := $(VENV)/.stamps
@@ -53,7 +54,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -132,6 +133,9 @@ debug-test debug-check: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extr
 	@PYTHONPATH=$(CURDIR)/$(DEBUG_SITE) $(py) $(pytest) $(if $(filter debug-check,$@),$(CHECKED:%=tests/python/test_%.py))
 debug-test:  ## all tests on a build that checks bounds and traps NaN
 debug-check:  ## the tests of the solvers on that build (minutes)
+
+mutants: install $(STAMPS)/extra-test  ## wrong lines in copies of the sources: which tests find them? (hours; goes on where it was stopped)
+	@$(py) tests/mutants/run.py --build $(BUILD) $(MUTANTS_ARGS)
 
 # What coverage leaves out: tests that judge time, memory or standard error, on which counters tell; and many
 # that only repeat what others reach.

@@ -68,11 +68,6 @@ def suites() -> list[str]:
     return re.findall(r"^  '(\w+)',$", (ROOT / "tests/fortran/meson.build").read_text(), re.MULTILINE)
 
 
-def quick() -> list[str]:
-    """Return the quick Python tests."""
-    return (ROOT / "tests/check.txt").read_text().split()
-
-
 def tests_of(path: str) -> tuple[list[str], list[str]]:
     """Return the Fortran suites that use a folder of fortran/, and the Python tests that import a module."""
     file = ROOT / path
@@ -103,7 +98,7 @@ def examined(tree: Tree, mutant: Mutant, until: str, processes: int) -> Row:
         if reason:
             return row | {"invalid": reason}
         row["folder"] = tree.fortran(using) or (importing and tree.python(importing)) or ""
-        if row["folder"] and (" " in row["folder"].split(":")[0] or _is_quick(row["folder"])):
+        if row["folder"] and (".py" not in row["folder"] or _is_quick(row["folder"])):
             row["check"] = row["folder"]  # one of the quick tests
         else:
             row["check"] = (fortran and tree.fortran(others)) or tree.python(["@tests/check.txt"])
@@ -114,8 +109,10 @@ def examined(tree: Tree, mutant: Mutant, until: str, processes: int) -> Row:
 
 def _is_quick(test: str) -> bool:
     """Test whether a Python test is one of those of `make check`."""
-    name = f"tests/python/{test}"
-    return any(name == entry or name.startswith((f"{entry}::", f"{entry}[")) for entry in quick())
+    name = f"tests/python/{test.partition(': ')[0]}"
+    listed = (ROOT / "tests/check.txt").read_text().split()
+    named = [entry for entry in listed if re.match(rf"{re.escape(entry.removeprefix('--deselect='))}(::|\[|$)", name)]
+    return bool(named) and not any(entry.startswith("--") for entry in named)
 
 
 def killed_by(row: Row, stage: str) -> str | None:

@@ -9,6 +9,7 @@ module test_edges
   use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   use hc_zone_estimators, only: area_radius, boundary, boundary_circle, circle_fit_t, edge_ellipse, edge_radius, &
     ellipse_t, moment_ellipse, pressure_center
+  use hc_edge_fit, only: fit_squares
   use hc_edge_band, only: edge_band_t, new_edge_band
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_traction_field, only: new_traction_field, traction_field_t
@@ -48,7 +49,8 @@ contains
       new_test('between_nodes', test_between), &
       new_test('pressure_between_nodes', test_pressure_between), &
       new_test('shear_between_nodes', test_shear_between), &
-      new_test('band', test_band) &
+      new_test('band', test_band), &
+      new_test('fit_of_squares', test_fit) &
     ]
   end subroutine collect_edges
 
@@ -528,5 +530,56 @@ contains
     end function beside
 
   end subroutine test_band
+
+  !> Squares that are a paraboloid are met exactly, whatever errors the nodes had; a half turn of the window, which cuts the contact,
+  !> turns the fit of any others.
+  subroutine test_fit(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(edge_options_t) :: options
+    type(lattice_t) :: lattice
+    integer, parameter :: m = 14, l = 11
+    real(wp), dimension(m, l) :: x, y, distance, exact, squares, turned
+    logical :: inner(m, l)
+    integer :: k
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [m, l], error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    ! the edge runs from one side of the window to the opposite one
+    distance = 0.8_wp*(x - y) - 1.1_wp
+    exact = 3.0_wp + 0.5_wp*x - 0.7_wp*y + 0.02_wp*x**2 - 0.03_wp*x*y + 0.01_wp*y**2
+    options%fit_share = 1.0_wp
+    squares = exact + 0.1_wp
+    call fit_squares(squares, sign(sqrt(abs(exact)), exact), distance, options)
+    ! in the corners there are too few nodes
+    inner = .false.
+    inner(4:m - 3, 4:l - 3) = .true.
+    associate (near => inner .and. distance <= options%fit_depth .and. distance >= 0.0_wp)
+      call check_true(error, count(near) > 5, 'there are nodes to be fitted')
+      if (allocated(error)) return
+      call check(error, maxval(abs(squares - exact), mask=near), 0.0_wp, 1.0e-9_wp, 'a paraboloid')
+      if (allocated(error)) return
+      call check(error, maxval(abs(squares - exact - 0.1_wp), mask=distance > options%fit_depth), 0.0_wp, 1.0e-14_wp, &
+                 'nothing else is touched')
+    end associate
+    if (allocated(error)) return
+    exact = sqrt(max(distance, 0.0_wp))*(1.0_wp + 0.1_wp*reshape(sin([(1.3_wp*k, k=1, m*l)]), [m, l]))
+    ! edges everywhere, on all sides of the window
+    distance = 1.5_wp + sin(x + 2.0_wp*y)
+    squares = exact**2
+    call fit_squares(squares, exact, distance, options)
+    turned = half_turn(exact**2)
+    call fit_squares(turned, half_turn(exact), half_turn(distance), options)
+    call check(error, maxval(abs(half_turn(turned) - squares)), 0.0_wp, 1.0e-9_wp, 'a half turn')
+
+  contains
+
+    pure function half_turn(field) result(turned)
+      real(wp), intent(in) :: field(m, l)
+      real(wp) :: turned(m, l)
+      turned = field(m:1:-1, l:1:-1)
+    end function half_turn
+
+  end subroutine test_fit
 
 end module test_edges

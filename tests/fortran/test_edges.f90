@@ -531,8 +531,8 @@ contains
 
   end subroutine test_band
 
-  !> Squares that are a paraboloid are met exactly, whatever errors the nodes had; a half turn of the window, which cuts the contact,
-  !> turns the fit of any others.
+  !> Squares that are a paraboloid are met exactly, whatever errors the nodes had; a half turn of the window, which cuts the
+  !> contact, turns the fit of any others.
   subroutine test_fit(error)
     type(error_t), allocatable, intent(out) :: error
     type(edge_options_t) :: options

@@ -533,8 +533,8 @@ contains
     call check(error, maxval(abs(ahead - friction*pressure*path)), 0.0_wp, 1.0e-3_wp, 'energy of every node')
   end subroutine test_wear_ahead
 
-  !> Cattaneo and Mindlin, c/a = 0.5 at the middle of a step and 0.2 at its end: Q = mu P (1 - (c/a)^3), so that the stick area grows
-  !> by (0.5^2 - 0.2^2)/(0.5^3 - 0.2^3) of the change of the tractions.
+  !> Cattaneo and Mindlin, c/a = 0.5 at the middle of a step and 0.2 at its end: Q = mu P (1 - (c/a)^3), so that the stick area
+  !> changes by (0.5^2 - 0.2^2)/(0.5^3 - 0.2^3) of the change of the tractions.
   subroutine test_change_by_halves(error)
     type(error_t), allocatable, intent(out) :: error
     type(lattice_t) :: lattice

@@ -6,10 +6,10 @@
     python tests/mutants/run.py --again             survivors once more, after tests were added
     python tests/mutants/run.py --write             put the table into docs/developer.md
 
-A seed draws mutants of fortran/ and pydriver/: an operator, a constant or a whole line is changed in a copy of the
-checkout below build/mutants. Each meets the tests of its own file, then those of `make check`; survivors meet
-the whole suite, which stops at the first failure. Mutants that equivalents.toml names with the reason behave
-as the line they come from: no test can tell.
+A seed draws mutants of fortran/ and pydriver/: an operator, a constant or a whole line is changed in a copy
+of the checkout below build/mutants. Each meets the tests of its own file, then those of `make check`;
+survivors meet the whole suite, which stops at the first failure. Mutants that equivalents.toml names with the
+reason behave as the line they come from: no test can tell.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ if __name__ == "__main__":
 
 from arrows import imports_of
 from bench import report
+
 from mutants.sites import Mutant, drawn
 from mutants.tree import ROOT, Tree
 
@@ -74,9 +75,15 @@ def tests_of(path: str) -> tuple[list[str], list[str]]:
     if path.startswith("fortran"):
         modules = {f"hc_{other.stem}" for other in file.parent.glob("*.f90")}
         texts = {suite: (ROOT / f"tests/fortran/test_{suite}.f90").read_text() for suite in suites()}
-        using = [suite for suite, text in texts.items() if modules & set(re.findall(r"^ *use (\w+)", text, re.MULTILINE))]
+        using = [
+            suite
+            for suite, text in texts.items()
+            if modules & set(re.findall(r"^ *use (\w+)", text, re.MULTILINE))
+        ]
         core = (ROOT / "pydriver/hexcontact/core").glob("*.py")
-        callers = {f"hexcontact.core.{other.stem}" for other in core if f"hc_{file.stem}" in other.read_text()}
+        callers = {
+            f"hexcontact.core.{other.stem}" for other in core if f"hc_{file.stem}" in other.read_text()
+        }
     else:
         using, callers = [], {".".join(Path(path).relative_to("pydriver").with_suffix("").parts)}
     tests = sorted((ROOT / "tests/python").glob("test_*.py"))
@@ -103,7 +110,9 @@ def examined(tree: Tree, mutant: Mutant, until: str, processes: int) -> Row:
         else:
             row["check"] = (fortran and tree.fortran(others)) or tree.python(["@tests/check.txt"])
         if until == "suite" and not row["check"]:
-            row["suite"] = row["folder"] or tree.python([*importing, "tests/python", "-m", "not alone"], processes)
+            row["suite"] = row["folder"] or tree.python(
+                [*importing, "tests/python", "-m", "not alone"], processes
+            )
     return row
 
 
@@ -111,7 +120,11 @@ def _is_quick(test: str) -> bool:
     """Test whether a Python test is one of those of `make check`."""
     name = f"tests/python/{test.partition(': ')[0]}"
     listed = (ROOT / "tests/check.txt").read_text().split()
-    named = [entry for entry in listed if re.match(rf"{re.escape(entry.removeprefix('--deselect='))}(::|\[|$)", name)]
+    named = [
+        entry
+        for entry in listed
+        if re.match(rf"{re.escape(entry.removeprefix('--deselect='))}(::|\[|$)", name)
+    ]
     return bool(named) and not any(entry.startswith("--") for entry in named)
 
 
@@ -166,7 +179,15 @@ def tables(rows: dict[str, Row], seed: int, numbers: dict[str, int]) -> list[rep
     reasons = equivalents()
     summary = report.Table(
         f"Mutants of seed {seed}",
-        ["lines of", "mutants", "not compiled", "compiled to the same", "equivalent", "killed by `make check`", "by the suite"],
+        [
+            "lines of",
+            "mutants",
+            "not compiled",
+            "compiled to the same",
+            "equivalent",
+            "killed by `make check`",
+            "by the suite",
+        ],
     )
     each = report.Table("Each mutant", ["line", "change", "killed by"])
     for language, number in numbers.items():
@@ -185,12 +206,17 @@ def tables(rows: dict[str, Row], seed: int, numbers: dict[str, int]) -> list[rep
         counts = [len(chosen), *invalid.values(), len(chosen) - len(judged)]
         summary.add("`fortran/`" if language == "fortran" else "`pydriver/`", *map(str, counts), *shares)
         for row in chosen:
-            where = f"`{row['path'].removeprefix('fortran/').removeprefix('pydriver/hexcontact/')}:{row['number']}`"
+            path = row["path"].removeprefix("fortran/").removeprefix("pydriver/hexcontact/")
+            where = f"`{path}:{row['number']}`"
             change = re.sub(r"(.+) for (.+)", r"`\1` for `\2`", row["change"]).replace("`nothing`", "nothing")
             killer = killed_by(row, "suite")
             slow = "" if row.get("check") else " (suite)"
-            found = f"`{killer}`{slow}" if killer else "**not killed**" if killer == "" else "not by `make check`"
-            each.add(where, change.replace("|", "\\|"), f"equivalent: {row['reason']}" if row["reason"] else found)
+            found = (
+                f"`{killer}`{slow}" if killer else "**not killed**" if killer == "" else "not by `make check`"
+            )
+            each.add(
+                where, change.replace("|", "\\|"), f"equivalent: {row['reason']}" if row["reason"] else found
+            )
     return [summary, each]
 
 
@@ -205,7 +231,9 @@ def _share(killers: list[str | None]) -> str:
 
 def main() -> None:
     """Run what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=NUMBERS, help="mutants of one language")
     parser.add_argument("--build", type=Path, default=ROOT / "build/release", help="where the extension is")

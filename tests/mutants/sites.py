@@ -8,25 +8,31 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import blake2b
+from itertools import pairwise
 from pathlib import Path
 
 FOLDERS = {"fortran": ("fortran", "*.f90"), "python": ("pydriver/hexcontact", "*.py")}
-SWAPPED = dict(
-    pair
-    for one, other in (
-        ("+", "-"), ("*", "/"), ("<", "<="), (">", ">="), ("==", "/="), (".and.", ".or."), (".true.", ".false."),
-        (".eqv.", ".neqv."), ("max", "min"), ("maxval", "minval"), ("any", "all"), ("and", "or"), ("True", "False"),
-        ("is", "is not"), ("in", "not in"),
-    )
-    for pair in ((one, other), (other, one))
+PAIRS = (
+    "+ -", "* /", "< <=", "> >=", ".and. .or.", ".true. .false.", ".eqv. .neqv.", "max min", "maxval minval", "any all",
+    "and or", "True False",
 )  # fmt: skip
-SWAPPED |= {".not.": "", "not": ""}
+SWAPPED = {one: other for pair in PAIRS for one, other in (pair.split(), pair.split()[::-1])}
+SWAPPED |= {
+    "==": "/=",
+    "/=": "==",
+    ".not.": "",
+    "not": "",
+    "is": "is not",
+    "is not": "is",
+    "in": "not in",
+    "not in": "in",
+}
 
 # Fortran statements that compute nothing, or that cannot be dropped by themselves.
 _DECLARES = re.compile(
-    r"(use|implicit|private|public|module|submodule|program|contains|end\w*|(abstract )?interface|import|procedure"
-    r"|generic|pure|elemental|impure|recursive|subroutine|function|type|class|real|integer|logical|character|complex"
-    r"|enum|block|format)\b|.*::"
+    r"(use|implicit|private|public|module|submodule|program|contains|end\w*|(abstract )?interface|import"
+    r"|procedure|generic|pure|elemental|impure|recursive|subroutine|function|type|class|real|integer|logical"
+    r"|character|complex|enum|block|format)\b|.*::"
 )
 _BLOCK = re.compile(
     r"(do|else|case|select|associate|critical|forall)\b|\w+ *: *do\b|if *\(.*\) *then$|where *\([^=]*\)$"
@@ -37,11 +43,9 @@ _TOKEN = re.compile(
     r"|(?P<other>\*\*|//|=>|\(/|/\))"
     r"|(?P<operator>/=|==|<=|>=|\.(?:and|or|not|true|false|eqv|neqv)\.|[-+*/<>]|\b(?:max|min|maxval|minval|any|all)(?=\())"
 )
-_PYTHON_TOKEN = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
-    ast.Eq: "==", ast.NotEq: "!=", ast.And: "and", ast.Or: "or", ast.Is: "is", ast.IsNot: "is not", ast.In: "in",
-    ast.NotIn: "not in",
-}  # fmt: skip
+_PYTHON_OPERATOR = re.compile(
+    r"(?<!\w)(?:not\ in|in|is\ not|is|and|or)(?!\w)|[<>=!]=|(?<![*/<>])[-+*/<>](?![*/<>=])"
+)
 
 
 @dataclass(frozen=True)
@@ -132,20 +136,19 @@ def _next(number: str) -> str:
 
 
 def _python_sites(text: str) -> Iterator[tuple[int, int, int, str, str]]:
-    """Yield line, columns, kind and new text of what can be changed in Python: in the bodies of functions only."""
+    """Yield line, columns, kind and new text of what can be changed in the bodies of Python functions."""
     lines = text.splitlines()
     if not text.isascii():  # columns of ast count bytes
         lines = [line.encode().decode("latin-1") for line in lines]
 
-    def between(left: ast.expr, right: ast.expr, word: str) -> Iterator[tuple[int, int, int, str, str]]:
+    def between(left: ast.expr, right: ast.expr) -> Iterator[tuple[int, int, int, str, str]]:
         assert left.end_lineno and left.end_col_offset
         for row in range(left.end_lineno - 1, right.lineno):
             start = left.end_col_offset if row == left.end_lineno - 1 else 0
             end = right.col_offset if row == right.lineno - 1 else len(lines[row])
-            pattern = rf"(?<!\w){re.escape(word)}(?!\w)" if word[0].isalpha() else re.escape(word)
-            found = re.search(pattern, lines[row][start:end].partition("#")[0])
+            found = _PYTHON_OPERATOR.search(lines[row][start:end].partition("#")[0])
             if found:
-                new = {"==": "!=", "!=": "=="}.get(word) or SWAPPED[word]
+                new = {"==": "!=", "!=": "=="}.get(found[0]) or SWAPPED[found[0]]
                 yield row, start + found.start(), start + found.end(), "operator", new
                 return
 
@@ -155,14 +158,14 @@ def _python_sites(text: str) -> Iterator[tuple[int, int, int, str, str]]:
                 return
             case ast.If(test=ast.Name(id="TYPE_CHECKING")):
                 return
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _PYTHON_TOKEN:
-                yield from between(left, right, _PYTHON_TOKEN[type(op)])
-            case ast.BoolOp(op=op, values=values):
-                for left, right in zip(values, values[1:], strict=False):
-                    yield from between(left, right, _PYTHON_TOKEN[type(op)])
-            case ast.Compare(left=left, ops=ops, comparators=others):
-                for one, op, other in zip([left, *others], ops, others, strict=False):
-                    yield from between(one, other, _PYTHON_TOKEN[type(op)])
+            case ast.BinOp(left=left, right=right):
+                yield from between(left, right)
+            case ast.BoolOp(values=operands):
+                for left, right in pairwise(operands):
+                    yield from between(left, right)
+            case ast.Compare(left=first, comparators=others):
+                for left, right in pairwise([first, *others]):
+                    yield from between(left, right)
             case ast.UnaryOp(op=ast.Not()):
                 yield node.lineno - 1, node.col_offset, node.operand.col_offset, "operator", ""
             case ast.Constant(value=bool()):

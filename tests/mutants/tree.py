@@ -42,7 +42,11 @@ class Tree:
     def renew(self) -> None:
         """Copy what differs from the checkout, and build."""
         listed = subprocess.run(
-            ["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
+            ["git", "ls-files", "-co", "--exclude-standard"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
         ).stdout.splitlines()
         for name in listed:
             source, copy = ROOT / name, self.root / name
@@ -127,7 +131,16 @@ class Tree:
         """Run Python tests up to the first failure, which is returned."""
         shutil.rmtree(self.temporary, ignore_errors=True)
         self.at.write_text("")
-        pytest = [sys.executable, "-m", "pytest", "-p", "mutants.limit", "-q", "-x", f"--numprocesses={processes}"]
+        pytest = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-p",
+            "mutants.limit",
+            "-q",
+            "-x",
+            f"--numprocesses={processes}",
+        ]
         kept = ["--dist=loadscope", f"--basetemp={self.temporary}"]
         done = self._run([*pytest, *kept, *words])
         if not done.returncode:

@@ -110,7 +110,10 @@ def test_each_folder_of_the_library_has_suites_and_modules_have_tests() -> None:
     for folder in folders - {run.ROOT / "fortran", run.ROOT / "fortran/python"}:
         file = next(folder.glob("*.f90")).relative_to(run.ROOT).as_posix()
         assert run.tests_of(file)[0], file
-    assert run.tests_of("pydriver/hexcontact/deck/units.py") == ([], ["tests/python/test_surfaces.py", "tests/python/test_units.py"])
+    assert run.tests_of("pydriver/hexcontact/deck/units.py") == (
+        [],
+        ["tests/python/test_surfaces.py", "tests/python/test_units.py"],
+    )
     assert "tests/python/test_edges.py" in run.tests_of("fortran/python/f2py_edges.f90")[1]
 
 
@@ -137,8 +140,6 @@ def test_the_table_counts_what_was_killed_by_what() -> None:
     ]
     rows = {mutant.key: row | {"path": mutant.path} for mutant, row in zip(mutants, found, strict=True)}
     summary, each = run.tables(rows, 1, {"fortran": 40})
-    assert summary.rows == [
-        ["`fortran/`", "4", "1", "0", "0", "1 of 4 (25 %)", "2 of 3 (67 %), 1 not tried"]
-    ]
+    assert summary.rows == [["`fortran/`", "4", "1", "0", "0", "1 of 4 (25 %)", "2 of 3 (67 %), 1 not tried"]]
     killers = ["`laws damping`", "`test_wear.py::test_a` (suite)", "**not killed**", "not by `make check`"]
     assert [row[2] for row in each.rows] == killers

@@ -1,11 +1,11 @@
-"""Measure the processor time of the Python tests; write those that `make check` leaves out to tests/check.txt.
+"""Measure the processor time of the Python tests; list in tests/check.txt what `make check` leaves out.
 
     python tests/quick.py                          all tests (a quarter of an hour)
     python tests/quick.py tests/python/test_x.py   those of a file; times of the others are kept
-    python tests/quick.py --write                  write the list from the times that are known
+    python tests/quick.py --write                  write the list; a file whose times are unknown is slow
 
-A test is slow if it takes more than `SECONDS`, with all its parameters `TOGETHER`. Times are those of a process
-and of what it starts, so that other programs hardly matter; they are kept in build/times.json.
+A test is slow if it takes more than `SECONDS`, with all its parameters `TOGETHER`. Times are those of a
+process and of what it starts, so that other programs hardly matter; they are kept in build/times.json.
 """
 
 from __future__ import annotations
@@ -79,11 +79,12 @@ def main() -> None:
     times = json.loads(TIMES.read_text()) if words == ["--write"] else measure(words)
     left_out = slow(times)
     quick = sum(seconds for name, seconds in times.items() if name.partition("[")[0] not in left_out)
-    print(
-        f"{len(times)} tests take {sum(times.values()):.0f} s, without {len(left_out)} slow ones {quick:.0f} s"
-    )
+    print(f"{len(times)} tests: {sum(times.values()):.0f} s; without {len(left_out)} slow ones {quick:.0f} s")
     if words == ["--write"]:
-        LIST.write_text("\n".join(["tests/python", *(f"--deselect={test}" for test in left_out)]) + "\n")
+        files = {path.relative_to(ROOT).as_posix() for path in (ROOT / "tests/python").glob("test_*.py")}
+        unknown = sorted(files - {name.partition("::")[0] for name in times})
+        lines = ["tests/python", *(f"--deselect={test}" for test in sorted([*unknown, *left_out]))]
+        LIST.write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

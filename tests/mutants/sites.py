@@ -13,8 +13,8 @@ from pathlib import Path
 
 FOLDERS = {"fortran": ("fortran", "*.f90"), "python": ("pydriver/hexcontact", "*.py")}
 PAIRS = (
-    "+ -", "* /", "< <=", "> >=", ".and. .or.", ".true. .false.", ".eqv. .neqv.", "max min", "maxval minval", "any all",
-    "and or", "True False",
+    "+ -", "* /", "< <=", "> >=", ".and. .or.", ".true. .false.", ".eqv. .neqv.", "max min", "maxval minval",
+    "any all", "and or", "True False",
 )  # fmt: skip
 SWAPPED = {one: other for pair in PAIRS for one, other in (pair.split(), pair.split()[::-1])}
 SWAPPED |= {

@@ -22,6 +22,7 @@ import re
 import sys
 import time
 import tomllib
+from collections.abc import Collection
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
@@ -70,71 +71,53 @@ def suites() -> list[str]:
 
 
 def tests_of(path: str) -> tuple[list[str], list[str]]:
-    """Return the Fortran suites that use a folder of fortran/, and the Python tests that import a module."""
+    """Return the Fortran suites that use a folder of fortran/, and the Python tests that import a module or room."""
     file = ROOT / path
     if path.startswith("fortran"):
         modules = {f"hc_{other.stem}" for other in file.parent.glob("*.f90")}
         texts = {suite: (ROOT / f"tests/fortran/test_{suite}.f90").read_text() for suite in suites()}
-        using = [
-            suite
-            for suite, text in texts.items()
-            if modules & set(re.findall(r"^ *use (\w+)", text, re.MULTILINE))
-        ]
+        uses = {suite: re.findall(r"^ *use (\w+)", text, re.MULTILINE) for suite, text in texts.items()}
         core = (ROOT / "pydriver/hexcontact/core").glob("*.py")
-        callers = {
+        callers = [
             f"hexcontact.core.{other.stem}" for other in core if f"hc_{file.stem}" in other.read_text()
-        }
-    else:
-        using, callers = [], {".".join(Path(path).relative_to("pydriver").with_suffix("").parts)}
-    tests = sorted((ROOT / "tests/python").glob("test_*.py")) if callers else []
-    importing = [
+        ]
+        return [suite for suite in suites() if modules & set(uses[suite])], importing(callers)
+    module = ".".join(Path(path).relative_to("pydriver").with_suffix("").parts)
+    return [], importing([module]) or importing([module.rpartition(".")[0]])
+
+
+def importing(modules: Collection[str]) -> list[str]:
+    """Return the files of Python tests that import one of some modules, or a module of one of some rooms."""
+    starts = tuple(f"{module}." for module in modules)
+    tests = sorted((ROOT / "tests/python").glob("test_*.py")) if starts else []
+    return [
         f"tests/python/{test.name}"
         for test in tests
-        if any(f"{name}.".startswith(f"{module}.") for name in imports_of(test, "") for module in callers)
+        if any(f"{name}.".startswith(starts) for name in imports_of(test, ""))
     ]
-    return using, importing
 
 
 def examined(tree: Tree, mutant: Mutant, until: str, processes: int) -> Row:
     """Run the stages on a mutant; return what killed it in each: an empty text if nothing did."""
     row: Row = asdict(mutant)
-    using, importing = tests_of(mutant.path)
-    others = [suite for suite in suites() if suite not in using]
-    fortran = mutant.path.startswith("fortran")
+    using, tests = tests_of(mutant.path)
+    slow = [word for word in (ROOT / "tests/check.txt").read_text().split() if word.startswith("--")]
     with tree.changed(mutant) as reason:
         if reason:
             return row | {"invalid": reason}
-        row["folder"] = tree.fortran(using) or (importing and tree.python(importing)) or ""
-        if row["folder"] and (".py" not in row["folder"] or _is_quick(row["folder"])):
-            row["check"] = row["folder"]  # one of the quick tests
-        else:
-            row["check"] = (fortran and tree.fortran(others)) or tree.python(["@tests/check.txt"])
+        row["folder"] = tree.fortran(using) or (tests and tree.python([*tests, *slow])) or ""
+        row["check"] = row["folder"]
+        if not row["check"] and mutant.path.startswith("fortran"):
+            row["check"] = tree.fortran([suite for suite in suites() if suite not in using])
+        row["check"] = row["check"] or tree.python(["@tests/check.txt"])
         if until == "suite" and not row["check"]:
-            row["suite"] = row["folder"] or tree.python(
-                [*importing, "tests/python", "-m", "not alone"], processes
-            )
+            row["suite"] = tree.python([*tests, "tests/python", "-m", "not alone"], processes)
     return row
-
-
-def _is_quick(test: str) -> bool:
-    """Test whether a Python test is one of those of `make check`."""
-    name = f"tests/python/{test.partition(': ')[0]}"
-    listed = (ROOT / "tests/check.txt").read_text().split()
-    named = [
-        entry
-        for entry in listed
-        if re.match(rf"{re.escape(entry.removeprefix('--deselect='))}(::|\[|$)", name)
-    ]
-    return bool(named) and not any(entry.startswith("--") for entry in named)
 
 
 def killed_by(row: Row, stage: str) -> str | None:
     """Return the test that kills a mutant up to a stage; None: it was not tried."""
-    if row.get("check"):
-        return row["check"]
-    if stage == "check":
-        return row.get("check")
-    return row.get("suite") or row.get("folder") or row.get("suite")
+    return row.get("check") or row.get(stage)
 
 
 def run(language: str, arguments: argparse.Namespace) -> None:

@@ -143,7 +143,7 @@ class Tree:
         ]
         kept = ["--dist=loadscope", f"--basetemp={self.temporary}"]
         done = self._run([*pytest, *kept, *words])
-        if not done.returncode:
+        if done.returncode in (0, 5):  # passed, or all are slow
             return ""
         named = re.search(r"^(?:FAILED|ERROR) tests/python/(\S+)", done.stdout, re.MULTILINE)
         at = self.at.read_text().removeprefix("tests/python/")

@@ -107,7 +107,7 @@ bench: install  ## work, times, memory, other codes side by side: tables of docs
 
 # --- tests -------------------------------------------------------------------
 
-check: install $(STAMPS)/extra-test  ## the quick tests: each part once, in less than a minute
+check: install $(STAMPS)/extra-test  ## all tests but the slow ones (tests/check.txt), in less than a minute
 	@meson test -C $(BUILD) --quiet --print-errorlogs
 	@$(py) -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
 

@@ -38,6 +38,7 @@ contains
     tests = [ &
       new_test('any_order', test_any_order), &
       new_test('near_compliance', test_near_compliance), &
+      new_test('residual', test_residual), &
       new_test('start', test_start), &
       new_test('fronts', test_fronts), &
       new_test('fronts_at_the_rim', test_rim), &
@@ -127,6 +128,35 @@ contains
       end do
     end do
   end subroutine test_near_compliance
+
+  !> The residual after a sweep is that of the displacements that it leaves, those computed anew for their rounding errors, too.
+  subroutine test_residual(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t), target :: contact
+    type(operators_t), target :: operators
+    type(contact_state_t) :: state
+    type(friction_iterate_t) :: now
+    real(wp) :: residual
+    integer :: sweep
+
+    call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(0.5_wp), error, n_threads=1)
+    if (allocated(error)) return
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call now%set_start(contact%problem, operators, state, state%relative_displacement, &
+                       load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+    if (allocated(error)) return
+    do sweep = 1, 6
+      if (sweep == 4) contact%problem%options%newton%displacement_rounding = 0.0_wp
+      call staggered_sweep(now, error)
+      if (allocated(error)) return
+      residual = now%residual_tangential
+      call now%find_tangential_residual()
+      call check(error, residual, now%residual_tangential, 0.0_wp, 'residual of the shear traction')
+      if (allocated(error)) return
+    end do
+  end subroutine test_residual
 
   !> Unlike bodies pressed by an approach begin in contact where they would overlap, with any pressure.
   subroutine test_start(error)

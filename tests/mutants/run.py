@@ -71,7 +71,7 @@ def suites() -> list[str]:
 
 
 def tests_of(path: str) -> tuple[list[str], list[str]]:
-    """Return the Fortran suites that use a folder of fortran/, and the Python tests that import a module or room."""
+    """Return the Fortran suites that use a folder of fortran/, and the Python tests that import a module."""
     file = ROOT / path
     if path.startswith("fortran"):
         modules = {f"hc_{other.stem}" for other in file.parent.glob("*.f90")}

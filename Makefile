@@ -7,6 +7,7 @@
 #   PYTEST_JOBS=4                processes that share the Python tests; 0: all in one
 #   BENCH_ARGS='--only counts'   more words for the benchmarks
 #   CHECKS='fretting torsion'    which comparisons make verify makes
+#   MUTANTS_ARGS='--until check' more words for make mutants
 
 VENV := .venv
 STAMPS := $(VENV)/.stamps
@@ -55,7 +56,7 @@ sources := $(build_files) $(library_sources) $(python_sources) $(fortran_tests)
 .DEFAULT_GOAL := help
 # The steps are in order; make -j would only mix their output.
 .NOTPARALLEL:
-.PHONY: help install demo check test test-fortran test-python debug-test debug-check perturbed-test coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
+.PHONY: help install demo check test test-fortran test-python debug-test debug-check perturbed-test mutants coverage package verify bench lint format docs docs-links pictures editable coverage-report clean distclean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -108,7 +109,7 @@ bench: install  ## work, times, memory, other codes side by side: tables of docs
 
 # --- tests -------------------------------------------------------------------
 
-check: install $(STAMPS)/extra-test  ## the quick tests: each part once, in less than a minute
+check: install $(STAMPS)/extra-test  ## all tests but the slow ones (tests/check.txt), in less than a minute
 	@meson test -C $(BUILD) --quiet --print-errorlogs
 	@$(py) -m pytest --quiet --numprocesses=$(PYTEST_JOBS) --maxprocesses=8 @tests/check.txt
 
@@ -140,6 +141,9 @@ perturbed-test: $(STAMPS)/build-tools $(STAMPS)/installed $(STAMPS)/extra-test  
 	$(call build_apart,$(PERTURBED_SITE),$(PERTURBED_BUILD),perturb_convolution=true)
 	@meson test -C $(PERTURBED_BUILD) --print-errorlogs
 	@PYTHONPATH=$(CURDIR)/$(PERTURBED_SITE) $(py) $(pytest)
+
+mutants: install $(STAMPS)/extra-test  ## wrong lines in copies of the sources: which tests find them? (hours; goes on where it was stopped)
+	@$(py) tests/mutants/run.py --build $(BUILD) $(MUTANTS_ARGS)
 
 # What coverage leaves out: tests that judge time, memory or standard error, on which counters tell; and many
 # that only repeat what others reach.

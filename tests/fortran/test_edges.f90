@@ -2,13 +2,17 @@
 module test_edges
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use hc_precision, only: wp, pi
+  use hc_options, only: edge_options_t
   use hc_error, only: error_t, status
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_lapack, only: least_squares
   use hc_interpolation, only: interpolate, interpolate_pressure, nearest_node
   use hc_zone_estimators, only: area_radius, boundary, boundary_circle, circle_fit_t, edge_ellipse, edge_radius, &
     ellipse_t, moment_ellipse, pressure_center
+  use hc_edge_fit, only: fit_squares
+  use hc_edge_band, only: edge_band_t, new_edge_band
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
+  use hc_traction_field, only: new_traction_field, traction_field_t
   use hc_zone_edge, only: cut_triangles, zone_edge_t, zone_mesh_t
   use hc_elastic_pair, only: elastic_pair_t
   use hc_contact_state, only: contact_state_t, force_control
@@ -43,7 +47,10 @@ contains
       new_test('few_nodes_stick', test_few_nodes), &
       new_test('symmetric_nodes', test_symmetric_nodes), &
       new_test('between_nodes', test_between), &
-      new_test('pressure_between_nodes', test_pressure_between) &
+      new_test('pressure_between_nodes', test_pressure_between), &
+      new_test('shear_between_nodes', test_shear_between), &
+      new_test('band', test_band), &
+      new_test('fit_of_squares', test_fit) &
     ]
   end subroutine collect_edges
 
@@ -411,5 +418,168 @@ contains
     call check(error, interpolate_pressure(lattice, state%pressure, squares, at), &
                interpolate(lattice, state%pressure, at, 0.0_wp), 0.0_wp, 'pressure in the middle')
   end subroutine test_pressure_between
+
+  !> Cattaneo and Mindlin: q = mu p0 (sqrt(1 - r^2) - c sqrt(1 - r^2/c^2)) on Hertz' pressure, stick within c; between the nodes,
+  !> too, and where the shear traction has a bound, and friction a reserve of its own.
+  subroutine test_shear_between(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+    type(traction_field_t) :: field
+    real(wp), allocatable :: x(:, :), y(:, :), r(:, :), traction(:, :, :), mu(:, :), reserve(:, :)
+    real(wp), parameter :: radius = 31.3_wp, stick = 17.6_wp, bound = 0.4_wp, coefficient = 0.5_wp
+    real(wp) :: at(2), found(3)
+    integer :: k
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    r = hypot(x, y)
+    allocate (traction(size(x, 1), size(x, 2), 3), source=0.0_wp)
+    traction(:, :, 1) = pressure(r)
+    traction(:, :, 2) = shear(r)
+    mu = 0.0_wp*x + coefficient
+    call new_contact_edges(edges, lattice, traction(:, :, 1), max(r - radius, 0.0_wp)**1.5_wp, r < radius, x < huge(1.0_wp))
+    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, mu)
+    reserve = merge(coefficient*pressure(r) - shear(r), 0.0_wp, r < stick)
+    call check(error, maxval(abs(field%reserve - reserve)), 0.0_wp, 1.0e-14_wp, 'reserve of the nodes that stick')
+    if (allocated(error)) return
+    do k = 1, 500
+      at = 0.07_wp*k*[cos(1.7_wp*k), sin(1.7_wp*k)]
+      found = field%at(at)
+      call check(error, found(2:3), [shear(norm2(at)), 0.0_wp], 0.03_wp, 'shear traction between the nodes')
+      if (allocated(error)) return
+      call check_true(error, norm2(found(2:3)) <= coefficient*found(1) + 1.0e-15_wp, 'within friction')
+      if (allocated(error)) return
+    end do
+    ! a bound below mu p in the middle
+    traction(:, :, 2) = min(traction(:, :, 2), bound - 0.1_wp)
+    call new_traction_field(field, lattice, edges, traction, r < radius, r < stick, mu, mu/coefficient*bound)
+    reserve = merge(min(coefficient*pressure(r), bound) - traction(:, :, 2), 0.0_wp, r < stick)
+    call check(error, maxval(abs(field%reserve - reserve)), 0.0_wp, 1.0e-14_wp, 'reserve below a bound')
+
+  contains
+
+    elemental real(wp) function pressure(r)
+      real(wp), intent(in) :: r
+      pressure = sqrt(max(1.0_wp - (r/radius)**2, 0.0_wp))
+    end function pressure
+
+    elemental real(wp) function shear(r)
+      real(wp), intent(in) :: r
+      shear = coefficient*(pressure(r) - stick/radius*sqrt(max(1.0_wp - (r/stick)**2, 0.0_wp)))
+    end function shear
+
+  end subroutine test_shear_between
+
+  !> About the edge of a disc: nodes whose neighbors are all in a part, and nodes beside it, are those of rings of the lattice.
+  subroutine test_band(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(edge_band_t) :: band
+    real(wp), allocatable :: x(:, :), y(:, :)
+    logical, allocatable :: part(:), hole(:, :)
+
+    call new_window(lattice, x, y, error)
+    if (allocated(error)) return
+    call new_edge_band(band, hypot(x, y) < 20.0_wp, edge_options_t())
+    ! the whole band but for one node, which lies in the middle of it
+    allocate (hole(size(x, 1), size(x, 2)), source=.true.)
+    hole(51 + 20, 51) = .false.
+    part = band%part_of(hole)
+    call check(error, count(.not. part), 1, 'the hole is in the band')
+    if (allocated(error)) return
+    call check_true(error, all(band%surrounded(part) .eqv. surrounded(part)), 'nodes that are surrounded')
+    if (allocated(error)) return
+    call check_true(error, all(band%next_to(.not. part) .eqv. beside(.not. part)), 'nodes beside the hole')
+    if (allocated(error)) return
+    call check(error, count(band%next_to(.not. part)), 6, 'six of them')
+
+  contains
+
+    !> Distances of one spacing make neighbors.
+    pure function neighbors_of(k) result(is)
+      integer, intent(in) :: k
+      logical :: is(band%n)
+      integer :: j
+
+      do j = 1, band%n
+        associate (step => matmul(equilateral_basis(1.0_wp), real(band%node(:, j) - band%node(:, k), wp)))
+          is(j) = abs(norm2(step) - 1.0_wp) < 1.0e-9_wp
+        end associate
+      end do
+    end function neighbors_of
+
+    function surrounded(part) result(is)
+      logical, intent(in) :: part(:)
+      logical :: is(size(part))
+      integer :: k
+
+      do k = 1, size(part)
+        is(k) = part(k) .and. count(neighbors_of(k) .and. part) == 6
+      end do
+    end function surrounded
+
+    function beside(part) result(is)
+      logical, intent(in) :: part(:)
+      logical :: is(size(part))
+      integer :: k
+
+      do k = 1, size(part)
+        is(k) = any(neighbors_of(k) .and. part)
+      end do
+    end function beside
+
+  end subroutine test_band
+
+  !> Squares that are a paraboloid are met exactly, whatever errors the nodes had; a half turn of the window, which cuts the
+  !> contact, turns the fit of any others.
+  subroutine test_fit(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(edge_options_t) :: options
+    type(lattice_t) :: lattice
+    integer, parameter :: m = 14, l = 11
+    real(wp), dimension(m, l) :: x, y, distance, exact, squares, turned
+    logical :: inner(m, l)
+    integer :: k
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [m, l], error)
+    if (allocated(error)) return
+    call lattice%coordinates(x, y)
+    ! the edge runs from one side of the window to the opposite one
+    distance = 0.8_wp*(x - y) - 1.1_wp
+    exact = 3.0_wp + 0.5_wp*x - 0.7_wp*y + 0.02_wp*x**2 - 0.03_wp*x*y + 0.01_wp*y**2
+    options%fit_share = 1.0_wp
+    squares = exact + 0.1_wp
+    call fit_squares(squares, sign(sqrt(abs(exact)), exact), distance, options)
+    ! in the corners there are too few nodes
+    inner = .false.
+    inner(4:m - 3, 4:l - 3) = .true.
+    associate (near => inner .and. distance <= options%fit_depth .and. distance >= 0.0_wp)
+      call check_true(error, count(near) > 5, 'there are nodes to be fitted')
+      if (allocated(error)) return
+      call check(error, maxval(abs(squares - exact), mask=near), 0.0_wp, 1.0e-9_wp, 'a paraboloid')
+      if (allocated(error)) return
+      call check(error, maxval(abs(squares - exact - 0.1_wp), mask=distance > options%fit_depth), 0.0_wp, 1.0e-14_wp, &
+                 'nothing else is touched')
+    end associate
+    if (allocated(error)) return
+    exact = sqrt(max(distance, 0.0_wp))*(1.0_wp + 0.1_wp*reshape(sin([(1.3_wp*k, k=1, m*l)]), [m, l]))
+    ! edges everywhere, on all sides of the window
+    distance = 1.5_wp + sin(x + 2.0_wp*y)
+    squares = exact**2
+    call fit_squares(squares, exact, distance, options)
+    turned = half_turn(exact**2)
+    call fit_squares(turned, half_turn(exact), half_turn(distance), options)
+    call check(error, maxval(abs(half_turn(turned) - squares)), 0.0_wp, 1.0e-9_wp, 'a half turn')
+
+  contains
+
+    pure function half_turn(field) result(turned)
+      real(wp), intent(in) :: field(m, l)
+      real(wp) :: turned(m, l)
+      turned = field(m:1:-1, l:1:-1)
+    end function half_turn
+
+  end subroutine test_fit
 
 end module test_edges

@@ -12,7 +12,7 @@ module test_friction
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, force_control, displacement_control, &
     separated, stick, slip, normal, about_z
   use hc_coulomb, only: coulomb_t
-  use hc_disc_law, only: linearize, on_cone, normal_to
+  use hc_disc_law, only: linearize, magnitude, on_cone, normal_to
   use hc_contact_residuals, only: tangential_residual, tangential_self_compliance
   use hc_contact_problem, only: friction_problem_t, new_friction_problem
   use hc_active_set, only: active_set_t, new_active_set
@@ -75,6 +75,11 @@ contains
     call check(error, on_cone([3.0_wp, -4.0_wp], rough%bound(0.0_wp)), [3.0_wp, -4.0_wp], 0.0_wp, 'no slip')
     if (allocated(error)) return
     call check(error, normal_to([0.6_wp, 0.8_wp]), [-0.8_wp, 0.6_wp], 0.0_wp, 'a quarter turn ahead')
+    if (allocated(error)) return
+    ! squares of either component would overflow or vanish
+    call check(error, [magnitude([1.0e200_wp, 1.0_wp])/1.0e200_wp, magnitude([-1.0_wp, 1.0e200_wp])/1.0e200_wp, &
+                       magnitude([3.0e-200_wp, 4.0e-200_wp])/1.0e-200_wp], [1.0_wp, 1.0_wp, 5.0_wp], 1.0e-14_wp, &
+               'lengths beyond the range of squares')
   end subroutine test_law
 
   !> Stick inside of the disc, direction and compliance outside; D -> |ds|/(mu p) at the solution, for any r.
@@ -337,6 +342,17 @@ contains
       call check(error, state%zone(2, 1), merge(stick, slip, i == 1), 'zone of a node that hardly moves')
       if (allocated(error)) return
     end do
+
+    ! no tolerance, a bound that rounding exceeds: what does not move at all sticks
+    reference(2, 1, :) = state%relative_displacement(2, 1, :)
+    state%traction(2, 1, 2) = 2.0_wp*(1.0_wp + 4.0_wp*epsilon(1.0_wp))
+    call take(displacement)
+    call problem%complete_state(target, 0.0_wp, reference, state)
+    call check(error, state%slip_increment(2, 1, :), [0.0_wp, 0.0_wp], 0.0_wp, 'no slip')
+    if (allocated(error)) return
+    call check(error, state%zone(2, 1), stick, 'zone of a node that does not move')
+    if (allocated(error)) return
+    state%traction(2, 1, 2) = 2.0_wp
 
     ! what is no number is no solution
     call ieee_get_halting_mode(ieee_invalid, halting)

@@ -38,7 +38,10 @@ contains
     tests = [ &
       new_test('any_order', test_any_order), &
       new_test('near_compliance', test_near_compliance), &
+      new_test('residual', test_residual), &
+      new_test('start', test_start), &
       new_test('fronts', test_fronts), &
+      new_test('fronts_at_the_rim', test_rim), &
       new_test('load_factor', test_load_factor), &
       new_test('load_factor_of_shifts', test_load_factor_of_shifts) &
     ]
@@ -126,6 +129,61 @@ contains
     end do
   end subroutine test_near_compliance
 
+  !> The residual after a sweep is that of the displacements that it leaves, those computed anew for their rounding errors, too.
+  subroutine test_residual(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t), target :: contact
+    type(operators_t), target :: operators
+    type(contact_state_t) :: state
+    type(friction_iterate_t) :: now
+    real(wp) :: residual
+    integer :: sweep
+
+    call new_sphere(contact, 10, 0.0_wp, 0.0_wp, coulomb_t(0.5_wp), error, n_threads=1)
+    if (allocated(error)) return
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call now%set_start(contact%problem, operators, state, state%relative_displacement, &
+                       load_target_t([f, f, f, f], [load, 0.2_wp*load, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+    if (allocated(error)) return
+    do sweep = 1, 6
+      if (sweep == 4) contact%problem%options%newton%displacement_rounding = 0.0_wp
+      call staggered_sweep(now, error)
+      if (allocated(error)) return
+      residual = now%residual_tangential
+      call now%find_tangential_residual()
+      call check(error, residual, now%residual_tangential, 0.0_wp, 'residual of the shear traction')
+      if (allocated(error)) return
+    end do
+  end subroutine test_residual
+
+  !> Unlike bodies pressed by an approach begin in contact where they would overlap, with any pressure.
+  subroutine test_start(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t) :: contact
+    type(operators_t) :: operators
+    type(contact_state_t) :: state
+    type(friction_iterate_t) :: now
+    real(wp), parameter :: approach = 0.3_wp
+
+    call new_sphere(contact, 10, 0.0_wp, 0.5_wp, coulomb_t(1.0_wp), error, n_threads=1)
+    if (allocated(error)) return
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    if (allocated(error)) return
+    call new_friction_state(state, contact%problem%lattice)
+    call now%set_start(contact%problem, operators, state, state%relative_displacement, &
+                       load_target_t([d, f, f, f], [approach, 0.0_wp, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+    if (allocated(error)) return
+    associate (overlap => reshape(contact%problem%initial_gap < approach, [size(now%p)]))
+      call check_true(error, any(overlap) .and. .not. all(overlap), 'the bodies overlap somewhere')
+      if (allocated(error)) return
+      call check_true(error, all(now%contact .eqv. overlap), 'contact where they overlap')
+      if (allocated(error)) return
+      call check_true(error, all((now%p > 0.0_wp) .eqv. overlap) .and. now%without_start, 'pressure there')
+    end associate
+  end subroutine test_start
+
   !> Relaxed fronts are nearer to those of the solution; small contacts do without.
   subroutine test_fronts(error)
     type(error_t), allocatable, intent(out) :: error
@@ -176,6 +234,49 @@ contains
     end function count_wrong
 
   end subroutine test_fronts
+
+  !> Relaxation leaves alone the nodes at the rim of the window, whose neighbors are not all there, and those far from the front.
+  subroutine test_rim(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(frictional_contact_t), target :: contact
+    type(operators_t), target :: operators
+    type(contact_state_t) :: start
+    type(friction_iterate_t), target :: now
+    real(wp), allocatable :: change(:, :)
+    real(wp), allocatable, target :: reference(:, :, :)
+    integer, parameter :: beside_rim(2, 4) = reshape([2, 7, 12, 7, 7, 2, 7, 12], [2, 4])
+    integer :: at(2), k
+
+    call new_sphere(contact, 6, 0.0_wp, 0.0_wp, coulomb_t(0.5_wp), error, n_threads=1)
+    if (allocated(error)) return
+    contact%problem%options%newton%front_nodes = 0
+    call new_operators(operators, contact%problem%lattice, contact%problem%pair, field_space_t(), error)
+    if (allocated(error)) return
+    ! contact all over the window of 13 by 13 nodes; one node next to its rim slips, the others stick
+    do k = 1, 4
+      at = beside_rim(:, k)
+      call new_friction_state(start, contact%problem%lattice)
+      start%pressure = 1.0_wp
+      start%traction(at(1), at(2), 1) = 0.6_wp
+      reference = start%relative_displacement
+      reference(at(1), at(2), 1) = contact%problem%tangential_compliance
+      now = friction_iterate_t()
+      call now%set_start(contact%problem, operators, start, reference, &
+                         load_target_t([f, d, d, d], [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), 1.0e-9_wp, error)
+      if (allocated(error)) return
+      now%first = .false.
+      call relax_fronts(now)
+      associate (n => size(now%p))
+        change = reshape(abs(now%q(:n) - reshape(start%traction(:, :, 1), [n])), shape(start%pressure))
+      end associate
+      call check_true(error, change(at(1), at(2)) > 0.05_wp, 'the node that slips')
+      if (allocated(error)) return
+      call check(error, maxval([change(1, :), change(13, :), change(:, 1), change(:, 13)]), 0.0_wp, 0.0_wp, 'rim of the window')
+      if (allocated(error)) return
+      call check(error, change(14 - at(1), 14 - at(2)), 0.0_wp, 0.0_wp, 'the other side of the window')
+      if (allocated(error)) return
+    end do
+  end subroutine test_rim
 
   !> Shift and torque on Hertz' pressure: too much by a thousandth, and not quite.
   !>

@@ -12,6 +12,7 @@ module test_interface
   use hc_frictional_contact, only: frictional_contact_t, new_frictional_contact
   use hc_direct_friction, only: direct_friction_t, new_direct_friction
   use hc_power_interface, only: power_interface_t
+  use hc_nodal_springs, only: nodal_springs_t
   use hc_normal_contact, only: normal_contact_t, new_normal_contact
   use hc_direct_contact, only: direct_contact_t, new_direct_contact
   use testing, only: test_t, new_test, check, check_true
@@ -45,6 +46,8 @@ contains
       new_test('reference_sphere', test_sphere), &
       new_test('direct_as_fft', test_direct), &
       new_test('rigid_flat', test_flat), &
+      new_test('nodal_springs', test_nodal_springs), &
+      new_test('soft_layer', test_soft), &
       new_test('first_order', test_first_order), &
       new_test('stiff_layer', test_stiff), &
       new_test('friction', test_friction), &
@@ -171,6 +174,32 @@ contains
     end do
   end subroutine test_flat
 
+  !> Rows of springs: none off the contact, none softer than the softest; what is wrong is a part of d_n p + C p or g + C p.
+  subroutine test_nodal_springs(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(nodal_springs_t) :: law
+    logical, parameter :: contact(3) = [.true., .false., .true.]
+    real(wp) :: compliance(3), offset(3), worst
+
+    call check_true(error, .not. law%is_compliant(), 'no springs')
+    if (allocated(error)) return
+    law%spring = [9.0_wp, 9.0_wp, 2.0_wp, 3.0_wp, 7.0_wp]
+    call check_true(error, law%is_compliant(), 'springs')
+    if (allocated(error)) return
+    ! of the nodes 3 to 5
+    call law%linearize(3, 1.0_wp, 5.0_wp, [1.0_wp, 1.0_wp, 1.0_wp], [0.0_wp, 0.0_wp, 0.0_wp], contact, compliance, offset)
+    call check(error, [compliance, offset], [2.0_wp, 0.0_wp, 5.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 'compliances and offsets')
+    if (allocated(error)) return
+    ! C p + min(d_n p, g) with d_n = 0.5: 2 - 2; 3*2 + min(1, -4) = 2; the last node is no candidate
+    worst = 0.0_wp
+    call law%violation(3, 0.5_wp, [1.0_wp, 2.0_wp, 1.0_wp], [-2.0_wp, -4.0_wp, 9.0_wp], [.true., .true., .false.], worst)
+    call check(error, worst, 4.0_wp, 0.0_wp, 'violation over d_n')
+    if (allocated(error)) return
+    worst = 5.0_wp
+    call law%violation(1, 0.5_wp, [0.0_wp], [1.0_wp], [.true.], worst)
+    call check(error, worst, 5.0_wp, 0.0_wp, 'a smaller violation than before')
+  end subroutine test_nodal_springs
+
   !> A stiff layer adds (m/(m+1)) (p0/c)^(1/m) to the approach of a sphere, to the first order: the rest falls faster.
   subroutine test_first_order(error)
     type(error_t), allocatable, intent(out) :: error
@@ -201,6 +230,24 @@ contains
     end do
     call check_true(error, rest(1) < 0.05_wp .and. rest(2) < 0.5_wp*rest(1), 'first order')
   end subroutine test_first_order
+
+  !> On a layer as soft as the bodies the pressure is smooth: what coarser lattices find is nearly that of the finest, where two
+  !> products are left to be made, one and a half with those on the coarser ones.
+  subroutine test_soft(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(normal_contact_t), target :: contact
+    type(contact_state_t) :: state
+    type(lattice_t) :: lattice
+    real(wp), allocatable :: gap(:, :)
+
+    call new_sphere(40, 80, lattice, gap, error)
+    if (allocated(error)) return
+    call new_normal_contact(contact, lattice, pair, gap, gap < 9.0_wp, error, law=power_interface_t(2.0_wp/pi, 1.5_wp))
+    if (allocated(error)) return
+    call contact%solve(force_control, 4.0_wp/3.0_wp, 1.0e-8_wp, 60, state, error)
+    if (allocated(error)) return
+    call check_true(error, state%operator_applications < 1.65_wp, 'few products')
+  end subroutine test_soft
 
   !> A layer stiffer than rounding errors can resolve is none.
   subroutine test_stiff(error)

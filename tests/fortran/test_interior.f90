@@ -1,6 +1,7 @@
 !> Displacement and stress below the surface against 20-digit values and against each other. Errors are relative to
 !> the envelopes 1/(4 pi max(1, R)) of the displacement and 1/(2 pi max(1, R)^2) of the stress.
 module test_interior
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_options, only: edge_options_t
@@ -284,12 +285,30 @@ contains
     type(interior_planes_t) :: planes
     type(lattice_t) :: lattice
     type(error_t), allocatable :: raised
-    real(wp) :: u(3, 3, 1), s(6, 3, 1)
+    real(wp) :: u(3, 3, 1), s(6, 3, 1), point(3), ratio(2)
+    integer :: i
 
     call new_interior_pyramid(pyramid, equilateral_basis(1.0_wp))
     call pyramid%fields([0.0_wp], [0.0_wp], [-1.0e-300_wp], 0.3_wp, u, s, raised)
     call check_true(error, allocated(raised), 'a point above the surface is refused')
     if (allocated(error)) return
+    do i = 1, 3
+      point = 1.0_wp
+      point(i) = ieee_value(1.0_wp, ieee_quiet_nan)
+      call pyramid%fields(point(1:1), point(2:2), point(3:3), 0.3_wp, u, s, raised)
+      call check_true(error, allocated(raised), 'a coordinate that is not a number is refused')
+      if (allocated(error)) return
+      point(i) = 1.0e101_wp
+      call pyramid%fields(point(1:1), point(2:2), point(3:3), 0.3_wp, u, s, raised)
+      call check_true(error, allocated(raised), 'a point far away is refused')
+      if (allocated(error)) return
+    end do
+    ratio = [-1.0_wp, ieee_value(1.0_wp, ieee_quiet_nan)]
+    do i = 1, 2
+      call pyramid%fields([0.0_wp], [0.0_wp], [1.0_wp], ratio(i), u, s, raised)
+      call check_true(error, allocated(raised), 'a ratio of Poisson of -1, or none, is refused')
+      if (allocated(error)) return
+    end do
     call pyramid%fields([0.0_wp], [0.0_wp], [0.0_wp], 0.6_wp, u, s, raised)
     call check_true(error, allocated(raised), 'a ratio of Poisson of 0.6 is refused')
     if (allocated(error)) return

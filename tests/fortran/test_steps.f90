@@ -4,7 +4,7 @@ module test_steps
   use hc_precision, only: wp, pi
   use hc_error, only: error_t, status
   use hc_contact_state, only: contact_state_t, new_friction_state, load_target_t, normal, along_x, about_z, &
-    displacement_control, rim_reached, stick
+    displacement_control, rim_reached, separated, slip, stick
   use hc_coulomb, only: coulomb_t
   use hc_field_space, only: field_space_t
   use hc_frictional_contact, only: frictional_contact_t
@@ -19,6 +19,8 @@ module test_steps
   use hc_contact_residuals, only: normal_self_compliance
   use hc_elastic_pair, only: elastic_pair_t
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
+  use hc_wear_ahead, only: energy_ahead, worn_cycle_t
+  use hc_normal_law, only: unilateral_t
   use hc_wear_jumps, only: energy_of_second_jump, jump_change, wear_by
   use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
     oblique_error, oblique_steps, slip_ring
@@ -50,7 +52,9 @@ contains
       new_test('limits_of_error', test_limits), &
       new_test('cycles', test_cycles), &
       new_test('expected_errors', test_expected), &
-      new_test('wear_jumps', test_wear_jumps) &
+      new_test('wear_jumps', test_wear_jumps), &
+      new_test('wear_ahead', test_wear_ahead), &
+      new_test('change_by_halves', test_change_by_halves) &
     ]
   end subroutine collect_steps
 
@@ -501,5 +505,87 @@ contains
     if (allocated(error)) return
     call check(error, oblique_error(oblique_steps(0.1_wp, 0.2_wp), 0.2_wp), 0.1_wp, thr, 'oblique steps for an error')
   end subroutine test_expected
+
+  !> Archard: flats that do not deform wear until every node wears alike, and carries a pressure that falls with its path.
+  subroutine test_wear_ahead(error)
+    type(error_t), allocatable, intent(out) :: error
+    integer, parameter :: n = 12
+    real(wp), dimension(n, n) :: energy, path, pressure, gap, friction, ahead
+    logical :: carries(n, n)
+    type(lattice_t) :: lattice
+    integer :: k
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [0, 0], [n, n], error)
+    if (allocated(error)) return
+    path = 0.5_wp + 0.1_wp*reshape([(mod(7*k, 11), k=1, n*n)], [n, n])
+    friction = 0.2_wp + 0.05_wp*reshape([(mod(3*k, 5), k=1, n*n)], [n, n])
+    carries = .false.
+    carries(4:9, 3:8) = .true.
+    pressure = merge(1.0_wp + 0.1_wp*reshape([(mod(5*k, 13), k=1, n*n)], [n, n]), 0.0_wp, carries)
+    energy = friction*pressure*path
+    gap = merge(0.0_wp, 10.0_wp, carries)
+    call energy_ahead(worn_cycle_t(energy, path, pressure, gap, carries, friction, .true.), lattice, &
+                      elastic_pair_t(1.0e-5_wp, 0.0_wp, 0.0_wp), unilateral_t(), 0.01_wp, 100.0_wp, 1.0e-9_wp, ahead, error, &
+                      field_space_t())
+    if (allocated(error)) return
+    ! the load stays: p = P/(A path) over the mean of 1/path
+    pressure = merge(sum(pressure)/sum(1.0_wp/path, mask=carries)/path, 0.0_wp, carries)
+    call check(error, maxval(abs(ahead - friction*pressure*path)), 0.0_wp, 1.0e-3_wp, 'energy of every node')
+  end subroutine test_wear_ahead
+
+  !> Cattaneo and Mindlin, c/a = 0.5 at the middle of a step and 0.2 at its end: Q = mu P (1 - (c/a)^3), so that the stick area
+  !> changes by (0.5^2 - 0.2^2)/(0.5^3 - 0.2^3) of the change of the tractions.
+  subroutine test_change_by_halves(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t) :: lattice
+    type(contact_state_t) :: virgin, half, halves, whole
+    type(step_change_t) :: change
+    integer, parameter :: n = 30
+    real(wp), parameter :: radius = 25.3_wp, c(2) = [0.5_wp, 0.2_wp], unit = 1.0e9_wp
+    real(wp), allocatable :: x(:, :), y(:, :)
+
+    call new_lattice(lattice, equilateral_basis(1.0_wp), [-n, -n], [2*n + 1, 2*n + 1], error)
+    if (allocated(error)) return
+    allocate (x(2*n + 1, 2*n + 1), y(2*n + 1, 2*n + 1))
+    call lattice%coordinates(x, y)
+    call new_friction_state(virgin, lattice)
+    half = sheared(c(1))
+    halves = sheared(c(2))
+    whole = halves
+    whole%traction = whole%traction*1.01_wp
+    associate (p => halves%pressure, area => pi*radius**2)
+      call compare_halves(lattice, x < 100.0_wp, coulomb_t(mu), whole, half, halves, virgin, virgin, area, change, field_space_t())
+      if (allocated(error)) return
+      call check(error, change%gain, (c(1)**2 - c(2)**2)/(c(1)**3 - c(2)**3), 0.03_wp, 'gain')
+      if (allocated(error)) return
+      call check(error, change%traction, 0.01_wp*(1.0_wp - c(2)**3), 1.0e-4_wp, 'change of the tractions')
+      if (allocated(error)) return
+      call check(error, change%added, change%traction, 1.0e-12_wp, 'all of it is new')
+      if (allocated(error)) return
+      call check(error, change%stick, 0.0_wp, 0.01_wp, 'the same stick area')
+      if (allocated(error)) return
+      ! an area that was twice as large halves everything
+      call compare_halves(lattice, x < 100.0_wp, coulomb_t(mu), whole, half, halves, whole, halves, 2.0_wp*area, change, &
+                          field_space_t())
+      call check(error, [change%traction, change%added], [0.005_wp*(1.0_wp - c(2)**3), 0.0_wp], 5.0e-5_wp, &
+                 'beside a contact that was larger, inherited')
+    end associate
+
+  contains
+
+    !> Tractions over Hertz' pressure, in pascal
+    type(contact_state_t) function sheared(c)
+      real(wp), intent(in) :: c
+      real(wp) :: r(size(x, 1), size(x, 2))
+
+      call new_friction_state(sheared, lattice)
+      r = hypot(x, y)/radius
+      sheared%pressure = unit*sqrt(max(1.0_wp - r**2, 0.0_wp))
+      sheared%traction(:, :, 1) = mu*(sheared%pressure - unit*c*sqrt(max(1.0_wp - (r/c)**2, 0.0_wp)))
+      sheared%gap = max(r - 1.0_wp, 0.0_wp)**1.5_wp
+      sheared%zone = merge(separated, merge(stick, slip, r < c), r > 1.0_wp)
+    end function sheared
+
+  end subroutine test_change_by_halves
 
 end module test_steps

@@ -8,6 +8,10 @@ from hypothesis import settings
 settings.register_profile("seeded", derandomize=True, database=None)
 settings.load_profile("seeded")
 
+# Processes of one session share the cores: threads of BLAS beside them would only wait for each other.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # A shell that runs tests in the background has them ignore Ctrl-C, and so what they start; some send it.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

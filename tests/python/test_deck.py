@@ -694,11 +694,17 @@ def test_a_history_that_is_appended_to_is_the_whole_one() -> None:
     assert [problem.key for problem in grown.problems] == [("load", 4, "ramp")]
 
 
-def test_a_history_of_too_many_steps_is_refused_before_it_is_unrolled() -> None:
+def test_a_history_of_too_many_steps_is_refused_before_it_is_unrolled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     path = [{"normal_load": 1.0, "steps": 100_000}]
     assert complaints({"repeat": 100_000, "path": path}, mu=0.0) == {
         "load": "expected at most 100000 load steps in all, not 10000000000"
     }
+    monkeypatch.setattr("hexcontact.problem.loads.MOST_STEPS", 6)
+    assert len(history({"repeat": 3, "path": [{"normal_load": 1.0, "steps": 2}]})) == 6
+    one_more = complaints({"normal_load": 1.0}, {"normal_load": 2.0, "steps": 6}, mu=0.0)
+    assert one_more == {"load": "expected at most 6 load steps in all, not 7"}
 
 
 @pytest.mark.parametrize(

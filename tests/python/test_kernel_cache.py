@@ -530,3 +530,23 @@ def test_what_is_no_number_of_bytes_is_refused(monkeypatch: pytest.MonkeyPatch, 
 )
 def test_numbers_of_bytes(value: float | str, number: int) -> None:
     assert kernel_cache._bytes(value, "") == number
+
+
+def test_growth_is_limited_to_what_is_spare() -> None:
+    """As much as fits beside what is there stays; less than nothing spare makes the cache smaller."""
+    normal()
+    before = kernel_cache.statistics().memory
+    assert before > 0
+    kernel_cache.limit_growth(10**9)
+    normal(window(31, 33))
+    grown = kernel_cache.statistics().memory
+    assert grown > before
+    kernel_cache.limit_growth(0)
+    normal(window(35, 37))
+    assert 0 < kernel_cache.statistics().memory <= grown
+    kernel_cache.limit_growth(-(10**9))
+    assert kernel_cache.statistics().memory == 0
+    # the bound itself remains
+    kernel_cache.limit_growth(10**9)
+    normal()
+    assert kernel_cache.statistics().memory == before

@@ -560,6 +560,11 @@ def test_zone_maps_fill_contact_and_stick_area() -> None:
     assert to_hex(handles["slip"].get_facecolor()) == SLIP.lower()
 
 
+def test_places_without_a_map_stay_empty() -> None:
+    figure = plotting.zones([cattaneo()] * 5, 4)  # in three columns
+    assert [axes.get_visible() for axes in figure.axes] == [True] * 5 + [False]
+
+
 def test_zone_maps_of_steps_differ_as_their_zones_do() -> None:
     panels = drawn.visible(plotting.zones(cattaneo(), [2, 4]))
     for axes, step in zip(panels, (2, 4), strict=True):

@@ -18,7 +18,7 @@ from validation import critical_planes
 
 from hexcontact import DeckError, PathWarning, fatigue, open_result
 from hexcontact.cli.app import app
-from hexcontact.deck.below import cycle_of
+from hexcontact.deck.below import cycle_of, steps_fault
 from hexcontact.interior import stress as stress_below
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 41)
@@ -347,15 +347,19 @@ def test_files_of_a_deck_say_what_they_hold(finished: Path) -> None:
         ),
         ('segment = ["press"]\nparameters = ["ruiz"]', "normal_load is 0 at the begin and 200 at the end"),
         ('segment = ["press", "push"]\nparameters = ["ruiz"]', "do not follow each other"),
+        (
+            'steps = [7, 8, 9]\nparameters = ["ruiz"]',
+            "fatigue.1.steps = [7, 8, 9]: tangential_load_x is 0 at the begin and -48 at the end",
+        ),
         ('parameters = ["ruiz"]', "expected either segment or steps"),
         ('steps = [6, 10]\nparameters = ["ruiz"]', "there are no fields of step 10"),
-        ('steps = [6, 7]\nparameters = ["findley"]', "findley_slope: missing; expected k of Findley"),
-        ('steps = [6, 7]\nparameters = ["findlay"]', "did you mean findley"),
+        ('steps = [6, 7, 8, 9]\nparameters = ["findley"]', "findley_slope: missing; expected k of Findley"),
+        ('steps = [6, 7, 8, 9]\nparameters = ["findlay"]', "did you mean findley"),
         (
-            'steps = [6, 7]\nparameters = ["ruiz"]\npoints = [[0, 0, 0]]',
+            'steps = [6, 7, 8, 9]\nparameters = ["ruiz"]\npoints = [[0, 0, 0]]',
             "ruiz: expected a contact with friction",
         ),
-        ('steps = [6, 7]\nparameters = ["ruiz"]\nbody = 2', "body 2 is rigid"),
+        ('steps = [6, 7, 8, 9]\nparameters = ["ruiz"]\nbody = 2', "body 2 is rigid"),
     ],
 )
 def test_bad_tables_are_one_sentence(tmp_path: Path, lines: str, sentence: str) -> None:
@@ -364,6 +368,28 @@ def test_bad_tables_are_one_sentence(tmp_path: Path, lines: str, sentence: str) 
     assert code == 2
     assert sentence in text
     assert len(text.splitlines()) == 1
+
+
+def test_a_cycle_in_a_history_without_labels_is_one_sentence(tmp_path: Path) -> None:
+    deck = DECK.format(pad=PAD).replace(', label = "pull"', "").replace(', label = "push"', "")
+    deck = deck.replace('label = "press"', "")
+    (tmp_path / "deck.toml").write_text(deck + '[[fatigue]]\nsegment = ["a"]\nparameters = ["ruiz"]\n')
+    code, text = command(tmp_path, "run", "deck.toml")
+    assert code == 2
+    assert 'fatigue.1.segment = ["a"]' in text
+    assert 'no segment has the label "a"; there are none with a label' in text
+    assert len(text.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["deck.toml"]
+
+
+def test_steps_of_a_cycle_close_from_before_or_from_the_first() -> None:
+    loads = (0.0, 1.0, -1.0, 1.0, -1.0)
+    stages = [(k, "", {"tangential_load_x": load}) for k, load in enumerate(loads)]
+    assert not steps_fault(stages, [4, 5])  # from the third step on
+    assert not steps_fault(stages, [3, 4, 5])  # from the third step to the fifth
+    assert not steps_fault(stages, [2, 5])  # the extremes of a cycle
+    assert "is 0 at the begin and 1 at the end" in steps_fault(stages, [2])
+    assert "is 0 at the begin and -1 at the end" in steps_fault(stages, [2, 3])
 
 
 def test_a_cycle_may_have_one_name_or_start_from_nothing(finished: Path) -> None:

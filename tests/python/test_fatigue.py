@@ -285,6 +285,47 @@ def _light(*given: object) -> tuple[np.ndarray, str]:
     return loads.view(_Light), source
 
 
+@pytest.mark.parametrize("source", ["edges", "nodes"])
+def test_the_stress_at_the_surface_has_the_tractions_of_the_result(finished: Path, source: str) -> None:
+    """Corrected at the edges the stress of hats left up to 7 % of the largest pressure on the free surface."""
+    result = open_result(finished / "deck.nc")
+    steps = [4, 7, 9]
+    largest = result.history["max_pressure"].max()
+    edge = np.sqrt(result.history["contact_area"][9] / np.pi)
+    x = np.linspace(-1.3, 1.3, 60) * edge
+    for where, depth in (
+        ({"points": np.stack([x, 0.1 * x, 0 * x], axis=-1)}, None),
+        ({"line": [(-1.3 * edge, 0.1 * edge, 0), (1.3 * edge, 0, 0)]}, None),
+        ({"depths": [0.0, 1e-5]}, 0),
+    ):
+        for body in (1, 2):
+            found = result.stress(step=steps, body=body, source=source, **where)
+            for k, step in enumerate(steps):
+                for name, component in (("pressure", "zz"), ("traction_x", "xz"), ("traction_y", "yz")):
+                    expected = -result.at(name, found.x.values, found.y.values, step=step, source=source)
+                    stress = found[f"stress_{component}"].values[k]
+                    stress = stress if depth is None else stress[depth]
+                    if source == "edges":
+                        assert np.array_equal(stress, expected)
+                    else:
+                        assert stress == pytest.approx(expected, abs=1e-8 * largest)
+    far = result.stress("stress_zz", "stress_xz", points=[(1.3 * edge, 0, 0)], source=source)
+    assert abs(far.to_array().values).max() < 1e-3
+
+
+def test_fatigue_uses_the_tractions_of_the_surface(finished: Path) -> None:
+    result = open_result(finished / "deck.nc")
+    points = [(-4e-4, 1e-5, 0), (-4e-4, 1e-5, 1e-5), (1e-4, 0, 0)]
+    [table] = result.stress_histories(**CYCLE, points=points)
+    for place in (0, 2):
+        for number in result.cycle_steps(**CYCLE):
+            row = table.loc[place + 1, number]
+            for name, column in (("pressure", "S33"), ("traction_x", "S13"), ("traction_y", "S23")):
+                expected = -result.at(name, *points[place][:2], step=number, source="edges") / 1e6
+                assert row[column] == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+    assert table.loc[2, 9]["S33"] != table.loc[1, 9]["S33"]
+
+
 def test_ruiz_is_zero_where_nothing_slips(finished: Path) -> None:
     result = open_result(finished / "deck.nc")
     found = result.fatigue("ruiz", **CYCLE)

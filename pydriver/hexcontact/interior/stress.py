@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, integer
 from ..core import kernel_cache, memory
 from ..core.contact import ElasticPair
-from ..core.edges import ContactEdges, tractions_memory
+from ..core.edges import ContactEdges, TractionField, tractions_memory
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
 from ..deck.tables import Body, Deck
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 Fields = Mapping[str, NDArray[Any]]
 Bodies = Sequence[Body]
+Surface = Callable[[int], TractionField]
+"""The tractions over the surface, to the edges, of the step of a place in a list."""
 
 LOADED = (*TRACTIONS, "bulk_body", *BULK_STRESS)
 """What the stress below the surface comes from."""
@@ -181,6 +183,7 @@ def below(
     *,
     friction: float = 0.0,
     source: str | None = None,
+    surface: Surface | None = None,
 ) -> xarray.Dataset:
     """Return quantities below the surface.
 
@@ -203,6 +206,8 @@ def below(
         Numbers of the steps; without them there is one step, and the dataset has no such dimension.
     friction, source : float and str, optional
         See `tractions`.
+    surface : callable, optional
+        The tractions to the edges, which the stress at depth 0 has exactly unless `source` is the nodes.
 
     Raises
     ------
@@ -225,6 +230,11 @@ def below(
             moved = _in_box(lattice, loads, body, nu, found, len(_DISPLACEMENTS))
         stress = _in_box(lattice, loads, body, nu, found, len(TENSOR))
     add_bulk(stress, steps, body)
+    if surface is not None and used == "edges":
+        at_surface = found.nodes[..., 2] == 0.0
+        stress[:, at_surface] = with_tractions(
+            stress[:, at_surface], surface_tractions(surface, len(steps), found.nodes[at_surface])
+        )
     values = {name: stress[..., k] for k, name in enumerate(TENSOR)}
     if any(name in _INVARIANTS for name in names):
         scalars = fields.invariants(stress)
@@ -246,6 +256,21 @@ def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
         component = TENSOR.index(name.removeprefix("bulk_"))
         stress[..., component] += bulk[:, k].reshape(-1, *[1] * (stress.ndim - 2))
     return stress
+
+
+def surface_tractions(surface: Surface, steps: int, points: Array) -> Array:
+    """Return pressure and shear tractions of some steps at points of the surface, (step, point, 3)."""
+    if not len(points):
+        return np.empty((steps, 0, 3))
+    x, y = points[:, 0], points[:, 1]
+    return np.array([surface(k)(x, y).T for k in range(steps)]).reshape(steps, -1, 3)
+
+
+def with_tractions(stress: Array, loads: Array) -> Array:
+    """Return stress (..., 6) at the surface with its tractions, p, q_x and q_y (..., 3), in either body."""
+    for name, load in zip(("stress_zz", "stress_xz", "stress_yz"), np.moveaxis(loads, -1, 0), strict=True):
+        stress[..., TENSOR.index(name)] = -load
+    return stress + 0.0  # no sign on zero
 
 
 def summed(lattice: Lattice, box: Region) -> bool:

@@ -21,15 +21,14 @@ from .region import Region, region
 from .stress import (
     Bodies,
     Fields,
+    NearSurface,
     Surface,
     add_bulk,
     material,
     source_of,
     summed,
-    surface_tractions,
     tractions,
     window_over,
-    with_tractions,
 )
 
 if TYPE_CHECKING:
@@ -114,8 +113,7 @@ def memory_needed(lattice: Lattice, where: Region, steps: int) -> int:
         whole, _, _ = window_over(lattice, where.lattice)
         # tractions, and the stress on a plane twice
         besides = max(besides, fields.planes_memory(whole) + 8 * min(steps, _AT_ONCE) * 15 * whole.size)
-    at_surface = 24 * steps * where.count  # tractions of points at depth 0
-    return 2 * loads + block + besides + at_surface + 80 * where.count
+    return 2 * loads + block + besides + 104 * where.count
 
 
 def histories(
@@ -141,25 +139,22 @@ def histories(
     ResourceError
         If there is not enough memory for tractions and a block.
     """
+    loads, used = tractions(lattice, steps, bodies, friction, None)
+    found = _of_tractions(lattice, steps, loads, body, material(bodies, body)[0], where)
+    if used == "nodes":
+        yield from found
+        return
+    near_surface = NearSurface(lattice, steps, loads, bodies, body, friction, surface)
     points = where.nodes.reshape(-1, 3)
-    at_surface = np.flatnonzero(points[:, 2] == 0.0)
-    shown = (
-        surface_tractions(surface, len(steps), points[at_surface]) if source_of(steps) == "edges" else None
-    )
-    for part, history in _of_tractions(lattice, steps, bodies, body, where, friction):
-        if shown is not None:
-            first, last = np.searchsorted(at_surface, (part.start, part.stop))
-            of_part = at_surface[first:last] - part.start
-            history[of_part] = with_tractions(history[of_part], np.moveaxis(shown[:, first:last], 0, 1))
+    for part, history in found:
+        near_surface.correct(np.swapaxes(history, 0, 1), points[part])
         yield part, history
 
 
 def _of_tractions(
-    lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, body: int, where: Region, friction: float
+    lattice: Lattice, steps: Sequence[Fields], loads: Array, body: int, poisson_ratio: float, where: Region
 ) -> Iterator[tuple[slice, Array]]:
     """Yield the histories that follow from the tractions of the lattice."""
-    poisson_ratio, _ = material(bodies, body)
-    loads, _ = tractions(lattice, steps, bodies, friction, None)
     block = max(_BLOCK, loads.nbytes)
     most = max(block // (48 * len(steps)), 1)
     memory.require(

@@ -43,9 +43,11 @@ _LOADED_ARRAYS, _CORRECTED_ARRAYS = 8, (3, 6)
 _READ_ARRAYS, _READ_KEPT = 4, 16 * 2**20
 _EDGE_ARRAYS = 11  # arguments and results of the correction at the edges
 _STICK = 1  # value of zone at a sticking node
+NEAR = 1.0  # depth in spacings above which the stress is corrected at the edges
 _SUMS_FOR_A_NODE = 50  # pyramids summed at single points in the time of a node of a plane, at least
 TENSOR = tuple(f"stress_{ab}" for ab in fields.COMPONENTS)
 """Components of the stress in the order of the core, which is that of symmetric tensors in VTK."""
+_AT_SURFACE = ("stress_zz", "stress_xz", "stress_yz")  # of pressure and shear tractions, in either body
 _INVARIANTS = tuple(name for name in STRESSES if STRESSES[name].units == "Pa" and name not in TENSOR)
 _DISPLACEMENTS = tuple(name for name in STRESSES if STRESSES[name].units == "m")
 
@@ -140,7 +142,7 @@ def tractions(
         raise DeckError(
             f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
         )
-    law = np.full_like(at_nodes[0, 0], friction if np.isfinite(friction) else 0.0)
+    law = _friction_of(at_nodes[0, 0], friction)
     constants = [(body.young_modulus, body.poisson_ratio) for body in bodies]
     pair = ElasticPair.from_materials(*constants[0], *constants[1])
     corrected = [
@@ -148,6 +150,11 @@ def tractions(
         for one, step in zip(at_nodes, steps, strict=True)
     ]
     return np.array(corrected), "edges"
+
+
+def _friction_of(field: Array, friction: float) -> Array:
+    """Return the coefficient at the nodes, 0 where shear tractions do not follow the pressure."""
+    return np.full_like(field, friction if np.isfinite(friction) else 0.0)
 
 
 def source_of(steps: Sequence[Fields]) -> str:
@@ -230,11 +237,12 @@ def below(
             moved = _in_box(lattice, loads, body, nu, found, len(_DISPLACEMENTS))
         stress = _in_box(lattice, loads, body, nu, found, len(TENSOR))
     add_bulk(stress, steps, body)
-    if surface is not None and used == "edges":
-        at_surface = found.nodes[..., 2] == 0.0
-        stress[:, at_surface] = with_tractions(
-            stress[:, at_surface], surface_tractions(surface, len(steps), found.nodes[at_surface])
-        )
+    about: dict[str, Any] = {"body": np.int32(body), "tractions": used}
+    if used == "edges":
+        near_surface = NearSurface(lattice, steps, loads, bodies, body, friction, surface)
+        stress = np.ascontiguousarray(stress)
+        near_surface.correct(stress.reshape(len(steps), -1, len(TENSOR)), found.nodes.reshape(-1, 3))
+        about["edge_without_root"] = near_surface.refused
     values = {name: stress[..., k] for k, name in enumerate(TENSOR)}
     if any(name in _INVARIANTS for name in names):
         scalars = fields.invariants(stress)
@@ -245,7 +253,7 @@ def below(
     return xarray.Dataset(
         {name: (dims, values[name][0] if one else values[name], STRESSES[name].attributes) for name in names},
         coords=found.coordinates | ({} if numbers is None else {"step": ("step", list(numbers))}),
-        attrs={"body": np.int32(body), "tractions": used},
+        attrs=about,
     )
 
 
@@ -258,19 +266,42 @@ def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
     return stress
 
 
-def surface_tractions(surface: Surface, steps: int, points: Array) -> Array:
-    """Return pressure and shear tractions of some steps at points of the surface, (step, point, 3)."""
-    if not len(points):
-        return np.empty((steps, 0, 3))
-    x, y = points[:, 0], points[:, 1]
-    return np.array([surface(k)(x, y).T for k in range(steps)]).reshape(steps, -1, 3)
+class NearSurface:
+    """What the stress of hats misses next to the surface: roots at the edges, the tractions at depth 0."""
 
+    def __init__(
+        self,
+        lattice: Lattice,
+        steps: Sequence[Fields],
+        loads: Array,
+        bodies: Bodies,
+        body: int,
+        friction: float,
+        surface: Surface | None,
+    ) -> None:
+        self._lattice, self._steps, self._loads, self._surface = lattice, steps, loads, surface
+        self._body, self._poisson_ratio = body, material(bodies, body)[0]
+        self._law = _friction_of(loads[0, 0], friction)
+        self.refused = 0.0  # largest share of an edge without a root
 
-def with_tractions(stress: Array, loads: Array) -> Array:
-    """Return stress (..., 6) at the surface with its tractions, p, q_x and q_y (..., 3), in either body."""
-    for name, load in zip(("stress_zz", "stress_xz", "stress_yz"), np.moveaxis(loads, -1, 0), strict=True):
-        stress[..., TENSOR.index(name)] = -load
-    return stress + 0.0  # no sign on zero
+    def correct(self, stress: Array, points: Array) -> None:
+        """Correct the stress (step, point, 6) at points (point, 3), m."""
+        near = points[:, 2] < NEAR * self._lattice.spacing
+        if near.any():
+            for k, (step, loads) in enumerate(zip(self._steps, self._loads, strict=True)):
+                [nodal] = nodal_tractions([step])
+                more, refused = _edges(self._lattice, nodal, step).stress(
+                    *(nodal[1:], np.asarray(step["zone"]) == _STICK, self._law, loads),
+                    *(self._body, self._poisson_ratio, points[near]),
+                )
+                stress[k, near] += more
+                self.refused = max(self.refused, refused)
+        free = points[:, 2] == 0.0
+        if self._surface is not None and free.any():
+            x, y, _ = points[free].T
+            for k in range(len(stress)):
+                for name, load in zip(_AT_SURFACE, self._surface(k)(x, y), strict=True):
+                    stress[k, free, TENSOR.index(name)] = 0.0 - load  # no sign on zero
 
 
 def summed(lattice: Lattice, box: Region) -> bool:

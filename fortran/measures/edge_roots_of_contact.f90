@@ -63,9 +63,12 @@ contains
     edge%lattice = lattice
     edge%zone = zones(:, :, 3)
     shear = norm2(traction(:, :, 2:3), dim=3)
-    allocate (reserve, mold=shear)
+    allocate (reserve, edge%field, mold=shear)
     reserve = merge(max(friction*traction(:, :, 1) - shear, 0.0_wp), 0.0_wp, edge%zone)
-    edge%field = friction*corrected(:, :, 1) - norm2(corrected(:, :, 2:3), dim=3)
+    ! signed, since corrected tractions are negative at some nodes; those outside the contact belong to its own edge
+    edge%field = 0.0_wp
+    where (zones(:, :, 1) .and. shear > 0.0_wp) edge%field = friction*corrected(:, :, 1) &
+                                                             - sum(corrected(:, :, 2:3)*traction(:, :, 2:3), dim=3)/shear
     edge%squares = reserve**2
     edge%distance = edges%stick_distances(edge%zone, reserve)
     outline = edges%stick_edge(edge%zone, reserve)

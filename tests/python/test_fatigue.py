@@ -287,7 +287,7 @@ def _light(*given: object) -> tuple[np.ndarray, str]:
 
 @pytest.mark.parametrize("source", ["edges", "nodes"])
 def test_the_stress_at_the_surface_has_the_tractions_of_the_result(finished: Path, source: str) -> None:
-    """Corrected at the edges the stress of hats left up to 7 % of the largest pressure on the free surface."""
+    """Hats corrected at the edges left up to 7 % of the largest pressure on the free surface."""
     result = open_result(finished / "deck.nc")
     steps = [4, 7, 9]
     largest = result.history["max_pressure"].max()

@@ -241,7 +241,7 @@ def cycle_of(stages: Sequence[Stage], labels: Sequence[str]) -> tuple[int, int]:
 
 
 def steps_fault(stages: Sequence[Stage], numbers: Sequence[int]) -> str:
-    """Return why load steps, counted from 1, are no closed cycle; empty if they are, or steps are left out."""
+    """Return why load steps, counted from 1, are no closed cycle; empty if they are, or some are left out."""
     first, last = numbers[0] - 1, numbers[-1] - 1
     if [*numbers] != [*range(first + 1, last + 2)] or last >= len(stages):
         return ""

@@ -219,7 +219,7 @@ def _problems_below(tables: dict[str, Any], steps: Sequence[LoadStep]) -> list[M
 def _fatigue_problems(
     table: Fatigue, place: int, stages: Sequence[Stage], every: int, frictional: bool, *, numbered: bool
 ) -> list[Mistake]:
-    """Return segments or steps without a closed cycle, as far as loads are known, and Ruiz off the surface."""
+    """Return segments or steps that make no closed cycle, as far as loads tell, and Ruiz off the surface."""
     found = []
     elsewhere = table.depths not in (None, (0.0,)) or table.points or table.line or table.plane
     if "ruiz" in table.parameters and (elsewhere or not frictional):

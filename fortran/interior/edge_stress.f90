@@ -32,7 +32,7 @@ module hc_edge_stress
   !> Depth below which the value at the point is integrated by itself.
   real(wp), parameter :: shallow = 0.1_wp
   !> Gauss points in a quarter of the angle, and on a piece of a ray.
-  integer, parameter :: n_angle = 8, n_ray = 12
+  integer, parameter :: n_angle = 6, n_ray = 8
 
 contains
 

@@ -44,7 +44,7 @@ contains
     integer, intent(in) :: threads
     !> Stress xx, yy, zz, xy, yz, xz (6, n) [Pa]
     real(wp), intent(inout) :: stress(:, :)
-    !> Largest share of an edge near these points where the traction is no root, so far
+    !> Share of the edge near these points where the traction is no root; at least the value on entry
     real(wp), intent(inout) :: refused
     type(edge_root_t), allocatable :: roots(:)
     real(wp), allocatable :: centers(:, :), inwards(:, :), loads(:, :), at(:, :)

@@ -244,7 +244,7 @@ contains
     real(c_double), intent(in) :: points(3, n_point)
     !> Threads to use; 0: as many as OpenMP would take
     integer(c_int), intent(in) :: threads
-    !> Stress xx, yy, zz, xy, yz, xz [Pa], and the share of the edge whose traction is no root
+    !> Stress xx, yy, zz, xy, yz, xz [Pa], and the share of the edge of the contact whose pressure is no root
     real(c_double), intent(out) :: correction(6, n_point), refused
     !> Status and its message
     integer(c_int), intent(out) :: code
@@ -254,9 +254,11 @@ contains
     type(contact_edges_t) :: edges
     type(edge_traction_t) :: near
     type(field_space_t) :: space
+    real(c_double) :: of_stick ! growing stick areas have none, and where they reach the edge of the contact that is their edge
 
     correction = 0.0_c_double
     refused = 0.0_c_double
+    of_stick = 0.0_c_double
     space = space_over([n_col, n_row], threads)
     call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
     if (.not. allocated(error)) then
@@ -265,7 +267,7 @@ contains
       call correct_stress_at_edges(near, body, poisson_ratio, points, space%threads, correction, refused)
       if (any(friction > 0.0_c_double) .and. any(zones(:, :, 3) /= 0)) then
         call new_edge_of_stick(near, lattice, edges, zones /= 0, friction, traction, corrected)
-        call correct_stress_at_edges(near, body, poisson_ratio, points, space%threads, correction, refused)
+        call correct_stress_at_edges(near, body, poisson_ratio, points, space%threads, correction, of_stick)
       end if
     end if
     call report(error, code, message)

@@ -338,8 +338,8 @@ class ContactEdges:
         ndarray, shape (n, 6)
             Components xx, yy, zz, xy, yz, xz.
         float
-            Largest share of an edge near the points where the traction does not vanish like a root, so that
-            nothing is corrected.
+            Share of the edge of the contact near the points where the pressure does not vanish like a root,
+            so that nothing is corrected.
         """
         pressure, gap = self._fields
         _, zones, _ = self._zone(stick, gap, True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import doctest
+import json
+import re
 import threading
 import tomllib
 from pathlib import Path
@@ -373,6 +375,35 @@ def test_files_of_a_deck_say_what_they_hold(finished: Path) -> None:
     code, text = command(finished, "plot", "deck_line.nc")
     assert code == 2
     assert "holds fatigue parameters, not load steps" in text
+
+
+def test_files_and_pages_say_where_the_largest_value_is(finished: Path) -> None:
+    with xarray.open_dataset(finished / "deck_fatigue_1.nc") as found:
+        for name, word, values in (
+            ("smith_watson_topper", "largest", found["smith_watson_topper"].values),
+            ("life", "least", -found["life"].values),
+        ):
+            depth, row, col = np.unravel_index(values.argmax(), values.shape)
+            place = [found.x.values[row, col], found.y.values[row, col], found.depth.values[depth]]
+            assert found[name].attrs[word] == found[name].values[depth, row, col]
+            assert found[name].attrs[f"{word}_at"].tolist() == place
+        at = found["life"].attrs["least_at"]
+        assert "largest" not in found["smith_watson_topper_polar"].attrs
+    code, text = command(finished, "info", "deck_fatigue_1.nc")
+    assert code == 0
+    assert re.search(r"least \S+ at x = \S+ \S+, y = \S+( \S+)?, depth 0 m\n", text)
+    code, text = command(finished, "info", "deck_fatigue_1.nc", "--json")
+    assert json.loads(text)["quantities"]["life"]["least_at"] == pytest.approx(at.tolist())
+    code, text = command(finished, "report", "deck.nc")
+    assert code == 0
+    assert "smith_watson_topper: largest" in (finished / "deck.html").read_text()
+    stress = open_result(finished / "deck.nc").stress(
+        "stress_xx", points=[(0, 0, 0), (-5e-4, 0, 1e-6)], step=[7, 9]
+    )
+    values = stress["stress_xx"].values
+    step, point = np.unravel_index(values.argmax(), values.shape)
+    assert stress["stress_xx"].attrs["largest_step"] == [7, 9][step]
+    assert stress["stress_xx"].attrs["largest_at"] == [[0, 0, 0], [-5e-4, 0, 1e-6]][point]
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from ..deck.below import Criteria, Fatigue, Stage, cycle_of
 from ..deck.faults import NOWHERE
 from ..errors import DeckError, PathWarning
 from ..variables import EDGES, INTERFACE, TRACTIONS
+from .extremes import with_places
 from .fatigue import SLIPS, histories, parameters_below, tabulated
 from .region import region
 from .stress import LOADED, Surface, below, bodies_of, nodal_tractions
@@ -85,7 +86,7 @@ class BelowSurface(ABC):
         steps = self._loaded(numbers, edges=source != "nodes")
         given = bodies_of(self.deck), body, where, components, several
         more: dict[str, Any] = {"friction": self._friction, "source": source}
-        return below(self.lattice, steps, *given, **more, surface=self._surface(numbers))
+        return with_places(below(self.lattice, steps, *given, **more, surface=self._surface(numbers)))
 
     def _surface(self, numbers: Sequence[int]) -> Surface:
         """Return what gives the tractions over the surface of some steps, to the edges."""
@@ -150,7 +151,7 @@ class BelowSurface(ABC):
         about: dict[str, Any] = {"steps": np.array(numbers, dtype="i4")}
         if (change := self._change_over(numbers)) is not None:
             about["change_over_cycle"] = change
-        return found.assign_attrs(about)
+        return with_places(found.assign_attrs(about))
 
     def stress_histories(
         self,

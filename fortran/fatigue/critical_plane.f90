@@ -1,124 +1,168 @@
 !> The plane on which a fatigue parameter is largest.
 !>
-!> Planes spread evenly over the hemisphere of normals are compared first; the best two that are not neighbors are then
-!> improved by steps that are halved where none of four directions leads higher. A smooth parameter is stationary at its
-!> largest value, so that an angle of 2e-3 costs some 1e-6 of it.
+!> Three faces of a cube contain all normals up to their sign; a face is a square of cells. A parameter is the largest of
+!> smooth functions, each of a few times of the history, so that it is stationary at its maximum in one of them. With a
+!> bound K of their curvature the value at the center of a cell, at an angle r from the maximum, is less by at most
+!>
+!>     K r^2/2.
+!>
+!> Cells below the best value by more than this are left out, the others are divided into four until the loss is negligible.
+!> Where more cells are left than can be kept, as on a ridge of equal values, the best of them are divided.
 module hc_critical_plane
   use hc_precision, only: wp, pi
-  use hc_plane_criteria, only: plane_criterion_t
+  use hc_plane_criteria, only: plane_criterion_t, stress_extent_t
+  use hc_stress_path, only: deviator_coordinates, hydrostatic
   implicit none
   private
 
-  public :: plane_set_t, new_plane_set, find_critical_plane
+  public :: find_critical_plane
 
-  !> Number of planes that are compared: normals 7 degrees apart.
-  integer, parameter :: n_spread = 400
-  !> Angle below which no more steps are made [rad].
-  real(wp), parameter :: least_angle = 2.0e-3_wp
-  !> Cosine of the angle between normals that count as neighbors (20 degrees).
-  real(wp), parameter :: neighbor = 0.94_wp
-  !> Share of the best value from which a second plane is improved, too.
-  real(wp), parameter :: rival = 0.9_wp
+  !> Cells along a side of a face at first: 11 degrees.
+  integer, parameter :: n_side = 8
+  !> Most cells that are divided at a time: all of the first ones, and half of that many later.
+  integer, parameter :: n_most = 3*n_side**2, n_small = 96, small = 2
+  !> Most divisions: down to 1.4e-3 degrees.
+  integer, parameter :: n_division = 13
+  !> Loss that is negligible, as a share of the value.
+  real(wp), parameter :: negligible = 1.0e-6_wp
+  !> Largest angle between center and corner of a cell, in that from the middle of a face to its side times the cell's share.
+  real(wp), parameter :: corner = 1.7_wp*0.25_wp*pi
 
-  !> Normals spread over a hemisphere.
-  type :: plane_set_t
-    !> Normals (3, number)
-    real(wp), allocatable :: normals(:, :)
-  end type plane_set_t
+  !> A search: the best plane so far, and the cells that may contain a better one.
+  type :: search_t
+    real(wp) :: value = -0.5_wp*huge(1.0_wp), normal(3) = [0.0_wp, 0.0_wp, 1.0_wp]
+    !> Most that the maximum exceeds the value at the center of its cell
+    real(wp) :: loss = 0.0_wp
+    integer :: number = 0, most = n_most
+    !> Face of each cell, place of its center there (-1 to 1) and value
+    integer :: face(n_most) = 0
+    real(wp) :: place(2, n_most) = 0.0_wp, values(n_most) = 0.0_wp
+  contains
+    procedure :: compare
+    procedure, private :: add
+  end type search_t
 
 contains
 
-  !> Spread normals evenly over a hemisphere, along a spiral.
-  pure subroutine new_plane_set(planes)
-    !> The set
-    type(plane_set_t), intent(out) :: planes
-    real(wp) :: height, azimuth
-    integer :: i
-
-    allocate (planes%normals(3, n_spread))
-    do i = 1, n_spread
-      height = (real(i, wp) - 0.5_wp)/n_spread
-      azimuth = pi*(3.0_wp - sqrt(5.0_wp))*i
-      planes%normals(:, i) = [sqrt(1.0_wp - height**2)*[cos(azimuth), sin(azimuth)], height]
-    end do
-  end subroutine new_plane_set
-
   !> Find the plane on which a parameter is largest, and its value there.
-  pure subroutine find_critical_plane(criterion, planes, history, value, normal)
+  pure subroutine find_critical_plane(criterion, history, value, normal)
     !> The parameter
     class(plane_criterion_t), intent(in) :: criterion
-    !> Planes to begin with
-    type(plane_set_t), intent(in) :: planes
     !> Stress (6, times): xx, yy, zz, xy, yz, xz [Pa]
     real(wp), intent(in), contiguous :: history(:, :)
     !> Largest value, in the unit of the parameter
     real(wp), intent(out) :: value
     !> Normal of the critical plane (3), its last component not negative
     real(wp), intent(out) :: normal(3)
-    real(wp) :: path(size(history, 2), 6), trace(size(history, 2)), found(size(planes%normals, 2)), second, other(3)
-    integer :: i, best
+    type(search_t) :: search, before
+    real(wp) :: path(size(history, 2), 6), half, enough
+    integer :: i, j, face, division
 
     path = transpose(history)
-    trace = sum(path(:, :3), dim=2)
-    value = -0.5_wp*huge(value)
-    do i = 1, size(found)
-      found(i) = value_on(criterion, path, trace, planes%normals(:, i), value - (1.0_wp - rival)*abs(value))
-      value = max(value, found(i))
+    half = 1.0_wp/n_side
+    search%loss = 0.5_wp*criterion%curvature(extent_of(history))*(corner*half)**2
+    do face = 1, 3
+      do j = 1, n_side
+        do i = 1, n_side
+          call search%compare(criterion, path, face, half*[2*i - 1 - n_side, 2*j - 1 - n_side])
+        end do
+      end do
     end do
-    best = maxloc(found, dim=1)
-    normal = planes%normals(:, best)
-    call ascend(criterion, path, trace, normal, value)
-    i = maxloc(found, dim=1, mask=abs(matmul(planes%normals(:, best), planes%normals)) < neighbor)
-    if (found(i) > found(best) - (1.0_wp - rival)*abs(found(best))) then
-      other = planes%normals(:, i)
-      second = found(i)
-      call ascend(criterion, path, trace, other, second)
-      if (second > value) then
-        value = second
-        normal = other
-      end if
-    end if
-    if (normal(3) < 0.0_wp) normal = -normal
+    do division = 1, n_division
+      if (search%number == 0 .or. search%loss <= negligible*abs(search%value)) exit
+      before = search
+      enough = max(search%value, criterion%least()) - search%loss
+      search%loss = 0.25_wp*search%loss
+      search%number = 0
+      if (division >= small) search%most = n_small
+      half = 0.5_wp*half
+      do i = 1, before%number
+        if (before%values(i) < enough) cycle
+        do j = 0, 3
+          call search%compare(criterion, path, before%face(i), before%place(:, i) + half*[1 - 2*mod(j, 2), 1 - 2*(j/2)])
+        end do
+      end do
+    end do
+    value = max(search%value, criterion%least())
+    normal = sign(1.0_wp, search%normal(3))*search%normal
   end subroutine find_critical_plane
 
-  !> Improve a plane by steps of its normal.
-  pure subroutine ascend(criterion, path, trace, normal, value)
+  !> Compare the center of a cell with the best plane, and keep the cell if a better one may lie in it.
+  pure subroutine compare(self, criterion, path, face, place)
+    class(search_t), intent(inout) :: self
     class(plane_criterion_t), intent(in) :: criterion
-    !> Stress (times, 6) and its trace (times) [Pa]
-    real(wp), intent(in), contiguous :: path(:, :), trace(:)
-    !> Normal, and the value on its plane
-    real(wp), intent(inout) :: normal(3), value
-    real(wp) :: angle, axes(3, 2), trial(3), best(3), here, start, turn
-    integer :: k, level
+    !> Stress (times, 6) [Pa]
+    real(wp), intent(in), contiguous :: path(:, :)
+    integer, intent(in) :: face
+    real(wp), intent(in) :: place(2)
+    real(wp) :: here, normal(3), enough
 
-    angle = 0.5_wp*sqrt(2.0_wp*pi/n_spread)
-    level = 0
-    do while (angle > least_angle)
-      axes = tangents(normal)
-      start = value
-      best = normal
-      do k = 1, 4
-        turn = 0.5_wp*pi*k + 0.25_wp*pi*level ! other directions at every size
-        trial = normal + angle*(cos(turn)*axes(:, 1) + sin(turn)*axes(:, 2))
-        trial = trial/norm2(trial)
-        here = value_on(criterion, path, trace, trial, value)
-        if (here > value) then
-          value = here
-          best = trial
-        end if
-      end do
-      normal = best
-      if (.not. value > start + 1.0e-9_wp*abs(start)) then
-        angle = 0.5_wp*angle
-        level = level + 1
-      end if
+    normal = normal_at(face, place)
+    enough = max(self%value, criterion%least()) - self%loss
+    here = value_on(criterion, path, normal, enough)
+    if (here < enough) return
+    call self%add(face, place, here)
+    if (.not. here > self%value) return
+    self%value = here
+    self%normal = normal
+  end subroutine compare
+
+  !> Add a cell, in place of the worst one if there is no place left.
+  pure subroutine add(self, face, place, value)
+    class(search_t), intent(inout) :: self
+    integer, intent(in) :: face
+    real(wp), intent(in) :: place(2), value
+    integer :: k
+
+    if (self%number < self%most) then
+      self%number = self%number + 1
+      k = self%number
+    else
+      k = minloc(self%values(:self%most), dim=1)
+      if (.not. value > self%values(k)) return
+    end if
+    self%face(k) = face
+    self%place(:, k) = place
+    self%values(k) = value
+  end subroutine add
+
+  !> Normal at a place of a face: the cubic makes the angles between neighbors nearly equal.
+  pure function normal_at(face, place) result(normal)
+    integer, intent(in) :: face
+    real(wp), intent(in) :: place(2)
+    real(wp) :: normal(3)
+
+    normal = cshift([place*(0.25_wp*pi + (1.0_wp - 0.25_wp*pi)*place**2), 1.0_wp], face)
+    normal = normal/norm2(normal)
+  end function normal_at
+
+  !> Bounds of the stresses of a history, by its deviators: principal stresses differ by at most 2 sqrt(J2), and a normal
+  !> stress is at most the hydrostatic one and 2 sqrt(J2/3).
+  pure function extent_of(history) result(extent)
+    real(wp), intent(in), contiguous :: history(:, :)
+    type(stress_extent_t) :: extent
+    real(wp) :: path(5, size(history, 2)), middle(5), pressure(size(history, 2)), size_of
+    integer :: i
+
+    do i = 1, size(history, 2)
+      path(:, i) = deviator_coordinates(history(:, i))
+      pressure(i) = hydrostatic(history(:, i))
     end do
-  end subroutine ascend
+    middle = 0.5_wp*(maxval(path, dim=2) + minval(path, dim=2))
+    extent%hydrostatic = maxval(pressure) - minval(pressure)
+    do i = 1, size(history, 2)
+      size_of = norm2(path(:, i))
+      extent%normal = max(extent%normal, pressure(i) + 2.0_wp/sqrt(3.0_wp)*size_of)
+      extent%spread = max(extent%spread, 2.0_wp*size_of)
+      extent%change = max(extent%change, 4.0_wp*norm2(path(:, i) - middle))
+    end do
+  end function extent_of
 
   !> Parameter on the plane of a normal.
-  pure real(wp) function value_on(criterion, path, trace, normal, floor)
+  pure real(wp) function value_on(criterion, path, normal, floor)
     class(plane_criterion_t), intent(in) :: criterion
-    real(wp), intent(in), contiguous :: path(:, :), trace(:)
+    !> Stress (times, 6) [Pa]
+    real(wp), intent(in), contiguous :: path(:, :)
     real(wp), intent(in) :: normal(3), floor
     real(wp) :: axes(3, 2), sigma(size(path, 1)), shear(size(path, 1), 2)
     integer :: k
@@ -132,7 +176,7 @@ contains
     else
       shear = 0.0_wp
     end if
-    value_on = criterion%value(sigma, shear, trace, floor)
+    value_on = criterion%value(sigma, shear, path(:, 1) + path(:, 2) + path(:, 3), floor)
   end function value_on
 
   !> n . sigma m at all times.

@@ -4,7 +4,7 @@ module hc_fatigue_fields
   use hc_precision, only: wp
   use hc_error, only: error_t, raise, status
   use hc_plane_criteria, only: plane_criterion_t
-  use hc_critical_plane, only: plane_set_t, new_plane_set, find_critical_plane
+  use hc_critical_plane, only: find_critical_plane
   use hc_stress_path, only: crossland
   use hc_fretting_parameters, only: find_ruiz
   implicit none
@@ -26,15 +26,13 @@ contains
     real(wp), intent(out), contiguous :: normals(:, :)
     !> Allocated if a stress is not finite, or there is none
     type(error_t), allocatable, intent(out) :: error
-    type(plane_set_t) :: planes
     integer :: i
 
     call require_stress(histories, error)
     if (allocated(error)) return
-    call new_plane_set(planes)
     !$omp parallel do schedule(dynamic, 16)
     do i = 1, size(values)
-      call find_critical_plane(criterion, planes, histories(:, :, i), values(i), normals(:, i))
+      call find_critical_plane(criterion, histories(:, :, i), values(i), normals(:, i))
     end do
     !$omp end parallel do
   end subroutine find_critical_planes

@@ -8,13 +8,27 @@ module hc_plane_criteria
   implicit none
   private
 
-  public :: plane_criterion_t, smith_watson_topper_t, findley_t, fatemi_socie_t
+  public :: plane_criterion_t, smith_watson_topper_t, findley_t, fatemi_socie_t, stress_extent_t
+
+  !> Bounds of the stresses of a history [Pa].
+  type :: stress_extent_t
+    !> Largest normal stress
+    real(wp) :: normal = 0.0_wp
+    !> Largest difference of principal stresses at a time, and of the change between two times
+    real(wp) :: spread = 0.0_wp, change = 0.0_wp
+    !> Range of the hydrostatic stress
+    real(wp) :: hydrostatic = 0.0_wp
+  end type stress_extent_t
 
   !> A parameter that is largest on the critical plane.
   type, abstract :: plane_criterion_t
   contains
     !> Value on a plane
     procedure(plane_value), deferred :: value
+    !> Bound of the second derivative along a great circle, for a history
+    procedure(bound_of), deferred :: curvature
+    !> Lowest value that the parameter takes
+    procedure, nopass :: least => unbounded
     !> Does the value depend on the shear traction?
     procedure, nopass :: uses_shear => always
   end type plane_criterion_t
@@ -29,6 +43,13 @@ module hc_plane_criteria
       !> Value of interest
       real(wp), intent(in) :: floor
     end function plane_value
+    !> Return how fast the parameter can fall off around its largest value [its unit/rad^2].
+    pure real(wp) function bound_of(self, extent)
+      import :: plane_criterion_t, stress_extent_t, wp
+      class(plane_criterion_t), intent(in) :: self
+      !> Bounds of the stresses
+      type(stress_extent_t), intent(in) :: extent
+    end function bound_of
   end interface
 
   !> sigma_n,max times half the range of the normal strain [Pa] (K. N. Smith, P. Watson and T. H. Topper, J. Mater. 5 (1970)
@@ -38,7 +59,9 @@ module hc_plane_criteria
     real(wp) :: young_modulus = 1.0_wp, poisson_ratio = 0.0_wp
   contains
     procedure :: value => smith_watson_topper
+    procedure :: curvature => curvature_of_smith_watson_topper
     procedure, nopass :: uses_shear => never
+    procedure, nopass :: least => zero
   end type smith_watson_topper_t
 
   !> tau_a + slope sigma_n,max [Pa] (W. N. Findley, J. Eng. Ind. 81 (1959) 301-306).
@@ -47,6 +70,7 @@ module hc_plane_criteria
     real(wp) :: slope = 0.3_wp
   contains
     procedure :: value => findley
+    procedure :: curvature => curvature_of_findley
   end type findley_t
 
   !> (tau_a/G) (1 + slope sigma_n,max/sigma_y), a strain (A. Fatemi and D. F. Socie, Fatigue Fract. Eng. Mater. Struct. 11
@@ -56,10 +80,16 @@ module hc_plane_criteria
     real(wp) :: slope = 1.0_wp, shear_modulus = 1.0_wp, yield_stress = 1.0_wp
   contains
     procedure :: value => fatemi_socie
+    procedure :: curvature => curvature_of_fatemi_socie
   end type fatemi_socie_t
 
   !> Relative distance from the opposite point of a circle that makes no difference.
   real(wp), parameter :: opposite = 1.0e-10_wp
+
+  !> Bounds of tau_a and of its derivatives along a great circle, over the change of the stress. With shares l_i of its points
+  !> the square of the radius is the sum of l_i l_j |d_ij|^2/2, for three points at most |d|^2/3; for the difference d of the
+  !> shear tractions at two times |d|, |d'| and |d''| are at most 1/2, sqrt(5)/2 and sqrt(26)/2.
+  real(wp), parameter :: most_amplitude = 0.29_wp, most_slope = 0.65_wp, most_curvature = 1.48_wp
 
 contains
 
@@ -71,6 +101,14 @@ contains
     never = .false.
   end function never
 
+  pure real(wp) function unbounded()
+    unbounded = -huge(unbounded)
+  end function unbounded
+
+  pure real(wp) function zero()
+    zero = 0.0_wp
+  end function zero
+
   pure real(wp) function smith_watson_topper(self, normal, shear, trace, floor) result(value)
     class(smith_watson_topper_t), intent(in) :: self
     real(wp), intent(in), contiguous :: normal(:), shear(:, :), trace(:)
@@ -79,7 +117,7 @@ contains
     integer :: i
 
     associate (nu => self%poisson_ratio, no_shear => shear, no_floor => floor)
-      highest = 0.0_wp
+      highest = -huge(highest)
       most = -huge(most)
       least = huge(least)
       do i = 1, size(normal)
@@ -88,8 +126,19 @@ contains
         least = min(least, (1.0_wp + nu)*normal(i) - nu*trace(i))
       end do
     end associate
-    value = highest*(most - least)/(2.0_wp*self%young_modulus)
+    value = highest*((most - least)/(2.0_wp*self%young_modulus))
   end function smith_watson_topper
+
+  !> Bound of (a b)'' for a normal stress a, of |a'| <= spread, |a''| <= 2 spread, and a difference b of strains likewise.
+  pure real(wp) function curvature_of_smith_watson_topper(self, extent) result(bound)
+    class(smith_watson_topper_t), intent(in) :: self
+    type(stress_extent_t), intent(in) :: extent
+    real(wp) :: change, range
+
+    change = (1.0_wp + self%poisson_ratio)*extent%change
+    range = change/sqrt(3.0_wp) + (1.0_wp - 2.0_wp*self%poisson_ratio)*extent%hydrostatic
+    bound = (extent%spread*(range + change) + max(extent%normal, 0.0_wp)*change)/self%young_modulus
+  end function curvature_of_smith_watson_topper
 
   pure real(wp) function findley(self, normal, shear, trace, floor) result(value)
     class(findley_t), intent(in) :: self
@@ -102,6 +151,12 @@ contains
     end associate
   end function findley
 
+  pure real(wp) function curvature_of_findley(self, extent) result(bound)
+    class(findley_t), intent(in) :: self
+    type(stress_extent_t), intent(in) :: extent
+    bound = most_curvature*extent%change + 2.0_wp*abs(self%slope)*extent%spread
+  end function curvature_of_findley
+
   pure real(wp) function fatemi_socie(self, normal, shear, trace, floor) result(value)
     class(fatemi_socie_t), intent(in) :: self
     real(wp), intent(in), contiguous :: normal(:), shear(:, :), trace(:)
@@ -112,6 +167,16 @@ contains
       value = value*shear_amplitude(shear, max(floor, 0.0_wp)/value) ! -huge(floor)/value would overflow
     end associate
   end function fatemi_socie
+
+  pure real(wp) function curvature_of_fatemi_socie(self, extent) result(bound)
+    class(fatemi_socie_t), intent(in) :: self
+    type(stress_extent_t), intent(in) :: extent
+    real(wp) :: slope
+
+    slope = abs(self%slope)/self%yield_stress
+    bound = extent%change*(most_curvature*(1.0_wp + slope*max(extent%normal, 0.0_wp)) &
+                           + 2.0_wp*(most_slope + most_amplitude)*slope*extent%spread)/self%shear_modulus
+  end function curvature_of_fatemi_socie
 
   !> Amplitude tau_a of a shear traction; where it is certainly below `floor`, a bound that is below it [Pa].
   pure real(wp) function shear_amplitude(shear, floor) result(amplitude)

@@ -16,12 +16,14 @@ module hc_f2py_edges
   use hc_contact_edges, only: contact_edges_t, new_contact_edges
   use hc_edge_tractions, only: correct_at_edges, edge_tractions_memory
   use hc_traction_field, only: traction_field_t, new_traction_field, field_of_arrays
+  use hc_stress_at_edges, only: edge_traction_t, correct_stress_at_edges
+  use hc_edge_roots_of_contact, only: new_edge_of_contact, new_edge_of_stick
   use hc_zone_edge, only: zone_edge_t, zone_mesh_t, cut_triangles
   implicit none
   private
 
   public :: count_cut_triangles, edge_of_zone, mesh_of_zone, distances_of_zone, tractions_to_edges, memory_of_edges, &
-            field_of_tractions, tractions_at_points, tractions_at_nodes
+            stress_to_edges, field_of_tractions, tractions_at_points, tractions_at_nodes
 
 contains
 
@@ -220,6 +222,56 @@ contains
     end if
     call report(error, code, message)
   end subroutine tractions_to_edges
+
+  !> Correct the stress at points near the edges of contact and stick for what hats miss of the tractions there.
+  subroutine stress_to_edges(n_col, n_row, n_point, basis, start, gap, zones, friction, traction, corrected, body, poisson_ratio, &
+                             points, threads, correction, refused, code, message)
+    !f2py threadsafe
+    !> Number of columns and rows, and of points
+    integer(c_int), intent(in) :: n_col, n_row, n_point
+    !> Basis vectors as columns, position of the first node [m]
+    real(c_double), intent(in) :: basis(2, 2), start(2)
+    !> Gap [m] and coefficient of friction, 0 if shear tractions do not follow the pressure
+    real(c_double), intent(in) :: gap(n_col, n_row), friction(n_col, n_row)
+    !> Nodes in contact, that can touch, that stick
+    integer(c_int), intent(in) :: zones(n_col, n_row, 3)
+    !> Pressure and shear traction at the nodes, and corrected at the edges [Pa]
+    real(c_double), intent(in) :: traction(n_col, n_row, 3), corrected(n_col, n_row, 3)
+    !> Number of the body and its Poisson's ratio
+    integer(c_int), intent(in) :: body
+    real(c_double), intent(in) :: poisson_ratio
+    !> x, y and depth [m]
+    real(c_double), intent(in) :: points(3, n_point)
+    !> Threads to use; 0: as many as OpenMP would take
+    integer(c_int), intent(in) :: threads
+    !> Stress xx, yy, zz, xy, yz, xz [Pa], and the share of the edge of the contact whose pressure is no root
+    real(c_double), intent(out) :: correction(6, n_point), refused
+    !> Status and its message
+    integer(c_int), intent(out) :: code
+    character(len=512), intent(out) :: message
+    type(error_t), allocatable :: error
+    type(lattice_t) :: lattice
+    type(contact_edges_t) :: edges
+    type(edge_traction_t) :: near
+    type(field_space_t) :: space
+    real(c_double) :: of_stick ! growing stick areas have none, and where they reach the edge of the contact that is their edge
+
+    correction = 0.0_c_double
+    refused = 0.0_c_double
+    of_stick = 0.0_c_double
+    space = space_over([n_col, n_row], threads)
+    call new_lattice(lattice, basis, [0, 0], [n_col, n_row], error, start)
+    if (.not. allocated(error)) then
+      call new_contact_edges(edges, lattice, traction(:, :, 1), gap, zones(:, :, 1) /= 0, zones(:, :, 2) /= 0)
+      call new_edge_of_contact(near, lattice, edges, zones /= 0, friction, traction, corrected)
+      call correct_stress_at_edges(near, body, poisson_ratio, points, space%threads, correction, refused)
+      if (any(friction > 0.0_c_double) .and. any(zones(:, :, 3) /= 0)) then
+        call new_edge_of_stick(near, lattice, edges, zones /= 0, friction, traction, corrected)
+        call correct_stress_at_edges(near, body, poisson_ratio, points, space%threads, correction, of_stick)
+      end if
+    end if
+    call report(error, code, message)
+  end subroutine stress_to_edges
 
   !> Count the bytes that the correction at the edges takes.
   subroutine memory_of_edges(n_col, n_row, n_contact, sheared, unlike, threads, bytes)

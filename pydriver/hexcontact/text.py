@@ -76,8 +76,8 @@ def shown(value: object, width: int = 60, depth: int = 5) -> str:
 
 
 def listed(entries: Sequence[str], conjunction: str) -> str:
-    """Join entries with commas and a conjunction: "a, b or c"."""
-    return entries[0] if len(entries) == 1 else f"{', '.join(entries[:-1])} {conjunction} {entries[-1]}"
+    """Join entries with commas and a conjunction: "a, b or c"; nothing if there are none."""
+    return f" {conjunction} ".join([*filter(None, [", ".join(entries[:-1])]), *entries[-1:]])
 
 
 def did_you_mean(word: object, known: Iterable[str]) -> str:

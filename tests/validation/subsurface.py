@@ -49,10 +49,29 @@ def errors(sources: tuple[str, ...] = SOURCES) -> Iterator[tuple[str, Array, flo
             tractions(step.lattice, [step.fields], step.bodies, 0.0, source)[0][0, 0] / exact.max_pressure
         )
         loads = np.array([[pressure, 0 * pressure, 0 * pressure], [0 * pressure, pressure, 0 * pressure]])
-        _, (normal, shear) = fields.at_points(step.lattice, loads, 1, 0.3, values[:, :3] * _RADIUS)
+        points = values[:, :3] * _RADIUS
+        _, (normal, shear) = fields.at_points(step.lattice, loads, 1, 0.3, points)
+        if source == "edges":
+            pressed, sheared = roots(step, loads[0, 0], exact.max_pressure, points)
+            normal, shear = normal + pressed, shear + sheared
         found[source] = abs(normal + values[:, 4:5] * shear - values[:, 5:]).max(axis=1)
     for k, row in enumerate(rows):
         yield row[0], values[k, :3], values[k, 4], {source: float(found[source][k]) for source in sources}
+
+
+def roots(step: Any, hats: Array, scale: float, points: Array, body: int = 1) -> tuple[Array, Array]:
+    """Return what hats of pressure/scale miss of its stress, and of that of a shear traction q_x = p."""
+    [nodal] = nodal_tractions([step.fields]) / scale
+    zero, none = np.zeros_like(hats), np.zeros(hats.shape, dtype=bool)
+    edges = _edges(step.lattice, nodal, step.fields)
+    both, pressed = (
+        edges.stress(
+            *(np.array([mu * nodal[0], zero]), none, zero + mu),
+            *(np.array([hats, mu * hats, zero]), body, 0.3, points),
+        )[0]
+        for mu in (1.0, 0.0)
+    )
+    return pressed, both - pressed
 
 
 def closed_forms() -> Comparison:

@@ -23,7 +23,8 @@ from .._version import __version__
 from ..deck.below import Fatigue, Stress
 from ..errors import DeckError
 from ..files import MADE_BY, replacing, require_replaceable
-from ..interior.tables import tables_of
+from ..interior.extremes import place_of
+from ..interior.tables import read_table, tables_of
 from ..plotting.report_data import drawn_data, kept_steps
 from ..problem.overview import case_rows
 from ..result.history import energy_table, load_or_motion, worth_showing
@@ -188,9 +189,14 @@ def _below(result: Result) -> Table:
         chosen = table.parameters if isinstance(table, Fatigue) else table.components
         labels = table.segment if isinstance(table, Fatigue) else None
         steps = labels or ("last",) if table.steps is None else np.atleast_1d(table.steps)
-        file = Path(result.path or "output").stem + f"_{name}.nc"
-        rows.append((file, ", ".join(chosen) or "stress", str(table.body), ", ".join(map(str, steps))))
-    return ("file", "quantities", "body", "load steps"), rows
+        output = Path(result.path or "output")
+        file = output.with_name(f"{output.stem}_{name}.nc")
+        found = read_table(file)
+        fields = {} if found is None else found.data_vars
+        places = [f"{key}: {place}" for key, field in fields.items() if (place := place_of(field))]
+        shown = ", ".join(chosen) or "stress", str(table.body), ", ".join(map(str, steps))
+        rows.append((file.name, *shown, "; ".join(places)))
+    return ("file", "quantities", "body", "load steps", "largest values"), rows
 
 
 def _pictures(result: Result) -> Iterator[tuple[str, str]]:

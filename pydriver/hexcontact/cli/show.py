@@ -13,11 +13,13 @@ from .options import AsJson, ResultFile, Shown, beside, flag, labels_of, output_
 @command("hexcontact info hertz_spheres.nc")
 def info(file: ResultFile, as_json: AsJson = False) -> Content:
     """Print a result: origin, history, energies, residuals, the last load step against Hertz."""
-    from ..interior.tables import description
+    from ..interior.tables import content_of, description
     from ..result.store import open_result
     from . import tables
 
-    if lines := [] if as_json else description(file):
+    if as_json and (content := content_of(file)):
+        return content
+    if lines := description(file):
         print_output("\n".join(lines))
         return None
     result = open_result(file)

@@ -308,6 +308,48 @@ class ContactEdges:
             called(_api.tractions_to_edges, self._basis, lambdas, gap.T, zones, friction.T, given, 0).T
         )
 
+    def stress(
+        self,
+        shear: Array,
+        stick: Mask,
+        friction: Array,
+        corrected: Array,
+        body: int,
+        poisson_ratio: float,
+        points: Array,
+    ) -> tuple[Array, float]:
+        """Return the stress (Pa) that hats of the corrected tractions miss next to the edges.
+
+        Parameters
+        ----------
+        shear, stick, friction
+            As of `tractions`.
+        corrected : ndarray, shape (3, n_row, n_col)
+            What that returned, Pa.
+        body : int
+            1 or 2.
+        poisson_ratio : float
+            Its Poisson's ratio.
+        points : ndarray, shape (n, 3)
+            x, y and depth below the surface of the body, m.
+
+        Returns
+        -------
+        ndarray, shape (n, 6)
+            Components xx, yy, zz, xy, yz, xz.
+        float
+            Share of the edge of the contact near the points where the pressure does not vanish like a root,
+            so that nothing is corrected.
+        """
+        pressure, gap = self._fields
+        _, zones, _ = self._zone(stick, gap, True)
+        given = np.stack([pressure, *shear]).T
+        fields = gap.T, zones, friction.T, given, corrected.T
+        found, refused = called(
+            _api.stress_to_edges, self._basis, self._start, *fields, body, poisson_ratio, points.T, 0
+        )
+        return np.asarray(found.T), float(refused)
+
     def _whole(self) -> _Zone:
         return self._zone(self._zones[0], self._fields[0], False)
 

@@ -240,6 +240,15 @@ def cycle_of(stages: Sequence[Stage], labels: Sequence[str]) -> tuple[int, int]:
     raise ValueError(f"{named}: {why or 'the segments do not follow each other'}; expected a closed cycle")
 
 
+def steps_fault(stages: Sequence[Stage], numbers: Sequence[int]) -> str:
+    """Return why load steps, counted from 1, are no closed cycle; empty if they are, or some are left out."""
+    first, last = numbers[0] - 1, numbers[-1] - 1
+    if [*numbers] != [*range(first + 1, last + 2)] or last >= len(stages):
+        return ""
+    fault = _fault(stages, first, last)  # from the state before them, or from the first one
+    return f"{fault}; expected a closed cycle" if fault and _fault(stages, first + 1, last) else ""
+
+
 def _fault(stages: Sequence[Stage], first: int, last: int) -> str:
     """Return why load steps are no closed cycle; empty if they are one, or the loads are not known."""
     end = stages[last][2]

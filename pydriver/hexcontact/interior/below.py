@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import has_entries, integer
+from ..core.edges import TractionField
 from ..core.lattice import Lattice
 from ..deck.below import Criteria, Fatigue, Stage, cycle_of
 from ..deck.faults import NOWHERE
 from ..errors import DeckError, PathWarning
 from ..variables import EDGES, INTERFACE, TRACTIONS
+from .extremes import with_places
 from .fatigue import SLIPS, histories, parameters_below, tabulated
 from .region import region
-from .stress import LOADED, below, bodies_of, nodal_tractions
+from .stress import LOADED, Surface, below, bodies_of, nodal_tractions
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -47,6 +49,10 @@ class BelowSurface(ABC):
     @abstractmethod
     def step(self, number: int) -> xarray.Dataset:
         """Return a load step."""
+
+    @abstractmethod
+    def traction_field(self, number: int, source: str | None) -> TractionField:
+        """Return pressure and shear traction of a load step at any point."""
 
     @abstractmethod
     def _fields(self, names: Sequence[str], step: int) -> dict[str, Any]:
@@ -79,7 +85,12 @@ class BelowSurface(ABC):
         several = None if one else numbers
         steps = self._loaded(numbers, edges=source != "nodes")
         given = bodies_of(self.deck), body, where, components, several
-        return below(self.lattice, steps, *given, friction=self._friction, source=source)
+        more: dict[str, Any] = {"friction": self._friction, "source": source}
+        return with_places(below(self.lattice, steps, *given, **more, surface=self._surface(numbers)))
+
+    def _surface(self, numbers: Sequence[int]) -> Surface:
+        """Return what gives the tractions over the surface of some steps, to the edges."""
+        return lambda place: self.traction_field(numbers[place], "edges")
 
     @property
     def _friction(self) -> float:
@@ -135,11 +146,12 @@ class BelowSurface(ABC):
         loaded = self._loaded(numbers, SLIPS if "ruiz" in parameters else (), edges=True)
         where = given or Fatigue.default_region
         bodies, friction = bodies_of(self.deck), self._friction
-        found = parameters_below(self.lattice, loaded, bodies, body, where, criteria, friction)
+        surface = self._surface(numbers)
+        found = parameters_below(self.lattice, loaded, bodies, body, where, criteria, friction, surface)
         about: dict[str, Any] = {"steps": np.array(numbers, dtype="i4")}
         if (change := self._change_over(numbers)) is not None:
             about["change_over_cycle"] = change
-        return found.assign_attrs(about)
+        return with_places(found.assign_attrs(about))
 
     def stress_histories(
         self,
@@ -156,9 +168,8 @@ class BelowSurface(ABC):
         numbers = self.cycle_steps(segment, steps)
         found = region(self.lattice, **(where or Fatigue.default_region))
         loaded = self._loaded(numbers, edges=True)
-        for part, history in histories(
-            self.lattice, loaded, bodies_of(self.deck), body, found, self._friction
-        ):
+        given = bodies_of(self.deck), body, found, self._friction, self._surface(numbers)
+        for part, history in histories(self.lattice, loaded, *given):
             yield tabulated(found, part, history, numbers)
 
     def cycle_steps(

@@ -18,7 +18,18 @@ from ..deck.below import NEEDS, Criteria
 from ..errors import DeckError
 from . import fields
 from .region import Region, region
-from .stress import Bodies, Fields, add_bulk, material, source_of, summed, tractions, window_over
+from .stress import (
+    Bodies,
+    Fields,
+    NearSurface,
+    Surface,
+    add_bulk,
+    material,
+    source_of,
+    summed,
+    tractions,
+    window_over,
+)
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -102,17 +113,23 @@ def memory_needed(lattice: Lattice, where: Region, steps: int) -> int:
         whole, _, _ = window_over(lattice, where.lattice)
         # tractions, and the stress on a plane twice
         besides = max(besides, fields.planes_memory(whole) + 8 * min(steps, _AT_ONCE) * 15 * whole.size)
-    return 2 * loads + block + besides + 80 * where.count
+    return 2 * loads + block + besides + 104 * where.count
 
 
 def histories(
-    lattice: Lattice, steps: Sequence[Fields], bodies: Bodies, body: int, where: Region, friction: float
+    lattice: Lattice,
+    steps: Sequence[Fields],
+    bodies: Bodies,
+    body: int,
+    where: Region,
+    friction: float,
+    surface: Surface,
 ) -> Iterator[tuple[slice, Array]]:
     """Yield stress histories (points, steps, 6) of a region block by block, and which of its points they are.
 
     Parameters
     ----------
-    lattice, steps, bodies, body, friction
+    lattice, steps, bodies, body, friction, surface
         As of `hexcontact.interior.stress.below`.
     where : Region
         The points, which are counted as if flattened.
@@ -122,8 +139,22 @@ def histories(
     ResourceError
         If there is not enough memory for tractions and a block.
     """
-    poisson_ratio, _ = material(bodies, body)
-    loads, _ = tractions(lattice, steps, bodies, friction, None)
+    loads, used = tractions(lattice, steps, bodies, friction, None)
+    found = _of_tractions(lattice, steps, loads, body, material(bodies, body)[0], where)
+    if used == "nodes":
+        yield from found
+        return
+    near_surface = NearSurface(lattice, steps, loads, bodies, body, friction, surface)
+    points = where.nodes.reshape(-1, 3)
+    for part, history in found:
+        near_surface.correct(np.swapaxes(history, 0, 1), points[part])
+        yield part, history
+
+
+def _of_tractions(
+    lattice: Lattice, steps: Sequence[Fields], loads: Array, body: int, poisson_ratio: float, where: Region
+) -> Iterator[tuple[slice, Array]]:
+    """Yield the histories that follow from the tractions of the lattice."""
     block = max(_BLOCK, loads.nbytes)
     most = max(block // (48 * len(steps)), 1)
     memory.require(
@@ -171,6 +202,7 @@ def parameters_below(
     where: Mapping[str, Any],
     criteria: Criteria,
     friction: float,
+    surface: Surface,
 ) -> xarray.Dataset:
     """Return fatigue parameters of a body.
 
@@ -191,6 +223,8 @@ def parameters_below(
         The parameters and their constants.
     friction : float
         Coefficient of friction.
+    surface : callable
+        The tractions at the surface, see `hexcontact.interior.stress.below`.
 
     Raises
     ------
@@ -207,7 +241,7 @@ def parameters_below(
     moduli["shear_modulus"] = shear_modulus
     slip = _surface_slip(lattice, steps, found) if "ruiz" in criteria.parameters else None
     values: dict[str, Array] = {}
-    for part, history in histories(lattice, steps, bodies, body, found, friction):
+    for part, history in histories(lattice, steps, bodies, body, found, friction, surface):
         nodal = None if slip is None else slip[..., part]
         block: dict[str, Array] = {}
         for name in sorted(set(criteria.parameters), key=list(NEEDS).index):  # life after its parameter

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, integer
 from ..core import kernel_cache, memory
 from ..core.contact import ElasticPair
-from ..core.edges import ContactEdges, tractions_memory
+from ..core.edges import ContactEdges, TractionField, tractions_memory
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
 from ..deck.tables import Body, Deck
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 Fields = Mapping[str, NDArray[Any]]
 Bodies = Sequence[Body]
+Surface = Callable[[int], TractionField]
+"""The tractions over the surface, to the edges, of the step of a place in a list."""
 
 LOADED = (*TRACTIONS, "bulk_body", *BULK_STRESS)
 """What the stress below the surface comes from."""
@@ -41,9 +43,11 @@ _LOADED_ARRAYS, _CORRECTED_ARRAYS = 8, (3, 6)
 _READ_ARRAYS, _READ_KEPT = 4, 16 * 2**20
 _EDGE_ARRAYS = 11  # arguments and results of the correction at the edges
 _STICK = 1  # value of zone at a sticking node
+NEAR = 1.0  # depth in spacings above which the stress is corrected at the edges
 _SUMS_FOR_A_NODE = 50  # pyramids summed at single points in the time of a node of a plane, at least
 TENSOR = tuple(f"stress_{ab}" for ab in fields.COMPONENTS)
 """Components of the stress in the order of the core, which is that of symmetric tensors in VTK."""
+_AT_SURFACE = ("stress_zz", "stress_xz", "stress_yz")  # of pressure and shear tractions, in either body
 _INVARIANTS = tuple(name for name in STRESSES if STRESSES[name].units == "Pa" and name not in TENSOR)
 _DISPLACEMENTS = tuple(name for name in STRESSES if STRESSES[name].units == "m")
 
@@ -138,7 +142,7 @@ def tractions(
         raise DeckError(
             f"source = {source!r}: expected nodes; the edges need {' and '.join(missing)}, which was not kept"
         )
-    law = np.full_like(at_nodes[0, 0], friction if np.isfinite(friction) else 0.0)
+    law = _friction_of(at_nodes[0, 0], friction)
     constants = [(body.young_modulus, body.poisson_ratio) for body in bodies]
     pair = ElasticPair.from_materials(*constants[0], *constants[1])
     corrected = [
@@ -146,6 +150,11 @@ def tractions(
         for one, step in zip(at_nodes, steps, strict=True)
     ]
     return np.array(corrected), "edges"
+
+
+def _friction_of(field: Array, friction: float) -> Array:
+    """Return the coefficient at the nodes, 0 where shear tractions do not follow the pressure."""
+    return np.full_like(field, friction if np.isfinite(friction) else 0.0)
 
 
 def source_of(steps: Sequence[Fields]) -> str:
@@ -181,6 +190,7 @@ def below(
     *,
     friction: float = 0.0,
     source: str | None = None,
+    surface: Surface | None = None,
 ) -> xarray.Dataset:
     """Return quantities below the surface.
 
@@ -203,6 +213,8 @@ def below(
         Numbers of the steps; without them there is one step, and the dataset has no such dimension.
     friction, source : float and str, optional
         See `tractions`.
+    surface : callable, optional
+        The tractions to the edges, which the stress at depth 0 has exactly unless `source` is the nodes.
 
     Raises
     ------
@@ -225,6 +237,12 @@ def below(
             moved = _in_box(lattice, loads, body, nu, found, len(_DISPLACEMENTS))
         stress = _in_box(lattice, loads, body, nu, found, len(TENSOR))
     add_bulk(stress, steps, body)
+    about: dict[str, Any] = {"body": np.int32(body), "tractions": used}
+    if used == "edges":
+        near_surface = NearSurface(lattice, steps, loads, bodies, body, friction, surface)
+        stress = np.ascontiguousarray(stress)
+        near_surface.correct(stress.reshape(len(steps), -1, len(TENSOR)), found.nodes.reshape(-1, 3))
+        about["edge_without_root"] = near_surface.refused
     values = {name: stress[..., k] for k, name in enumerate(TENSOR)}
     if any(name in _INVARIANTS for name in names):
         scalars = fields.invariants(stress)
@@ -235,7 +253,7 @@ def below(
     return xarray.Dataset(
         {name: (dims, values[name][0] if one else values[name], STRESSES[name].attributes) for name in names},
         coords=found.coordinates | ({} if numbers is None else {"step": ("step", list(numbers))}),
-        attrs={"body": np.int32(body), "tractions": used},
+        attrs=about,
     )
 
 
@@ -246,6 +264,44 @@ def add_bulk(stress: Array, steps: Sequence[Fields], body: int) -> Array:
         component = TENSOR.index(name.removeprefix("bulk_"))
         stress[..., component] += bulk[:, k].reshape(-1, *[1] * (stress.ndim - 2))
     return stress
+
+
+class NearSurface:
+    """What the stress of hats misses next to the surface: roots at the edges, the tractions at depth 0."""
+
+    def __init__(
+        self,
+        lattice: Lattice,
+        steps: Sequence[Fields],
+        loads: Array,
+        bodies: Bodies,
+        body: int,
+        friction: float,
+        surface: Surface | None,
+    ) -> None:
+        self._lattice, self._steps, self._loads, self._surface = lattice, steps, loads, surface
+        self._body, self._poisson_ratio = body, material(bodies, body)[0]
+        self._law = _friction_of(loads[0, 0], friction)
+        self.refused = 0.0  # largest share of an edge without a root
+
+    def correct(self, stress: Array, points: Array) -> None:
+        """Correct the stress (step, point, 6) at points (point, 3), m."""
+        near = points[:, 2] < NEAR * self._lattice.spacing
+        if near.any():
+            for k, (step, loads) in enumerate(zip(self._steps, self._loads, strict=True)):
+                [nodal] = nodal_tractions([step])
+                more, refused = _edges(self._lattice, nodal, step).stress(
+                    *(nodal[1:], np.asarray(step["zone"]) == _STICK, self._law, loads),
+                    *(self._body, self._poisson_ratio, points[near]),
+                )
+                stress[k, near] += more
+                self.refused = max(self.refused, refused)
+        free = points[:, 2] == 0.0
+        if self._surface is not None and free.any():
+            x, y, _ = points[free].T
+            for k in range(len(stress)):
+                for name, load in zip(_AT_SURFACE, self._surface(k)(x, y), strict=True):
+                    stress[k, free, TENSOR.index(name)] = 0.0 - load  # no sign on zero
 
 
 def summed(lattice: Lattice, box: Region) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from ..errors import DeckError
 from ..files import replacing
 from ..text import quantity
 from .below import BelowSurface
+from .extremes import extremes_of, place_of
 
 if TYPE_CHECKING:
     import xarray
@@ -101,20 +102,32 @@ def of_cycle(result: BelowSurface, table: Fatigue) -> xarray.Dataset:
     return result.fatigue(*table.parameters, **cycle, body=table.body, **given, **table.where)  # type: ignore[arg-type]
 
 
-def description(path: Path) -> list[str]:
-    """Return lines about a file of stresses or fatigue parameters; none if it is not one."""
+def read_table(path: Path) -> xarray.Dataset | None:
+    """Return the dataset of a file of stresses or fatigue parameters; None if it is not one."""
     import xarray
 
     if not path.is_file():  # a pipe would block
-        return []
+        return None
     try:
         with xarray.open_dataset(path, engine="netcdf4") as found:
             found.load()
     except (OSError, ValueError):
+        return None
+    return found if found.attrs.get("content") in (STRESS, FATIGUE) else None
+
+
+def content_of(path: Path) -> dict[str, Any]:
+    """Return the content of a file of stresses or fatigue parameters as one object; nothing if it is none."""
+    if (found := read_table(path)) is None:
+        return {}
+    return {"file": path, **found.attrs, "quantities": extremes_of(found)}
+
+
+def description(path: Path) -> list[str]:
+    """Return lines about a file of stresses or fatigue parameters; none if it is not one."""
+    if (found := read_table(path)) is None:
         return []
     about = found.attrs
-    if about.get("content") not in (STRESS, FATIGUE):
-        return []
     steps = np.atleast_1d(about["steps"] if "steps" in about else found["step"].values).tolist()
     sizes = " x ".join(str(n) for name, n in found.sizes.items() if name != "step") or "1"
     over = f"step {steps[0]}" if len(steps) == 1 else f"steps {steps[0]} to {steps[-1]}"
@@ -127,6 +140,8 @@ def description(path: Path) -> list[str]:
         low, high = (quantity(float(end), prefixed) for end in (np.nanmin(values), np.nanmax(values)))
         extent = f"{low} and more" if name == "life" else f"{low} to {high} {unit[len(prefixed) :]}"
         lines.append(f"  {name:<22} {extent}".rstrip())
+        if place := place_of(values):
+            lines.append(f"  {'':<22} {place}")
     return [*lines, str(about["source"])]
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..deck.below import Fatigue, Stage, cycle_of
+from ..deck.below import Fatigue, Stage, cycle_of, steps_fault
 from ..deck.faults import MISSING, Mistake, deck_error
 from ..deck.interface import Friction, Interface, TwoCoefficients, coulomb
 from ..deck.read import Assembled
@@ -206,7 +206,7 @@ def _problems_below(tables: dict[str, Any], steps: Sequence[LoadStep]) -> list[M
             )
             found.append(Mistake((kind, place, "steps"), table.steps, sentence))
         if kind == "fatigue":
-            found += _fatigue_problems(table, place, stages, output.every, frictional)
+            found += _fatigue_problems(table, place, stages, output.every, frictional, numbered=last > 0)
             ruiz = "ruiz" in table.parameters
             needed += [name for name in known if ruiz and name.startswith("slip_increment")]
     if below and output.fields and (lost := [n for n in needed if n not in output.fields]):
@@ -217,9 +217,9 @@ def _problems_below(tables: dict[str, Any], steps: Sequence[LoadStep]) -> list[M
 
 
 def _fatigue_problems(
-    table: Fatigue, place: int, stages: Sequence[Stage], every: int, frictional: bool
+    table: Fatigue, place: int, stages: Sequence[Stage], every: int, frictional: bool, *, numbered: bool
 ) -> list[Mistake]:
-    """Return segments without a closed cycle, as far as loads are known, and Ruiz off the surface."""
+    """Return segments or steps that make no closed cycle, as far as loads tell, and Ruiz off the surface."""
     found = []
     elsewhere = table.depths not in (None, (0.0,)) or table.points or table.line or table.plane
     if "ruiz" in table.parameters and (elsewhere or not frictional):
@@ -233,6 +233,8 @@ def _fatigue_problems(
             fault = str(error)
     if table.segment and fault:
         found.append(Mistake(("fatigue", place, "segment"), table.segment, fault))
+    if table.steps and numbered and (fault := steps_fault(stages, table.steps)):
+        found.append(Mistake(("fatigue", place, "steps"), table.steps, fault))
     return found
 
 

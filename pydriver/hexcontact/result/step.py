@@ -260,7 +260,8 @@ class Step:
         if not self.sharp:
             loaded = {name: values for name, values in loaded.items() if name not in EDGES}
         given = self.bodies, body, {"points": points}, components
-        return below(self.lattice, [loaded], *given, friction=self.friction, source=source)
+        more: dict[str, Any] = {"friction": self.friction, "source": source}
+        return below(self.lattice, [loaded], *given, **more, surface=lambda _: self.traction_field("edges"))
 
     # --- display --------------------------------------------------------------------------------------------
 

@@ -1,0 +1,55 @@
+"""Where the quantities of a table are largest, and life is least."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..text import quantity
+
+if TYPE_CHECKING:
+    import xarray
+
+_LEAST = ("life",)  # quantities whose least value counts
+
+
+def with_places(found: xarray.Dataset) -> xarray.Dataset:
+    """Return a dataset whose quantities have the attributes largest, largest_at (x, y, depth), largest_step."""
+    for name, field in found.data_vars.items():
+        values = np.where(np.isfinite(field.values), field.values, np.nan)
+        if field.attrs.get("units") == "rad" or np.isnan(values).all():
+            continue
+        word, pick = ("least", np.nanargmin) if name in _LEAST else ("largest", np.nanargmax)
+        at = field.isel(dict(zip(field.dims, np.unravel_index(pick(values), values.shape), strict=True)))
+        field.attrs[word] = float(at)
+        field.attrs[f"{word}_at"] = [float(at[axis]) for axis in ("x", "y", "depth")]
+        if "step" in at.coords:
+            field.attrs[f"{word}_step"] = int(at["step"])
+    return found
+
+
+def place_of(field: xarray.DataArray) -> str:
+    """Return the value that counts and its place in words; empty if the file has none."""
+    word = "least" if field.name in _LEAST else "largest"
+    if (at := field.attrs.get(f"{word}_at")) is None:
+        return ""
+    units = str(field.attrs.get("units", "")).removesuffix("1")
+    value = float(field.attrs[word])
+    text = quantity(value, units) if " " not in units else f"{quantity(value)} {units}"
+    x, y, depth = (quantity(float(place), "m") for place in at)
+    step = field.attrs.get(f"{word}_step")
+    return f"{word} {text} at x = {x}, y = {y}, depth {depth}" + (f", step {step}" if step else "")
+
+
+def extremes_of(found: xarray.Dataset) -> dict[str, dict[str, Any]]:
+    """Return the range of each quantity, and the place of the value that counts, for other programs."""
+    return {
+        str(name): {
+            "units": field.attrs.get("units", ""),
+            "range": [float(np.nanmin(field)), float(np.nanmax(field))],
+            **{key: value for key, value in field.attrs.items() if key.startswith(("least", "largest"))},
+        }
+        for name, field in found.data_vars.items()
+        if field.attrs.get("units") != "rad"
+    }

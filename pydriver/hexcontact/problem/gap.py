@@ -112,12 +112,15 @@ class Gap:
         ours = isinstance(self.source, np.ndarray | HeightMap | Separation)
         return gap if ours else gap.copy()  # a function may keep, and change, what it returns
 
-    def ends_within(self, lattice: Lattice, chosen: Mask) -> bool:
-        """Test whether a height map ends within a spacing of one of some nodes of a window."""
-        source = self.source
-        if not isinstance(source, HeightMap):
-            return False
-        return source.ends_within(lattice.spacing, lattice.x[chosen], lattice.y[chosen])
+    @property
+    def height_map(self) -> HeightMap | None:
+        """The map of heights, if it is one."""
+        return self.source if isinstance(self.source, HeightMap) else None
+
+    def fault_near(self, lattice: Lattice, chosen: Mask) -> str:
+        """Return what a contact at some nodes of a window comes too near to: the end of a map, or a hole."""
+        grid = self.height_map
+        return grid.fault_near(lattice.spacing, lattice.x[chosen], lattice.y[chosen]) if grid else ""
 
     def __eq__(self, other: object) -> bool:
         """Test whether two gaps are the same; functions are if they are one object."""

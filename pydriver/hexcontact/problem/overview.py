@@ -75,6 +75,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
     )  # without the coordinates, for which the window may be too large
     return [
         *((f"body {number}", _body(body)) for number, body in ((1, case.body_1), (2, case.body_2))),
+        *([("gap", str(case.height_map))] if case.height_map else []),
         (
             "pair",
             f"E* = {quantity(case.pair.effective_modulus, 'Pa')}, beta = {case.pair.beta:.4g}, "
@@ -125,6 +126,7 @@ def law_in_words(case: Problem) -> str:
     mu: Any = friction.coefficient if friction else 0.0
     if isinstance(mu, NodalCoefficient):
         law = f"coefficient {mu}" if mu.in_deck != FROM_PYTHON else "coefficient by node"
+        law += ", bilinear" * isinstance(mu.in_deck, dict)
     elif isinstance(mu, TwoCoefficients):
         law = f"coefficients {mu}"
     else:

@@ -101,6 +101,27 @@ LIMITS = (
         "Nodes that enter are charged with the slip of the whole step: (X3) to (X5)",
         most=_STEP_ERROR,
     ),
+    Limit(
+        "spacings_between_points",
+        "the points of the height map are {spacings_between_points:.2g} spacings apart, expected at most 10: "
+        "the nodes between them add no information; choose a larger spacing",
+        "A spline of points that are further apart than the wavelengths of a surface has none of its waves",
+        most=10.0,
+    ),
+    Limit(
+        "points_between_nodes",
+        "the nodes are {points_between_nodes:.2g} points of the height map apart, expected at most 5: those "
+        "between them do not count; choose a smaller spacing, or average the heights",
+        "Waves shorter than two spacings appear as longer ones (Shannon, Proc. IRE 37, 1949, 10)",
+        most=5.0,
+    ),
+    Limit(
+        "holes_near_contact",
+        "{holes_near_contact} holes of the height map lie near the estimated contact: a contact that comes "
+        "within two points of one ends the run; fill them, as by gap.interpolate_na",
+        "Contact beside a hole would end there only because the data do",
+        most=0.0,
+    ),
 )
 """All limits, in the order of the warnings."""
 
@@ -136,6 +157,13 @@ def expected(case: Problem) -> dict[str, Any]:
         "pressure_ratio": known.max_pressure / case.pair.effective_modulus,
         "spacings": known.half_width / case.lattice.spacing,
     }
+    if grid := case.height_map:
+        along = np.array(grid.distances) / case.lattice.spacing
+        found |= {
+            "spacings_between_points": float(along.max()),
+            "points_between_nodes": float(1.0 / along.min()),
+            "holes_near_contact": case.holes_near(known),
+        }
     if case.accuracy is None:
         errors, needed = expected_lattice_errors(found["spacings"], _slipping(case), _LATTICE_ERROR)
         found |= {

@@ -219,9 +219,6 @@ class _Column(NamedTuple):
     cells: list[Any]
 
 
-_UNIT_IN_HEADER = r"\s*(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))?\s*"
-
-
 def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
     """Return a series of loads from a file.
 
@@ -346,8 +343,10 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
 
 def _split(header: str) -> tuple[str, str]:
     """Return a header without its unit, and the unit."""
-    match = re.fullmatch(_UNIT_IN_HEADER, header)
-    return (match["name"], (match["square"] or match["round"] or "").strip()) if match else (header, "")
+    name = header.strip()
+    opening = {"]": "[", ")": "("}.get(name[-1:], "")
+    before, bracket, unit = name[:-1].rpartition(opening) if opening else ("", "", "")
+    return (before.strip(), unit.strip()) if bracket and name[-1] not in unit else (name, "")
 
 
 def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:

@@ -12,7 +12,7 @@ import re
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..text import listed
+from ..text import listed, shown
 
 if TYPE_CHECKING:
     import pint
@@ -56,9 +56,11 @@ _METRIC = {
 
 _ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0, "mrad": 1e-3}
 
-_QUANTITY = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>.*?)\s*", re.ASCII
-)
+DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+"""Pattern of a number without its sign; each digit fits one part of it only, so that it cannot backtrack."""
+
+_QUANTITY = re.compile(rf"(?P<number>[+-]?{DIGITS})\s*(?P<unit>.*)", re.ASCII)
+LONGEST = 1000  # characters of a quantity
 
 # Products, quotients and small powers of named units; pint would evaluate other expressions.
 _NAME = r"[^\W\d_]+|[%°]|[^\W\d_]*°"
@@ -105,7 +107,7 @@ def to_si(value: object, dimension: Dimension) -> float:
 
 
 def _from_text(text: str, dimension: Dimension) -> float:
-    match = _QUANTITY.fullmatch(text)
+    match = _QUANTITY.fullmatch(text.strip()) if len(text) <= LONGEST else None
     if match is None:
         raise UnitError("")
     number, unit = match["number"], match["unit"]
@@ -145,7 +147,7 @@ def _unknown(number: float, unit: str, dimension: Dimension) -> str:
     alike = [known for known in _METRIC.get(dimension.unit, {}) if known.lower() == unit.lower()]
     power = re.sub(r"(?<=[^\W\d_])(?=\d$)", "^", unit)
     hint = listed(alike, "or") if alike else power if power != unit else ""
-    return f'"{unit}" is not a known unit' + (f"; did you mean {hint}?" if hint else "")
+    return f"{shown(unit)} is not a known unit" + (f"; did you mean {hint}?" if hint else "")
 
 
 def _same(units: Any, other: Any) -> bool:

@@ -156,7 +156,7 @@ class HeightMap:
         around = [self._filled[row + i, col + j] for i in (0, 1) for j in (0, 1)]
         return np.minimum.reduce(around), np.maximum.reduce(around)
 
-    @property
+    @cached_property
     def overshoot(self) -> float:
         """Largest departure (m) from the range of the four heights around: in middles of cells and edges."""
         x, y = (np.sort(np.append(along, along[:-1] + np.diff(along) / 2)) for along in (self.x, self.y))

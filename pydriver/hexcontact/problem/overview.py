@@ -180,13 +180,18 @@ def _history(case: Problem) -> str:
         where = f"{chosen} segment{'s' * (chosen > 1)}"
         fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
         return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}"
+    gaps = "".join(
+        f"; {count} of {rows.count} rows of a series keep the {key.replace('_', ' ')} of the row before"
+        for rows in (load.series for load in case.deck.load if load.series)
+        for key, count in rows.missing.items()
+    )
     wears = ""
     if wear := case.deck.wear:
         solved = 'a number that shows on the way (jump "auto")'
         if not isinstance(wear.jump, str):
             solved = f"{math.ceil(wear.cycles / wear.jump) + 1:,}"
         wears = f", then {solved} of {wear.cycles:,} cycles, with {1 + len(case.cycle)} each"
-    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "") + wears
+    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "") + wears + gaps
 
 
 def _largest(case: Problem) -> str:

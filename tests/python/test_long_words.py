@@ -9,6 +9,7 @@ import importlib
 import itertools
 import re
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, get_args
@@ -84,7 +85,9 @@ def patterns() -> dict[tuple[str, str], str]:
             for entry in value if isinstance(value, tuple) else (value,):
                 if constant.startswith("_") and isinstance(entry, str) and re.search(r"[\\\[]", entry):
                     try:
-                        re.compile(entry)
+                        with warnings.catch_warnings():
+                            warnings.simplefilter("ignore")
+                            re.compile(entry)
                     except re.error:  # a text
                         continue
                     found.setdefault((entry, "match"), f"{name}.{constant}")

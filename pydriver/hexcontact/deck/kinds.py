@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from ..text import did_you_mean, listed, shown
 from ..variables import LARGEST
 from .formula import Formula
-from .units import ANGLE, DIGITS, LONGEST, NUMBER, Dimension, UnitError, to_si
+from .units import ANGLE, DIGITS, LONGEST, NUMBER, Dimension, UnitError, spelled, to_si
 
 Schema = dict[str, Any]
 """A JSON schema."""
@@ -122,7 +122,7 @@ class Quantity(Kind):
         bounds = {"exclusiveMinimum": self.above, "minimum": self.at_least, "maximum": self.at_most}
         number = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
         least = self.above if self.above is not None else self.at_least
-        sign = r"\+?" if least is not None and least >= 0 else "[+-]?"
+        sign = r"\+?" if least is not None and least >= 0 else "[+\u2212-]?"
         text = {"type": "string", "pattern": rf"^\s*{sign}{DIGITS}\s*[^\s\d.+-].*$"}
         known: Schema = {"description": self.expected[0].upper() + self.expected[1:]}
         if self.dimension is NUMBER:
@@ -174,7 +174,7 @@ class OrShare(Kind):
     def _parse(self, value: object) -> float | Share:
         if isinstance(value, Share):
             return value
-        text = value.strip() if isinstance(value, str) and len(value) <= LONGEST else ""
+        text = spelled(value.strip()) if isinstance(value, str) and len(value) <= LONGEST else ""
         match = re.fullmatch(_SHARE, text)
         if match and abs(share := float(match[1])) <= LARGEST:
             return Share(share)

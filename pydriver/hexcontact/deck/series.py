@@ -21,7 +21,7 @@ from ..text import did_you_mean, folded, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
 from .model import Table, extended, meaning
-from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE
+from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
 
 class Driven(NamedTuple):
@@ -97,7 +97,7 @@ _LONGEST_LABEL = 1000  # characters
 _EXPECTED = "a CSV or netCDF file of loads"
 _MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # cells without a value, in small letters
 _SEPARATORS = ("\t", ";", ",")
-_THOUSANDS = r"[+-]?\d{1,3}(?:[ '\u00a0\u2009\u202f]\d{3})+(?:\.\d*)?"
+_THOUSANDS = r"[+-]?\d{1,3}(?:[ ']\d{3})+(?:\.\d*)?"
 _NUMBER = r"[+-]?\.?\d"  # its beginning
 _FORTRAN_EXPONENT = r"(?<=[\d.])[dD](?=[+-]?\d+$)"
 _BETWEEN_BLANKS = r"[^\s\[(]+(?:\s*(?:\[[^\[\]]*\]|\([^()]*\)))?"  # a header with its unit
@@ -313,6 +313,7 @@ def _value(key: str, cell: Any, unit: str) -> Any:
         return ""
     kind = DRIVEN[key].kind
     if isinstance(cell, str):
+        cell = spelled(cell)
         if re.fullmatch(_THOUSANDS, cell):
             refuse("expected a number without separators of thousands")
         if re.fullmatch(r"[+-]?[\d.]+,\d+", cell):

@@ -79,6 +79,13 @@ LIMITS = (
         least=1e-4,
     ),
     Limit(
+        "young_modulus",
+        "a Young's modulus of {young_modulus:g} Pa is below that of rubber, expected at least 1e6: bare "
+        "numbers are in m, N and Pa, not in mm and MPa",
+        "Rubber has 1 MPa and more; a modulus in MPa, taken as Pa, is below 1.2e6 for every solid",
+        least=1e6,
+    ),
+    Limit(
         "friction_coefficient",
         "friction.coefficient = {friction_coefficient:g}, expected at most 3 (was it in percent?), or inf "
         "for no slip",
@@ -145,6 +152,8 @@ def expected(case: Problem) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if isinstance(mu, TwoCoefficients):
         mu = max(mu.along, mu.across)
+    if moduli := [body.young_modulus for body in (case.body_1, case.body_2) if body.young_modulus]:
+        found["young_modulus"] = min(moduli)
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     if known is None:

@@ -68,8 +68,13 @@ LONGEST = 1000  # characters of a quantity
 # Signs and powers as programs for texts write them, and units that pint reads otherwise or not at all.
 _SIGNS = str.maketrans("\u2212\u2013\u22c5\u00d7\u00a0\u2009\u202f", "--**   ")
 _POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-_SPELLED = {"Msi": "Mpsi", "mil": "thou", "mils": "thou"}
-_POUNDS = {"lb": "lbf", "lbs": "lbf"}  # of forces and torques
+_POUNDS = {"lb": "lbf", "lbs": "lbf"}
+_SPELLED = {  # by SI unit
+    "m": {"mil": "thou", "mils": "thou"},
+    "Pa": {"Msi": "Mpsi"},
+    "N": _POUNDS,
+    "N m": _POUNDS,
+}
 _MOMENT = re.compile(r"([nuµmkMG]?N)(um|µm|mm|cm|m)")
 _BRACKETS = re.compile(r"(/ ?)?\(([^()/]*)\)(?! ?[*^])")
 _TIMES = re.compile(r" ?(?<!\*)[*·](?!\*) ?|(?<=\w) (?=[^\W\d])")
@@ -125,7 +130,7 @@ def spelled(text: str) -> str:
 
 def _plain(unit: str, dimension: Dimension) -> str:
     """Return a unit as a product of names that pint knows, without brackets: mm^3/N/m for mm^3/(N m)."""
-    known = _SPELLED | (_POUNDS if dimension in (FORCE, TORQUE) else {})
+    known = _SPELLED.get(dimension.unit, {})
 
     def name(word: re.Match[str]) -> str:
         moment = _MOMENT.fullmatch(word[0])

@@ -158,12 +158,15 @@ class HeightMap:
 
     @cached_property
     def overshoot(self) -> float:
-        """Largest departure (m) from the range of the four heights around: in middles of cells and edges."""
-        x, y = (np.sort(np.append(along, along[:-1] + np.diff(along) / 2)) for along in (self.x, self.y))
-        x, y = np.meshgrid(x, y, indexing="ij")
-        found, (least, most) = self(x, y), self._range(x, y)
-        beyond = np.maximum(found - most, least - found)
-        largest = float(beyond[np.isfinite(beyond)].max())
+        """Largest departure (m) from the range of the four heights around, in the middles of cells."""
+        x, y = (along[:-1] + np.diff(along) / 2 for along in (self.x, self.y))
+        around = [self._filled[i : i - 1 or None, j : j - 1 or None] for i in (0, 1) for j in (0, 1)]
+        found = np.array(self._spline(x, y))
+        if self._smooth is not None:
+            row, col = np.nonzero(self._smooth(x, y) < 1.0 - 1e-9)
+            found[row, col] = self(x[row], y[col])
+        beyond = np.maximum(found - np.maximum.reduce(around), np.minimum.reduce(around) - found)
+        largest = float(beyond[np.isfinite(beyond)].max(initial=0.0))
         return largest if largest > 1e-12 * np.ptp(self._filled) else 0.0  # rounding
 
     # --- contacts that the data do not bound ----------------------------------------------------------------

@@ -45,8 +45,9 @@ class Case(Problem):
     gap : callable or array_like, optional
         Initial gap (m) instead of the surfaces of the bodies: a function of two arrays x, y (m); an array
         (n_row, n_col) over the nodes of `lattice`; or heights on a rectangular grid, an xarray.DataArray
-        with the coordinates x and y (in m, or in their attribute ``units``), which a cubic spline joins.
-        Infinite where the bodies cannot touch. The approach counts from gap = 0.
+        with the coordinates x and y (in m, or in their attribute ``units``), which a cubic spline joins, near
+        steps without overshoot. Infinite where the bodies cannot touch; NaN in holes of the data, near which
+        a contact is an error. The approach counts from gap = 0.
     lattice : Lattice, optional
         The window, instead of the keyword arguments of the grid.
     spacing, nodes_across, nodes_in_radius, extent, window, center, origin : optional

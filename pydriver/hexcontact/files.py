@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import errno
 import os
@@ -50,7 +51,9 @@ def text_of(path: str | Path, expected: str) -> str:
         fault = "is a folder"
     except UnicodeDecodeError as error:
         fault = f"is not UTF-8 text (byte {error.start})"
-        if content.startswith(_HDF5):
+        if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            fault = "is UTF-16 text; save it as UTF-8"
+        elif content.startswith(_HDF5):
             fault = "is a netCDF file, such as a result; hexcontact info shows it"
     except (OSError, ValueError) as error:
         fault = f"cannot be read ({getattr(error, 'strerror', None) or error})"

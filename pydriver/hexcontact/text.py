@@ -80,10 +80,22 @@ def listed(entries: Sequence[str], conjunction: str) -> str:
     return f" {conjunction} ".join([*filter(None, [", ".join(entries[:-1])]), *entries[-1:]])
 
 
+def folded(word: str) -> str:
+    """Return a word without case, blanks, underscores and hyphens."""
+    return "".join(word.split()).replace("_", "").replace("-", "").casefold()
+
+
+def nearest(word: object, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """Return the nearest known word, first without case, blanks and underscores; empty if none is near."""
+    of_folded = {folded(name): name for name in known}
+    near = difflib.get_close_matches(folded(str(word)[:100]), list(of_folded), n=1, cutoff=cutoff)
+    return of_folded[near[0]] if near else ""
+
+
 def did_you_mean(word: object, known: Iterable[str]) -> str:
     """Return "; did you mean ...?" with the nearest known word, or nothing."""
-    near = difflib.get_close_matches(str(word)[:100], list(known), n=1)
-    return f"; did you mean {near[0]}?" if near else ""
+    near = nearest(word, known)
+    return f"; did you mean {near}?" if near else ""
 
 
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}

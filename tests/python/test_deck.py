@@ -379,7 +379,7 @@ def test_read_toml(tmp_path: Path) -> None:
         (b"a = 1\nb = \n", ":2:5: is not TOML: Invalid value"),
         (b"a = 1\na = 2\n", ":2:6: is not TOML: Cannot overwrite a value; a stands there a second time"),
         (b'a = "x', "is not TOML: "),
-        (b"\xff\xfe", ": is not UTF-8 text (byte 0); expected a deck (a TOML file)"),
+        (b"\xff\xfe", ": is UTF-16 text; save it as UTF-8; expected a deck (a TOML file)"),
         (b"CDF\x01\x00", ":1:4: is not TOML: "),
         (b"a = " + b"[" * 20000, ": is not TOML: nested too deeply"),
         (b"a = " + b"9" * 5000, ": is not TOML: "),

@@ -295,7 +295,6 @@ WRONG = [
         "normal_load\n\n-1\nnan\ninf\n",
         [
             'line 3, column "normal_load" = "-1"',
-            'line 4, column "normal_load" = "nan"',
             'line 5, column "normal_load" = "inf"',
         ],
     ),
@@ -309,7 +308,7 @@ WRONG = [
     ("normal_load,normal_load\n1,2\n", ['expected each column once; "normal_load" is there more than once']),
     (
         "normal_load,shift_x\n1,2\n1,2,3\n",
-        ["history.csv, line 3: expected 2 cells, as many as headers, not 3"],
+        ["history.csv, line 3: expected 2 cells, as many as headers in line 1, not 3"],
     ),
     ("label\nx\n", ["history.csv: expected a column of loads or motions, such as normal_load [N]"]),
     ("normal_load\n", ["history.csv: expected at least one row below the headers"]),
@@ -328,6 +327,65 @@ def test_mistakes_in_files_of_series(folder: Path, text: str, sentences: list[st
     for sentence in sentences:
         assert any(sentence in line for line in lines), lines
     assert all(line.startswith("deck.toml:14:") and "load.1.series" in line for line in lines)
+
+
+PLAIN = "time [s],normal_load [N],tangential_load_x [N]\n0,5,0\n1,20,0\n2,20,3\n3,20,-3\n4,20,3\n"
+BLANKS = PLAIN.replace(",", "  ")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        f"#{PLAIN}",  # as numpy.savetxt writes them
+        f"# of the rig\n\n# {PLAIN}# the end\n",
+        PLAIN.replace("5,", "5.0D+00,").replace("20,", "2.0d1,"),  # Fortran
+        PLAIN.replace(" [s]", "").replace(" [N]", "").replace("x\n", "x\ns,N,N\n"),
+        PLAIN.replace(" [s]", "").replace(" [N]", "").replace("x\n", "x\n-,[N],(N)\n"),
+        "sep=;\n" + PLAIN.replace(",", ";"),
+        PLAIN.replace("\n", ",\n").replace("],\n", "]\n", 1),
+        PLAIN.replace("\n", ",,\n"),
+        BLANKS,
+        f"# {BLANKS}",
+        BLANKS.replace(" [s]", "").replace(" [N]", "").replace("x\n", "x\ns  N  N\n"),
+        PLAIN.title().replace("_", " "),
+        PLAIN.replace("\n", "\r"),
+    ],
+)  # fmt: skip
+def test_series_as_programs_write_them(folder: Path, text: str) -> None:
+    Path("history.csv").write_text(text, encoding="utf-8", newline="")
+    assert read_series(Path("history.csv")) == {
+        "normal_load": [5.0, 20.0, 20.0, 20.0, 20.0], "tangential_load_x": [0.0, 0.0, 3.0, -3.0, 3.0],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("nothing", ["", "NaN", "nan", "N/A", "-", "null"])
+def test_a_missing_value_keeps_the_quantity_and_is_counted(folder: Path, nothing: str) -> None:
+    put("history.csv", f"normal_load [N],tangential_load_x [N],label\n10,0,-\n{nothing},2,-\n20,3,-\n")
+    case = Case.from_toml(put("deck.toml", SERIES))
+    assert targets(case) == [(10, 0, 0, 0), (10, 2, 0, 0), (20, 3, 0, 0)]
+    assert (
+        dict(case_rows(case))["load steps"]
+        == "3; 1 of 3 rows of a series keep the normal load of the row before"
+    )
+    put("history.csv", f"normal_load [N],approach [um]\n10,{nothing}\n{nothing},2\n")
+    assert dict(case_rows(Case.from_toml(put("deck.toml", SERIES))))["load steps"] == "2"
+
+
+def test_what_is_unusual_in_a_series_is_named(folder: Path) -> None:
+    for text, sentence in (
+        (f"Operator: n.n.\n{PLAIN}", "line 2: expected 1 cells, as many as headers in line 1, not 3"),
+        (f"{PLAIN}5,-1e-6,0\n", "; this is noise, 5e-08 of the largest one: write 0"),
+        ("normal_load [mN]\n20 000\n", "expected a number without separators of thousands"),
+        ('normal_load [N]\n"1,000"\n', "expected a decimal point, not a comma"),
+        ("normal_load,twist\nN,N\n1,2\n", 'column "twist": expected an angle'),
+        ("Normal_Lod\n1\n", "did you mean normal_load?"),
+        ("normal_load\n-5\n", 'line 2, column "normal_load" = "-5"'),
+    ):
+        put("history.csv", text)
+        assert sentence in "\n".join(complaint(put("deck.toml", SERIES)))
+    Path("history.csv").write_text(PLAIN, encoding="utf-16")
+    assert "is UTF-16 text; save it as UTF-8" in "\n".join(complaint(put("deck.toml", SERIES)))
 
 
 def test_mistakes_about_series(folder: Path) -> None:

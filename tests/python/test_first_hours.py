@@ -21,9 +21,10 @@ from commands import ENVIRONMENT
 from typer.testing import CliRunner, Result
 
 import hexcontact
-from hexcontact import Case
+from hexcontact import Case, DeckError
 from hexcontact.case import Body
 from hexcontact.cli.app import app
+from hexcontact.deck import model
 from hexcontact.deck.write import starter
 from hexcontact.surfaces import Sphere
 from hexcontact.text import cut
@@ -71,6 +72,10 @@ WRONG = [  # what stands in the deck, what is written instead, the only lines of
     ('"10 mm"', '"10,5 mm"', [r".*; a number has a decimal point: 10\.5"]),
     ("[grid]", "[friction]", [r"\d+:10: is not TOML: Cannot declare \('friction',\) twice"]),
     ("[[load]]", "[load]\nsteps = 1\n[load]", [r"\d+:6: .*; of several tables .*: \[\[load\]\]"]),
+    ("normal_load = ", "Normal_Load = ", [r".*load\.1\.Normal_Load: .*; did you mean normal_load\?"]),
+    (PRESSING, 'Tangential_Load_X = "9 N"', [r".*load\.1\.T.*_X: .*; did you mean tangential_load_x\?"]),
+    (PRESSING, 'tangentialLoadY = "9 N"', [r".*load\.1\.t.*Y: .*; did you mean tangential_load_y\?"]),
+    ("young_modulus", '"Young modulus"', [r".*body\.1\.Young modulus: .*; did you mean young_modulus\?"]),
     ("radius = ", "R = ", [r".*body\.1\.surface\.R: unknown key; did you mean radius\?"]),
     ("nodes_in_radius = 20", 'h = "1 um"', [r".*grid\.h: unknown key; did you mean spacing\?"]),
     ("[friction]", "[frction]", [r".*frction: unknown key; did you mean friction\?"]),
@@ -331,3 +336,39 @@ def test_a_result_shows_its_warnings_and_where_pictures_are() -> None:
         _ = result.plot
     with pytest.raises(AttributeError, match=r'case\.run\("name\.nc"\)'):
         _ = result.save
+
+
+@pytest.mark.parametrize(
+    ("size", "words"),
+    [
+        ('diameter = "20 mm"', r'diameter = "20 mm": unknown key; use radius, half the diameter: 0\.01 m'),
+        ("Diameter = 0.02", r"Diameter = 0\.02: unknown key; use radius, half the diameter: 0\.01 m"),
+        ('diameter = "wide"', r'diameter = "wide": unknown key; use radius, half the diameter'),
+    ],
+)
+def test_a_diameter_names_the_radius(folder: Path, size: str, words: str) -> None:
+    (folder / "wrong.toml").write_text(DECK.replace('radius = "10 mm"', size), encoding="utf-8")
+    [line] = refused("check", "wrong.toml")
+    assert re.fullmatch(rf".*body\.1\.surface\.{words}", line)
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "coating",
+        "layer_thickness",
+        "Yield Stress",
+        "temperature",
+        "thermal_conductivity",
+        "viscosity",
+        "density",
+    ],
+)
+def test_features_that_are_not_included_point_to_the_limits(folder: Path, key: str) -> None:
+    page = (Path(__file__).parents[2] / "docs/limits.md").read_text(encoding="utf-8")
+    for name in model._NOT_INCLUDED:
+        assert any(word[:10] in page for word in name.split() if word not in ("and", "bodies"))
+    with pytest.raises(DeckError, match=r"unknown key; [a-z ]+: not included \(docs/limits\.md says"):
+        Case.from_toml("deck.toml", {f"body.1.{key}": 1})
+    with pytest.raises(TypeError, match=r"unknown argument of Case; [a-z ]+: not included \(docs/limits\.md"):
+        Case(**{"body_1": {}, "body_2": {}, key: 1})

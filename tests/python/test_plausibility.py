@@ -57,7 +57,22 @@ def test_cases_need_no_warning(path: Path) -> None:
     [
         (
             {"body__1__young_modulus": "113.8 Pa"},
-            ["the surfaces slope by 17 ", "the largest pressure is 12 E*"],
+            [
+                "the surfaces slope by 17 ",
+                "the largest pressure is 12 E*",
+                "a Young's modulus of 113.8 Pa is",
+            ],
+        ),
+        (
+            {
+                "body__1__young_modulus": 210000,
+                "body__1__surface__radius": 10,
+                "body__2__rigid": True,
+                "body__2__young_modulus": None,
+                "body__2__poisson_ratio": None,
+                "load__1__normal_load": 1e4,
+            },
+            ["a Young's modulus of 210000 Pa is below that of rubber, expected at least 1e6: bare"],
         ),
         ({"body__1__surface__radius": "25 m"}, ["the largest pressure is only 8.1e-05 E*"]),
         (

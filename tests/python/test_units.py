@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from hexcontact.deck import units
 from hexcontact.deck.units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE, UnitError, to_si
+from hexcontact.deck.wear import COEFFICIENT
 
 
 @pytest.mark.parametrize(
@@ -36,6 +37,24 @@ from hexcontact.deck.units import ANGLE, FORCE, LENGTH, NUMBER, PRESSURE, TORQUE
         ("0.25 turn", ANGLE, math.pi / 2),
         ("2 mrad", ANGLE, 2e-3),
         ("5 %", NUMBER, 0.05),
+        ("2 Nm", TORQUE, 2.0),
+        ("2 Nmm", TORQUE, 2e-3),
+        ("2 kNm", TORQUE, 2e3),
+        ("2 nNm", TORQUE, 2e-9),
+        ("1e-5 mm^3/(N m)", COEFFICIENT, 1e-14),
+        ("1e-5 mm^3 / (N*m)", COEFFICIENT, 1e-14),
+        ("1e-5 mm³/Nm", COEFFICIENT, 1e-14),
+        ("1e-5 mm³/(N·m)", COEFFICIENT, 1e-14),
+        ("1e-5 mm³N⁻¹m⁻¹".replace("³", "³ ").replace("¹m", "¹ m"), COEFFICIENT, 1e-14),
+        ("30 Msi", PRESSURE, 30e6 * 4.4482216152605 / 0.0254**2),
+        ("30 psi", PRESSURE, 30 * 4.4482216152605 / 0.0254**2),
+        ("10 lbs", FORCE, 44.482216152605),
+        ("10 lb", FORCE, 44.482216152605),
+        ("1 lb ft", TORQUE, 4.4482216152605 * 0.3048),
+        ("2 mil", LENGTH, 50.8e-6),
+        ("\u221210 N", FORCE, -10.0),
+        ("10\u00a0N", FORCE, 10.0),
+        ("1 N/mm²", PRESSURE, 1e6),
         (0.3, NUMBER, 0.3),
         (7, LENGTH, 7.0),
     ],
@@ -64,6 +83,11 @@ def test_values_become_si(text: object, dimension: units.Dimension, expected: fl
         ("3 mm^999999999", LENGTH, "is not a known unit"),
         ("3 __import__('os')", LENGTH, "is not a known unit"),
         ("3 m; m", LENGTH, "is not a known unit"),
+        ("3 (N m)^2", TORQUE, "is not a known unit"),
+        ("3 (N m)**2", TORQUE, "is not a known unit"),
+        ("3 mm^3/(N/m)", COEFFICIENT, "is not a known unit"),
+        ("3 lbs", LENGTH, '"lbs" is a mass'),
+        ("3 Nm", FORCE, '"Nm" is a torque or an energy'),
         ("3" + " mm" * 100, LENGTH, "is not a known unit"),
         ("3", LENGTH, "a quoted value needs its unit"),
         ("0.3", NUMBER, "write the number without quotes"),

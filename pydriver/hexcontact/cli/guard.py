@@ -123,7 +123,7 @@ class _Unpadded(io.TextIOWrapper):
 
     def write(self, text: str) -> int:
         """Write text."""
-        super().write(re.sub(r" +(?=\n)", "", text))
+        super().write(re.sub(r"(?<! ) ++(?=\n)", "", text))
         return len(text)
 
 

@@ -187,7 +187,7 @@ def setting(text: str) -> tuple[str, Any]:
         raise DeckError(f"--set {text}: expected KEY=VALUE, such as load.1.normal_load='20 N'")
     try:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except ValueError:  # TOMLDecodeError, or an integer of too many digits
         return key.strip(), value.strip()
 
 

@@ -196,7 +196,7 @@ def _warn(message: str, level: int = 4) -> None:
 
 def _bytes(value: float | str, name: str) -> int:
     """Return a number of bytes."""
-    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE]\d+)?)\s*(\w*)\s*", str(value))
+    match = re.fullmatch(r"\s*(\d++(?:\.\d*+)?(?:[eE]\d++)?)\s*+(\w*+)\s*", str(value))
     factor = _UNITS.get(match[2]) if match else None
     if match is None or factor is None or float(match[1]) * factor >= 2**62:
         raise DeckError(f"{name} = {value!r}: expected a number of bytes such as 512 MB")
@@ -265,6 +265,8 @@ def _maker() -> str:
         )
         parts += sorted(set(processor))
         # of the system, by these names; those of packages have others
-        mapped = re.findall(r"/\S*/lib(?:m|fftw3f?|gfortran)\.so\S*", Path("/proc/self/maps").read_text())
+        mapped = re.findall(
+            r"(?<!\S)/\S*/lib(?:m|fftw3f?|gfortran)\.so\S*", Path("/proc/self/maps").read_text()
+        )
         parts += [f"{path} {Path(path).stat().st_size}" for path in sorted(set(mapped))]
     return f"hexcontact {__version__} {hashlib.sha256(os.fsencode('; '.join(parts))).hexdigest()}"

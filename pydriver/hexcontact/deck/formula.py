@@ -36,7 +36,7 @@ _OVER_ARRAYS: dict[Callable[..., float], Callable[..., Any]] = {
     max: lambda *values: functools.reduce(np.maximum, values),
     math.pow: np.power,
 }
-_NAME = r"(?<![\w.])[^\W\d]\w*(?:\.\w+)*(?!\w*\s*\()"
+_NAME = r"(?<![\w.])[^\W\d]\w*+(?:\.\w++)*+(?!\s*\()"
 _LONGEST = 300  # characters; the parser and the evaluation need stack for each level of parentheses
 
 
@@ -65,11 +65,10 @@ class Formula:
         def symbol(match: re.Match[str]) -> str:
             return found.setdefault(match[0], f"_{len(found)}")
 
-        symbols = re.sub(_NAME, symbol, text.strip())
         try:
             if len(text) > _LONGEST:
                 raise ValueError
-            self._tree = ast.parse(symbols, mode="eval").body
+            self._tree = ast.parse(re.sub(_NAME, symbol, text.strip()), mode="eval").body
             self._names = {symbol: name for name, symbol in found.items()}
             self._checked(self._tree)
         except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError):

@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from ..text import did_you_mean, listed, shown
 from ..variables import LARGEST
 from .formula import Formula
-from .units import ANGLE, NUMBER, Dimension, UnitError, to_si
+from .units import ANGLE, DIGITS, LONGEST, NUMBER, Dimension, UnitError, spelled, to_si
 
 Schema = dict[str, Any]
 """A JSON schema."""
@@ -27,8 +27,7 @@ def refuse(sentence: str) -> NoReturn:
 
 
 SMALLEST = 1.0 / LARGEST
-_DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_SHARE = rf"\s*([+-]?{_DIGITS})\s*\*?\s*(?:mu|[\u00b5\u03bc])\s*\*?\s*P\s*"  # both letters mu
+_SHARE = rf"([+-]?{DIGITS})\s*(?:\*\s*)?(?:mu|[\u00b5\u03bc])\s*(?:\*\s*)?P"  # both letters mu
 
 
 class Kind:
@@ -123,8 +122,8 @@ class Quantity(Kind):
         bounds = {"exclusiveMinimum": self.above, "minimum": self.at_least, "maximum": self.at_most}
         number = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
         least = self.above if self.above is not None else self.at_least
-        sign = r"\+?" if least is not None and least >= 0 else "[+-]?"
-        text = {"type": "string", "pattern": rf"^\s*{sign}{_DIGITS}\s*[^\s\d.+-].*$"}
+        sign = r"\+?" if least is not None and least >= 0 else "[+\u2212-]?"
+        text = {"type": "string", "pattern": rf"^\s*{sign}{DIGITS}\s*[^\s\d.+-].*$"}
         known: Schema = {"description": self.expected[0].upper() + self.expected[1:]}
         if self.dimension is NUMBER:
             return {"anyOf": [text, number], **known}
@@ -175,7 +174,8 @@ class OrShare(Kind):
     def _parse(self, value: object) -> float | Share:
         if isinstance(value, Share):
             return value
-        match = re.fullmatch(_SHARE, value) if isinstance(value, str) else None
+        text = spelled(value.strip()) if isinstance(value, str) and len(value) <= LONGEST else ""
+        match = re.fullmatch(_SHARE, text)
         if match and abs(share := float(match[1])) <= LARGEST:
             return Share(share)
         try:

@@ -6,7 +6,7 @@ sentences, which one `DeckError` reports together.
 
 from __future__ import annotations
 
-import difflib
+import contextlib
 import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, NoReturn, Self, get_args
@@ -14,9 +14,10 @@ from typing import Any, ClassVar, NoReturn, Self, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from ..text import listed
+from ..text import folded, listed, nearest
 from .faults import MISSING, NOWHERE, Mistake, Source, deck_error
 from .kinds import Kind, Schema
+from .units import LENGTH, UnitError, to_si
 
 
 def meaning(default: Any, words: str, example: str = "") -> Any:
@@ -38,10 +39,39 @@ SYMBOLS = {
     **dict.fromkeys(("delta", "δ", "depth", "d"), "approach"),
     **dict.fromkeys(("ux", "sx", "displacement_x"), "shift_x"),
     **dict.fromkeys(("uy", "sy", "displacement_y"), "shift_y"),
-    **dict.fromkeys(("R", "r"), "radius"),
+    **dict.fromkeys(("R", "r", "diameter"), "radius"),
+    **{f"diameter_{axis}": f"radius_{axis}" for axis in "xy"},
     **dict.fromkeys(("h", "dx", "l_e", "mesh"), "spacing"),
 }
 """Keys of decks by the symbols and words of engineers, with the table if several have such a key."""
+
+_NOT_INCLUDED = {
+    "layers and coatings": ("coating", "layer", "thickness", "substrate", "film"),
+    "plasticity": ("plastic", "yield", "hardening", "hardness"),
+    "heat": ("temperature", "thermal", "heat", "conductivity"),
+    "lubrication": ("lubricat", "viscosity", "fluid"),
+    "adhesion": ("adhesi", "surfaceenergy", "workofadhesion"),
+    "viscoelastic bodies": ("viscoelastic", "relaxation", "prony", "damping"),
+    "anisotropic bodies": ("anisotrop", "orthotropicstiffness"),
+    "inertia": ("density", "mass", "inertia", "velocity", "frequency"),
+    "rolling": ("rolling", "creepage"),
+    "periodic surfaces": ("periodic",),
+}
+"""Features that the program does not have (docs/limits.md), with the beginnings of their words, folded."""
+
+
+def not_included(word: str) -> str:
+    """Return the sentence about a feature that is not included; empty for other words."""
+    of_word = folded(word[:100])
+    found = [name for name, words in _NOT_INCLUDED.items() if of_word.startswith(words)]
+    return f"{found[0]}: not included (docs/limits.md says what is, and what to do instead)" if found else ""
+
+
+def _half_of(value: object) -> str:
+    """Return the assignment of half a diameter; empty if it is none."""
+    with contextlib.suppress(UnitError):
+        return f": {to_si(value, LENGTH) / 2.0:.12g} m"
+    return ""
 
 
 class Table(BaseModel):
@@ -71,7 +101,9 @@ class Table(BaseModel):
     @classmethod
     def meant(cls, key: str) -> str:
         """Return the known key that an unknown one may mean, also in an inner table; empty if none."""
-        known, path = cls.known_keys(), SYMBOLS.get(key, key)
+        known = cls.known_keys()
+        same = {folded(name): name for name in known}.get(folded(key[:100]), key)
+        path = SYMBOLS.get(key) or (SYMBOLS.get(key.lower(), same) if len(key) > 2 else same)
         table, _, word = path.rpartition(".")
         elsewhere = table and table != cls.__name__.lower() and word != key
         if word in known and not elsewhere:
@@ -86,8 +118,7 @@ class Table(BaseModel):
             return path if path in below else below[0]
         if elsewhere:
             return path
-        near = difflib.get_close_matches(key[:100], list(known), n=1)
-        return near[0] if near else ""
+        return nearest(key, known)
 
     @classmethod
     def parse(cls, data: Mapping[str, Any], source: Source) -> Self:
@@ -167,7 +198,13 @@ class Table(BaseModel):
         if kind == "missing":
             return Mistake(key, MISSING, f"missing; expected {expectation(known[key[0]])}")
         if kind == "extra_forbidden":
-            near = cls.meant(str(key[0]))
+            word = str(key[0])
+            if feature := not_included(word):
+                return Mistake(key, MISSING, f"unknown key; {feature}")
+            if folded(word).startswith("diameter") and (radius := cls.meant(word)):
+                sentence = f"unknown key; use {radius}, half the diameter{_half_of(value)}"
+                return Mistake(key, value, sentence)
+            near = cls.meant(word)
             hint = f"did you mean {near}?" if near else f"known here: {listed(sorted(known), 'and')}"
             return Mistake(key, MISSING, f"unknown key; {hint}")
         if kind == "list_type":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -17,11 +17,11 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import DeckError
 from ..files import require_ordinary, text_of
-from ..text import did_you_mean, listed, shown
+from ..text import did_you_mean, folded, listed, shown
 from ..variables import LOADS
 from .kinds import Kind, Quantity, Schema, Several, Text, refuse
 from .model import Table, extended, meaning
-from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE
+from .units import ANGLE, FORCE, LENGTH, PRESSURE, TORQUE, spelled
 
 
 class Driven(NamedTuple):
@@ -95,6 +95,12 @@ _IGNORED = ("time", "step")  # columns of files that are no deck keys
 _MOST_SENTENCES = 10
 _LONGEST_LABEL = 1000  # characters
 _EXPECTED = "a CSV or netCDF file of loads"
+_MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # cells without a value, in small letters
+_SEPARATORS = ("\t", ";", ",")
+_THOUSANDS = r"[+-]?\d{1,3}(?:[ ']\d{3})+(?:\.\d*)?"
+_NUMBER = r"[+-]?\.?\d"  # its beginning
+_FORTRAN_EXPONENT = r"(?<=[\d.])[dD](?=[+-]?\d+$)"
+_BETWEEN_BLANKS = r"[^\s\[(]+(?:\s*(?:\[[^\[\]]*\]|\([^()]*\)))?"  # a header with its unit
 
 MOST_STEPS = 100_000
 """Load steps of a history, and rows of a series."""
@@ -191,6 +197,20 @@ class Series(_Rows):
         """Number of rows."""
         return len(next(filled for key in DRIVEN if (filled := getattr(self, key)) is not None))
 
+    @property
+    def missing(self) -> dict[str, int]:
+        """Number of rows that leave a load or motion as it is, of each that other rows have."""
+        arrays = {key: array for key in DRIVEN if (array := getattr(self, key)) is not None}
+        other = {one: two for pair in LOADS.values() for one, two in (pair, pair[::-1])}
+        counts = {
+            key: sum(
+                a is None and b is None
+                for a, b in zip(array, arrays.get(other.get(key, ""), array), strict=True)
+            )
+            for key, array in arrays.items()
+        }
+        return {key: count for key, count in counts.items() if count}
+
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield the values of each row, in SI, and its label."""
         named = {key: array for key in (*DRIVEN, "label") if (array := getattr(self, key)) is not None}
@@ -219,9 +239,6 @@ class _Column(NamedTuple):
     cells: list[Any]
 
 
-_UNIT_IN_HEADER = r"\s*(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))?\s*"
-
-
 def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[str, list[Any]]:
     """Return a series of loads from a file.
 
@@ -229,7 +246,8 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
     ----------
     path : Path
         A netCDF file if its name ends in ``.nc`` (variables of one dimension, with the attribute ``units``),
-        else text: a line of headers, then rows, separated by commas, semicolons or tabs.
+        else text: a line of headers, perhaps one of units, then rows, separated by commas, semicolons, tabs
+        or blanks.
     columns : mapping of str to str, optional
         Header of the column for each key; other columns are ignored. Without it every header has to be a key
         of [[load]], except for ``time`` and ``step``.
@@ -261,7 +279,8 @@ def read_series(path: Path, columns: Mapping[str, Any] | None = None) -> dict[st
             except PydanticCustomError as error:
                 series[key].append("")
                 place = f"{path}, {where} {line}, column {shown(column.header)}"
-                problems.append(f"{place} = {shown(cell)}: {error.message()}")
+                noise = _noise(column.cells, cell) if key == "normal_load" else ""
+                problems.append(f"{place} = {shown(cell)}: {error.message()}{noise}")
     for row, force, displacement in driven_twice(series):
         place = f"{path}, {where} {lines[row]}"
         problems.append(f"{place}: expected {force} or {displacement}, not both; choose one with columns")
@@ -280,17 +299,32 @@ def _unit_fault(key: str, unit: str) -> str:
     return ""
 
 
+def _noise(cells: Sequence[Any], cell: Any) -> str:
+    """Return the remedy for a small normal load below 0."""
+    numbers = [number for number in map(_number, map(str, cells)) if number is not None]
+    number, largest = _number(str(cell)), max(numbers, default=0.0)
+    if number is None or not 0.0 < -number < 0.01 * largest:
+        return ""
+    return f"; this is noise, {-number / largest:.2g} of the largest one: write 0"
+
+
 def _value(key: str, cell: Any, unit: str) -> Any:
-    if cell == "":
+    if isinstance(cell, str) and cell.lower() in _MISSING:
         return ""
     kind = DRIVEN[key].kind
     if isinstance(cell, str):
+        cell = spelled(cell)
+        if re.fullmatch(_THOUSANDS, cell):
+            refuse("expected a number without separators of thousands")
         if re.fullmatch(r"[+-]?[\d.]+,\d+", cell):
             refuse("expected a decimal point, not a comma")
         number = _number(cell)
         if number is None and unit and _number(cell.split()[0] if cell.split() else "") is not None:
             refuse(f"expected a number without a unit, since the header has the unit [{unit}]")
-        quantity: Any = cell if number is None else (f"{cell} {unit}" if unit else number)
+        if number is None:
+            quantity: Any = cell
+        else:
+            quantity = f"{re.sub(_FORTRAN_EXPONENT, 'e', cell)} {unit}" if unit else number
     else:
         quantity = f"{cell!r} {unit}" if unit else cell
     value = kind.parse(quantity)
@@ -299,7 +333,7 @@ def _value(key: str, cell: Any, unit: str) -> Any:
 
 def _number(text: str) -> float | None:
     try:
-        return float(text)
+        return float(re.sub(_FORTRAN_EXPONENT, "e", text))
     except ValueError:
         return None
 
@@ -308,14 +342,15 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
     """Return the column of each key."""
     keys, problems = (*DRIVEN, "label"), []
     chosen: dict[str, _Column] = {}
+    meant = {folded(key): key for key in keys}
     headers = [column.header for column in found]
     for twin in dict.fromkeys(header for header in headers if headers.count(header) > 1 and header):
         problems.append(f"{path}: expected each column once; {shown(twin)} is there more than once")
     if columns is None:
         for column in found:
-            if column.header in keys:
-                chosen[column.header] = column
-            elif column.header not in _IGNORED:
+            if key := meant.get(folded(column.header)):
+                chosen[key] = column
+            elif folded(column.header) not in _IGNORED:
                 others = (
                     f"; known are {listed(keys, 'and')}; to leave columns out, name the others with columns"
                 )
@@ -346,34 +381,82 @@ def _chosen(path: Path, found: list[_Column], columns: Mapping[str, Any] | None)
 
 def _split(header: str) -> tuple[str, str]:
     """Return a header without its unit, and the unit."""
-    match = re.fullmatch(_UNIT_IN_HEADER, header)
-    return (match["name"], (match["square"] or match["round"] or "").strip()) if match else (header, "")
+    name = header.strip()
+    opening = {"]": "[", ")": "("}.get(name[-1:], "")
+    before, bracket, unit = name[:-1].rpartition(opening) if opening else ("", "", "")
+    return (before.strip(), unit.strip()) if bracket and name[-1] not in unit else (name, "")
 
 
 def _text_columns(path: Path) -> tuple[list[_Column], list[int]]:
-    """Return columns and line numbers of a text file without empty lines and lines that begin with #."""
-    lines = [
-        (number, line)
-        for number, line in enumerate(text_of(path, _EXPECTED).splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    """Return columns and line numbers of a text file without empty lines and lines that begin with #.
+
+    The line of headers may begin with # itself, as numpy.savetxt writes it, and follow a line sep=; of Excel.
+    """
+    lines = [(n, line) for n, line in enumerate(text_of(path, _EXPECTED).splitlines(), 1) if line.strip()]
+    separator = ""
+    if lines and (given := lines[0][1].strip().lower()).startswith("sep=") and len(given) == len("sep=;"):
+        separator = given[-1]
+        del lines[0]
+    remarks = [(number, line.lstrip()[1:]) for number, line in lines if line.lstrip().startswith("#")]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if lines and (above := [remark for remark in remarks if remark[0] < lines[0][0]]):
+        split = _cells(lines[0][1], separator or _separator(*(line for _, line in lines[:3])))
+        if all(_number(cell) is not None or cell.lower() in _MISSING for cell in split):
+            lines.insert(0, above[-1])
     if not lines:
         raise DeckError(f"{path}: is empty; expected a line of headers such as normal_load [N], and rows")
     _refuse_many(path, len(lines) - 1)
-    separator = next((mark for mark in ("\t", ";", ",") if mark in lines[0][1]), ",")
+    separator = separator or _separator(*(line for _, line in lines[:3]))
     try:
-        rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
+        headers, *rows = (_cells(line, separator) for _, line in lines)
     except csv.Error as error:
         raise DeckError(f"{path}: cannot be read ({error}); expected {_EXPECTED}") from None
+    if separator == " ":
+        headers = re.findall(_BETWEEN_BLANKS, lines[0][1])
+    while len(headers) > 1 and not headers[-1] and not any(any(row[len(headers) - 1 :]) for row in rows):
+        headers.pop()
+    rows = [row if any(row[len(headers) :]) else row[: len(headers)] for row in rows]  # trailing separators
+    expected = f"expected {len(headers)} cells, as many as headers in line {lines[0][0]}"
     problems = [
-        f"{path}, line {number}: expected {len(rows[0])} cells, as many as headers, not {len(row)}"
-        for (number, _), row in zip(lines, rows, strict=True)
-        if len(row) != len(rows[0])
+        f"{path}, line {number}: {expected}, not {len(row)}"
+        for (number, _), row in zip(lines[1:], rows, strict=True)
+        if len(row) != len(headers)
     ]
     if problems:
         raise DeckError("\n".join(problems[:_MOST_SENTENCES]))
-    columns = [_Column(*_split(header), [*cells]) for header, *cells in zip(*rows, strict=True)]
-    return columns, [number for number, _ in lines[1:]]
+    names, numbers = [_split(header) for header in headers], [number for number, _ in lines[1:]]
+    if len(rows) > 1 and not any(unit for _, unit in names) and _are_units(*rows[:2]):
+        names = [(name, unit.strip("[]() -")) for (name, _), unit in zip(names, rows[0], strict=True)]
+        del rows[0], numbers[0]
+    columns = [_Column(*name, [row[place] for row in rows]) for place, name in enumerate(names)]
+    return columns, numbers
+
+
+def _separator(header: str, *rows: str) -> str:
+    """Return the separator of cells; blanks if no other is there, and all lines have as many words."""
+    for mark in _SEPARATORS:
+        if mark in header:
+            return mark
+    count = len(re.findall(_BETWEEN_BLANKS, header))
+    words = [row.split() for row in rows]
+    as_many = count > 1 and all(len(row) == count for row in words)
+    return " " if as_many and any(_number(word) is not None for row in words for word in row) else ","
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line."""
+    if separator == " ":
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+
+
+def _are_units(row: list[str], below: list[str]) -> bool:
+    """Return whether a row holds words above numbers, such as the units below headers."""
+    words = [(cell, number) for cell, number in zip(row, below, strict=True) if cell not in ("", "-")]
+    return bool(words) and all(
+        cell.lower() not in _MISSING and not re.match(_NUMBER, cell) and _number(number) is not None
+        for cell, number in words
+    )
 
 
 def _refuse_many(path: Path, rows: int) -> None:

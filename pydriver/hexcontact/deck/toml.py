@@ -11,18 +11,18 @@ from typing import Any
 
 from ..errors import DeckError, Fault
 from ..files import text_of
+from .units import DIGITS
 
 DEEPEST = 50  # levels of tables and arrays; no key needs more than six
 
 # Text in quotes or a comment; a number with a comma; brackets; a number with a unit without quotes.
 _QUOTED = r"""\"[^\"]*\"|'[^']*'|\#.*"""
 _COMMA = r"=\s*([+-]?\d+),(\d+)\s*$"
-_BRACKET = r"(\w+)\[\d*\]"
+_BRACKET = r"(?<!\w)(\w+)\[\d*\]"
 _ARRAYS = ("load", "stress", "fatigue", "parameter")  # tables of which a file may have several
 _TWICE = r"Cannot declare \('(\w+)',\) twice"
 _AGAIN = "Cannot overwrite a value"
-_KEY = r"\s*([^=#]*[^=#\s])\s*="
-_WITH_UNIT = r"(?<![\w.])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*(?:[^\W\d_]+[\w/^*·]*|[%°])"
+_WITH_UNIT = rf"(?<![\w.])[+-]?{DIGITS}\s*(?:[^\W\d_]+[\w/^*·]*|[%°])"
 
 
 def read_toml(path: str | Path, kind: str = "a deck") -> tuple[dict[str, Any], str]:
@@ -75,8 +75,8 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
             hint = f"; a number has a decimal point: {comma[1]}.{comma[2]}"
         elif (twice := re.match(_TWICE, message)) and twice[1] in _ARRAYS:
             hint = f"; of several tables each begins with two brackets: [[{twice[1]}]]"
-        elif message.startswith(_AGAIN) and (key := re.match(_KEY, line)):
-            hint = f"; {key[1]} stands there a second time"
+        elif message.startswith(_AGAIN) and "=" in line:
+            hint = f"; {line.partition('=')[0].strip()} stands there a second time"
         sentence = f"{name}:{place[1]}:{place[2]}: is not TOML: {message[: place.start()]}{hint}"
         raise DeckError(sentence, [Fault(sentence, "", "", name, int(place[1]), int(place[2]))]) from None
     refuse_deep(tables, name)

@@ -12,7 +12,7 @@ import re
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..text import listed
+from ..text import listed, shown
 
 if TYPE_CHECKING:
     import pint
@@ -51,14 +51,33 @@ _METRIC = {
     "m": {"nm": -9, "um": -6, "µm": -6, "mm": -3, "cm": -2, "m": 0},
     "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm^2": 6, "N/m^2": 0},
     "N": {"uN": -6, "µN": -6, "mN": -3, "N": 0, "kN": 3, "MN": 6},
-    "N m": {"N um": -6, "N µm": -6, "mN m": -3, "N mm": -3, "N m": 0, "kN mm": 0, "kN m": 3},
+    "N m": {
+        **{"N um": -6, "N µm": -6, "mN m": -3, "N mm": -3, "N m": 0, "kN mm": 0, "kN m": 3},
+        **{"mNm": -3, "Nmm": -3, "Nm": 0, "kNmm": 0, "kNm": 3},
+    },
 }
 
 _ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0, "mrad": 1e-3}
 
-_QUANTITY = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>.*?)\s*", re.ASCII
-)
+DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+"""Pattern of a number without its sign; each digit fits one part of it only, so that it cannot backtrack."""
+
+_QUANTITY = re.compile(rf"(?P<number>[+-]?{DIGITS})\s*(?P<unit>.*)", re.ASCII)
+LONGEST = 1000  # characters of a quantity
+
+# Signs and powers as programs for texts write them, and units that pint reads otherwise or not at all.
+_SIGNS = str.maketrans("\u2212\u2013\u22c5\u00d7\u00a0\u2009\u202f", "--**   ")
+_POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_POUNDS = {"lb": "lbf", "lbs": "lbf"}
+_SPELLED = {  # by SI unit
+    "m": {"mil": "thou", "mils": "thou"},
+    "Pa": {"Msi": "Mpsi"},
+    "N": _POUNDS,
+    "N m": _POUNDS,
+}
+_MOMENT = re.compile(r"([nuµmkMG]?N)(um|µm|mm|cm|m)")
+_BRACKETS = re.compile(r"(/ ?)?\(([^()/]*)\)(?! ?[*^])")
+_TIMES = re.compile(r" ?(?<!\*)[*·](?!\*) ?|(?<=\w) (?=[^\W\d])")
 
 # Products, quotients and small powers of named units; pint would evaluate other expressions.
 _NAME = r"[^\W\d_]+|[%°]|[^\W\d_]*°"
@@ -104,8 +123,29 @@ def to_si(value: object, dimension: Dimension) -> float:
         raise UnitError("") from None
 
 
+def spelled(text: str) -> str:
+    """Return a text with the signs and powers of ASCII: -1 for −1, mm^3 for mm³."""
+    return re.sub("[⁻⁰¹²³⁴-⁹]+", lambda power: "^" + power[0].translate(_POWERS), text.translate(_SIGNS))
+
+
+def _plain(unit: str, dimension: Dimension) -> str:
+    """Return a unit as a product of names that pint knows, without brackets: mm^3/N/m for mm^3/(N m)."""
+    known = _SPELLED.get(dimension.unit, {})
+
+    def name(word: re.Match[str]) -> str:
+        moment = _MOMENT.fullmatch(word[0])
+        return f"({moment[1]}*{moment[2]})" if moment else known.get(word[0], word[0])
+
+    def product(group: re.Match[str]) -> str:
+        sign = "/" if group[1] else ""
+        return sign + _TIMES.sub(sign or "*", group[2].strip())
+
+    unit = re.sub(r"[^\W\d_]+", name, " ".join(unit.split()))
+    return _BRACKETS.sub(product, _BRACKETS.sub(product, unit))
+
+
 def _from_text(text: str, dimension: Dimension) -> float:
-    match = _QUANTITY.fullmatch(text)
+    match = _QUANTITY.fullmatch(spelled(text.strip())) if len(text) <= LONGEST else None
     if match is None:
         raise UnitError("")
     number, unit = match["number"], match["unit"]
@@ -124,11 +164,11 @@ def _from_text(text: str, dimension: Dimension) -> float:
 
 def _by_pint(number: float, unit: str, dimension: Dimension) -> float:
     unknown = UnitError(_unknown(number, unit, dimension))
-    if len(unit) > _LONGEST_UNIT or _UNIT.fullmatch(unit) is None:
+    if len(unit) > _LONGEST_UNIT or _UNIT.fullmatch(plain := _plain(unit, dimension)) is None:
         raise unknown
     registry = _registry()
     try:
-        quantity = registry.Quantity(number, unit).to_base_units()
+        quantity = registry.Quantity(number, plain).to_base_units()
     except Exception:  # pint raises a dozen unrelated types
         raise unknown from None
     # Comparing base units, not dimensionalities, keeps radians apart from pure numbers.
@@ -145,7 +185,7 @@ def _unknown(number: float, unit: str, dimension: Dimension) -> str:
     alike = [known for known in _METRIC.get(dimension.unit, {}) if known.lower() == unit.lower()]
     power = re.sub(r"(?<=[^\W\d_])(?=\d$)", "^", unit)
     hint = listed(alike, "or") if alike else power if power != unit else ""
-    return f'"{unit}" is not a known unit' + (f"; did you mean {hint}?" if hint else "")
+    return f"{shown(unit)} is not a known unit" + (f"; did you mean {hint}?" if hint else "")
 
 
 def _same(units: Any, other: Any) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import inspect
 from collections.abc import Callable
@@ -11,12 +10,12 @@ from typing import Any, ParamSpec, TypeVar
 from ..core.lattice import Lattice
 from ..deck import tables
 from ..deck.interface import Interface
-from ..deck.model import SYMBOLS, Argument, Table
+from ..deck.model import SYMBOLS, Argument, Table, not_included
 from ..deck.series import DRIVEN
 from ..deck.surfaces import Surface
 from ..deck.wear import Wear
 from ..deck.write import plain
-from ..text import listed
+from ..text import listed, nearest
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -47,8 +46,9 @@ def known_keywords(call: Callable[_P, _T]) -> Callable[_P, _T]:
         same = [word for word in (path, path.replace(".", "_")) if word in known]
         below = [f"{of}.{path}" for of in known if of in _TABLES and path in _TABLES[of].known_keys()]
         longer = [word for word in known if word.startswith(f"{name}_")]
-        near = [*same, *below, *longer, *difflib.get_close_matches(name, known, n=1, cutoff=0.7)]
+        near = [*same, *below, *longer, *filter(None, [nearest(name, known, cutoff=0.7)])]
         hint = f"did you mean {near[0]}?" if near else f"known here: {listed(known, 'and')}"
+        hint = not_included(name) or hint
         raise TypeError(f"{name}: unknown argument of {title}; {hint}")
 
     return checked

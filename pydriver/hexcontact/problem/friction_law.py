@@ -18,7 +18,7 @@ from ..deck.interface import Friction, Interface, NodalCoefficient, TwoCoefficie
 from ..deck.units import NUMBER
 from ..errors import DeckError
 from ..files import reading
-from .gap import HeightMap
+from .height_map import HeightMap
 
 _NAME = "friction.coefficient"
 _MOST_POINTS = 1_000_000  # of a map, which is text in the deck of a result

@@ -75,6 +75,7 @@ def case_rows(case: Problem, memory: Callable[[Problem, Lattice], int] | None = 
     )  # without the coordinates, for which the window may be too large
     return [
         *((f"body {number}", _body(body)) for number, body in ((1, case.body_1), (2, case.body_2))),
+        *([("gap", str(case.height_map))] if case.height_map else []),
         (
             "pair",
             f"E* = {quantity(case.pair.effective_modulus, 'Pa')}, beta = {case.pair.beta:.4g}, "
@@ -125,6 +126,7 @@ def law_in_words(case: Problem) -> str:
     mu: Any = friction.coefficient if friction else 0.0
     if isinstance(mu, NodalCoefficient):
         law = f"coefficient {mu}" if mu.in_deck != FROM_PYTHON else "coefficient by node"
+        law += ", bilinear" * isinstance(mu.in_deck, dict)
     elif isinstance(mu, TwoCoefficients):
         law = f"coefficients {mu}"
     else:
@@ -178,13 +180,18 @@ def _history(case: Problem) -> str:
         where = f"{chosen} segment{'s' * (chosen > 1)}"
         fixed = f", and {given} that {'are' if given > 1 else 'is'} given" * (given > 0)
         return f"chosen on the way in {where} (step_tolerance {case.solver.step_tolerance:g}){fixed}"
+    gaps = "".join(
+        f"; {count} of {rows.count} rows of a series keep the {key.replace('_', ' ')} of the row before"
+        for rows in (load.series for load in case.deck.load if load.series)
+        for key, count in rows.missing.items()
+    )
     wears = ""
     if wear := case.deck.wear:
         solved = 'a number that shows on the way (jump "auto")'
         if not isinstance(wear.jump, str):
             solved = f"{math.ceil(wear.cycles / wear.jump) + 1:,}"
         wears = f", then {solved} of {wear.cycles:,} cycles, with {1 + len(case.cycle)} each"
-    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "") + wears
+    return f"{len(case.load_steps)}" + (f" in {segments} segments" if segments > 1 else "") + wears + gaps
 
 
 def _largest(case: Problem) -> str:

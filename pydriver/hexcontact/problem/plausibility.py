@@ -79,6 +79,13 @@ LIMITS = (
         least=1e-4,
     ),
     Limit(
+        "young_modulus",
+        "a Young's modulus of {young_modulus:g} Pa is below that of rubber, expected at least 1e6: bare "
+        "numbers are in m, N and Pa, not in mm and MPa",
+        "Rubber has 1 MPa and more; a modulus in MPa, taken as Pa, is below 1.2e6 for every solid",
+        least=1e6,
+    ),
+    Limit(
         "friction_coefficient",
         "friction.coefficient = {friction_coefficient:g}, expected at most 3 (was it in percent?), or inf "
         "for no slip",
@@ -100,6 +107,27 @@ LIMITS = (
         'solver.entry = "interpolated" less at two to six times the work of a step',
         "Nodes that enter are charged with the slip of the whole step: (X3) to (X5)",
         most=_STEP_ERROR,
+    ),
+    Limit(
+        "spacings_between_points",
+        "the points of the height map are {spacings_between_points:.2g} spacings apart, expected at most 10: "
+        "the nodes between them add no information; choose a larger spacing",
+        "A spline of points that are further apart than the wavelengths of a surface has none of its waves",
+        most=10.0,
+    ),
+    Limit(
+        "points_between_nodes",
+        "the nodes are {points_between_nodes:.2g} points of the height map apart, expected at most 5: those "
+        "between them do not count; choose a smaller spacing, or average the heights",
+        "Waves shorter than two spacings appear as longer ones (Shannon, Proc. IRE 37, 1949, 10)",
+        most=5.0,
+    ),
+    Limit(
+        "holes_near_contact",
+        "{holes_near_contact} holes of the height map lie near the estimated contact: a contact that comes "
+        "within two points of one ends the run; fill them, as by gap.interpolate_na",
+        "Contact beside a hole would end there only because the data do",
+        most=0.0,
     ),
 )
 """All limits, in the order of the warnings."""
@@ -124,6 +152,8 @@ def expected(case: Problem) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if isinstance(mu, TwoCoefficients):
         mu = max(mu.along, mu.across)
+    if moduli := [body.young_modulus for body in (case.body_1, case.body_2) if body.young_modulus]:
+        found["young_modulus"] = min(moduli)
     if isinstance(mu, float):
         found["friction_coefficient"] = 0.0 if math.isinf(mu) else mu
     if known is None:
@@ -136,6 +166,13 @@ def expected(case: Problem) -> dict[str, Any]:
         "pressure_ratio": known.max_pressure / case.pair.effective_modulus,
         "spacings": known.half_width / case.lattice.spacing,
     }
+    if grid := case.height_map:
+        along = np.array(grid.distances) / case.lattice.spacing
+        found |= {
+            "spacings_between_points": float(along.max()),
+            "points_between_nodes": float(1.0 / along.min()),
+            "holes_near_contact": case.holes_near(known),
+        }
     if case.accuracy is None:
         errors, needed = expected_lattice_errors(found["spacings"], _slipping(case), _LATTICE_ERROR)
         found |= {

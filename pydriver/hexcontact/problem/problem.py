@@ -32,6 +32,7 @@ from .arguments import Body
 from .checks import checked
 from .friction_law import FrictionField
 from .gap import Gap, GivenGap
+from .height_map import HeightMap
 from .loads import LoadStep, wearing_cycle
 from .window import Estimate, NoContactFound
 
@@ -172,6 +173,11 @@ class Problem:
         return whole, strain if bulk.body == 1 else -strain
 
     @property
+    def height_map(self) -> HeightMap | None:
+        """The heights of a gap that was measured on a grid."""
+        return self._gap.height_map
+
+    @property
     def adaptive(self) -> bool:
         """Whether load steps are chosen during the solution: some are "auto", and have a history."""
         return self.solver.algorithm == "incremental" and any(s.ramp is not None for s in self.load_steps)
@@ -247,7 +253,7 @@ class Problem:
         return self._friction.over(lattice)
 
     def check_contact(self, number: int, lattice: Lattice, contact: Mask) -> None:
-        """Refuse a load step whose contact reaches the end of a height map.
+        """Refuse a load step whose contact reaches the end of a height map, or a hole in it.
 
         Parameters
         ----------
@@ -263,11 +269,16 @@ class Problem:
         DeckError
             If the contact reaches it.
         """
-        if self._gap.ends_within(lattice, contact):
-            raise DeckError(
-                f"gap: the contact of load step {number} reaches the end of the height map; expected heights "
-                "of a larger part, or a function that says what lies beyond"
-            )
+        if fault := self._gap.fault_near(lattice, contact):
+            raise DeckError(f"gap: the contact of load step {number} {fault}")
+
+    def holes_near(self, contact: Estimate) -> int:
+        """Return the number of holes of a height map within the bounds of an estimated contact."""
+        if self.height_map is None:
+            return 0
+        at = window.lattice_coordinates(*self.height_map.holes, self.deck.grid.origin)
+        inside = [(low <= c) & (c <= high) for c, (low, high) in zip(at, contact.bounds, strict=True)]
+        return int(np.count_nonzero(inside[0] & inside[1]))
 
     def on_lattice(self, spacing: float, origin: tuple[float, float]) -> Self:
         """Return the same problem on a lattice of another spacing (m) and origin (m), without refinement."""
@@ -380,6 +391,8 @@ class Problem:
             self.initial_gap(lattice)
             self._check_interface(source, lattice)
             return lattice
+        if not grid.center and self.height_map and (fault := self.height_map.touch_fault):
+            raise DeckError(f"gap: {fault}")
         touch = self._gap.first_touch or (0.0, 0.0)
         center = grid.center or touch
         self._center = center if self._gap.given else touch

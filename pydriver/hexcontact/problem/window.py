@@ -227,13 +227,17 @@ def starting_half_size(
         height = reals(gap(x, y), "gap")
         height = np.where(np.isfinite(height), height, np.inf)
         # the median over the directions, some of which may lie outside of a punch or along a groove
-        # (not by numpy.median, which imports numpy.ma)
+        # (not by numpy.median, which imports numpy.ma); at the end of a surface the lowest direction
         middle = slice(angles.size // 2 - 1, angles.size // 2 + 1)
-        profile = np.sort(height, axis=1)[:, middle].mean(axis=1) - height.min()
-        if normal_load is not None:
-            inside = 2 * pair.effective_modulus * radii * profile < normal_load
-        else:
-            inside = profile < approach
+        sides = np.sort(height, axis=1)
+        for profile in (sides[:, middle].mean(axis=1), sides[:, 0]):
+            rise = profile - height.min()
+            if normal_load is not None:
+                inside = 2 * pair.effective_modulus * radii * rise < normal_load
+            else:
+                inside = rise < approach
+            if inside.any():
+                break
     if inside[-1]:
         raise NoContactFound("the contact has no end")
     if not (inside.any() or np.isfinite(height[0]).any()):

@@ -270,6 +270,11 @@ module hc_options
     real(wp) :: ring_shift = 0.7_wp, entering_factor = 5.0_wp, small_radius = 3.0_wp
     !> Largest gain G of (S3): where nothing but rounding errors is added to tractions it would be any number
     real(wp) :: most_gain = 10.0_wp
+    !> Factor on the changes that repeated cycles are expected to leave, and the largest ratio of one change to the change before
+    !> it: a series without decay counts as one that closes in 50 cycles
+    real(wp) :: closing_safety = 3.0_wp, slowest_closing = 0.98_wp
+    !> Change of the wear of a cycle over that of the shear tractions, both as shares, where only the latter is known
+    real(wp) :: closing_gain = 20.0_wp
     !> Shear tractions, over the largest pressure, that are rounding errors
     real(wp) :: shear_rounding = 1.0e-12_wp
   end type step_options_t

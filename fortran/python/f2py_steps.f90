@@ -13,11 +13,12 @@ module hc_f2py_steps
   use hc_step_error, only: step_change_t, compare_halves, shear_free
   use hc_step_control, only: step_control_t, step_attempt_t
   use hc_expected_error, only: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, &
-                               entry_steps, oblique_error, oblique_steps
+                               entry_steps, oblique_error, oblique_steps, turning_error
   implicit none
   private
 
-  public :: change_by_halving, is_shear_free, first_attempt, decide_attempt, accept_attempt, errors_of_lattice, errors_of_entry
+  public :: change_by_halving, is_shear_free, first_attempt, decide_attempt, accept_attempt, errors_of_lattice, errors_of_entry, &
+            error_of_turns, width_of_ring
 
   !> Fields of a state that are compared: pressure, gap, traction along x and along y.
   integer, parameter :: n_field = 4
@@ -200,6 +201,28 @@ contains
     error = max(error, oblique_error(steps, load_ratio))
     needed = max(needed, oblique_steps(goal, load_ratio))
   end subroutine errors_of_entry
+
+  !> Estimate the error of the dissipated energy where the tangential load turns.
+  subroutine error_of_turns(n, shear, error)
+    !> Number of load steps
+    integer(c_int), intent(in) :: n
+    !> Tangential load or shift along x and y, and torque or twist, each over its largest, at the end of each step
+    real(c_double), intent(in) :: shear(3, n)
+    !> Its error as a share
+    real(c_double), intent(out) :: error
+
+    error = turning_error(shear)
+  end subroutine error_of_turns
+
+  !> Compute the width of the slip ring over the contact radius.
+  subroutine width_of_ring(load_ratio, width)
+    !> Q/mu P
+    real(c_double), intent(in) :: load_ratio
+    !> Width over radius
+    real(c_double), intent(out) :: width
+
+    width = slip_ring(load_ratio)
+  end subroutine width_of_ring
 
   !> Set up a control from its numbers.
   pure type(step_control_t) function control_of(numbers, least)

@@ -133,6 +133,30 @@ def worn(
     return np.ascontiguousarray(found[0].T), float(found[1]), float(found[2])
 
 
+def wear_left(
+    friction: FrictionLaw, energies: Sequence[Array], before: ContactState, after: ContactState
+) -> float:
+    """Bound the change of the wear of a cycle by further repetitions: docs/theory/wear.md, (V9).
+
+    Parameters
+    ----------
+    friction : FrictionLaw
+        Friction at the nodes.
+    energies : sequence of ndarray, (n_row, n_col)
+        Energy that friction dissipates in each of the last cycles, at most three, by area (J/m2).
+    before, after : ContactState
+        Beginning and end of the last cycle.
+
+    Returns
+    -------
+    float
+        Share of the largest wear of a node.
+    """
+    mu = np.broadcast_to(friction.coefficient, after.pressure.shape)
+    tractions = np.array([[state.traction_x, state.traction_y] for state in (before, after)])
+    return float(_wear.wear_left_open(np.array(energies).T, tractions.T, after.pressure.T, mu.T))
+
+
 def expected_end(
     last: Array, ahead: float, before: Array | None = None, pressure: Array | None = None
 ) -> tuple[Array, Array]:

@@ -76,9 +76,8 @@ def error(
     step = f"step {target.index + 1}{planned}{segment}"
     shown = listed([f"{sign} = {_number(value)}" for sign, value in residuals.items()], "and")
     after = f"after {listed(_tried(solution), 'and')} the residuals are {shown}"
-    doubtful, excess = _sliding(case, solution, target, values)
+    doubtful, excess, expected = _sliding(case, lattice, solution, target, values)
     if excess:
-        expected = "expected a smaller load, or a prescribed motion in its place (shift_x, shift_y, twist)"
         return ConvergenceError(f"{step}: gross sliding: {excess}; {after}; {expected}", details)
     lines = [f"{step} did not converge: {after}; solver.tolerance = {case.solver.tolerance:g} was expected"]
     if worst.what == _LOST:
@@ -114,21 +113,50 @@ def _tried(solution: NormalSolution) -> list[str]:
 
 
 def _sliding(
-    case: Problem, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
-) -> tuple[bool, str]:
-    """Return whether friction may not carry the load, and a sentence if it cannot."""
+    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+) -> tuple[bool, str, str]:
+    """Return whether friction may not carry the load, and if it cannot, a sentence and what was expected."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
     bound = case.friction_coefficient * values[0] if z else math.nan
     seen = bool(getattr(solution, "sliding", False))
     doubtful = bool(torque or (shear and not shear <= _NEAR_SLIDING * bound))
     if not case.frictional or not (seen or (shear and shear >= _SLIDING * bound)):
-        return doubtful and not math.isinf(case.friction_coefficient), ""
+        return doubtful and not math.isinf(case.friction_coefficient), "", ""
+    if twist and shear and shear < bound and (found := _moment(case, lattice, solution, target, values)):
+        return True, *found
     wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
     known = known if shear and math.isfinite(bound) else ""
-    return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}"
+    expected = "expected a smaller load, or a prescribed motion in its place (shift_x, shift_y, twist)"
+    return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}", expected
+
+
+def _moment(
+    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+) -> tuple[str, str] | None:
+    """Return a sentence on the moment of the loads about the contact, and what was expected; None if it is carried."""
+    pressure, mu = solution.pressure, case.friction_coefficient
+    if not pressure.any() or math.isnan(mu):
+        return None
+    x, y = (float(np.average(place, weights=pressure)) for place in (lattice.x, lattice.y))
+    load_x, load_y = (
+        value * (motion.control == "force")
+        for value, motion in zip(values[1:3], (target.x, target.y), strict=True)
+    )
+    of_load = x * load_y - y * load_x
+    moment = values[3] - of_load
+    largest = mu * lattice.cell_area * float(np.sum(pressure * np.hypot(lattice.x - x, lattice.y - y)))
+    if not (abs(of_load) > abs(values[3]) and abs(moment) > 0.5 * largest):
+        return None
+    return (
+        f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at x = "
+        f"{quantity(x, 'm')}, y = {quantity(y, 'm')} (at most {quantity(largest, 'N m')}): the tangential load acts "
+        f"at x = y = 0, and torque = {quantity(values[3], 'N m')} is prescribed there",
+        f"expected twist = 0 in place of the torque, a torque of about {quantity(of_load, 'N m')}, or surfaces "
+        "that touch at x = y = 0",
+    )
 
 
 def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:

@@ -274,7 +274,7 @@ module hc_options
     !> it: a series without decay counts as one that closes in 50 cycles
     real(wp) :: closing_safety = 3.0_wp, slowest_closing = 0.98_wp
     !> Change of the wear of a cycle over that of the shear tractions, both as shares, where only the latter is known
-    real(wp) :: closing_gain = 20.0_wp
+    real(wp) :: closing_gain = 100.0_wp
     !> Shear tractions, over the largest pressure, that are rounding errors
     real(wp) :: shear_rounding = 1.0e-12_wp
   end type step_options_t

@@ -31,6 +31,8 @@ module hc_step_error
     real(wp) :: lattice = 0.0_wp
     !> Change of the stick area over that of the tractions, in these units, during the second half
     real(wp) :: gain = 1.0_wp
+    !> Dissipated energy of the halves, and the part that is uncertain since tractions turn in each, (W4), over the cell area
+    real(wp) :: spent = 0.0_wp, turned = 0.0_wp
   end type step_change_t
 
 contains
@@ -86,6 +88,12 @@ contains
       change%added = scale*space%sum(norm2(whole%traction - halves%traction &
                                            - (whole_before%traction - halves_before%traction), dim=3))
     end associate
+
+    if (friction%is_bounded()) then
+      change%spent = space%sum(shear(half)*slipped(halves_before, half) + shear(halves)*slipped(half, halves))
+      change%turned = space%sum(turned(halves_before, half)*slipped(halves_before, half) &
+                                + turned(half, halves)*slipped(half, halves))
+    end if
 
     grown = abs(sticking%area - stick_area(lattice, candidate, friction, half, tuning))/area
     loaded = scale*space%sum(norm2(half%traction - halves%traction, dim=3))
@@ -176,6 +184,26 @@ contains
       call friction%find_bounds((row - 1)*size(bound, 1) + 1, state%pressure(:, row), bound(:, row))
     end do
   end function bounds
+
+  !> Compute the slip during a step; 0 where nodes do not slip at its end [m].
+  pure function slipped(before, after)
+    !> Beginning and end
+    type(contact_state_t), intent(in) :: before, after
+    real(wp) :: slipped(size(after%traction, 1), size(after%traction, 2))
+
+    slipped = merge(norm2(after%relative_displacement - before%relative_displacement, dim=3), 0.0_wp, after%zone == slip)
+  end function slipped
+
+  !> Compute the parts of the shear tractions before a step that are transverse to those at its end [Pa].
+  pure function turned(before, after)
+    !> Beginning and end
+    type(contact_state_t), intent(in) :: before, after
+    real(wp) :: turned(size(after%traction, 1), size(after%traction, 2))
+
+    associate (q => after%traction, q_before => before%traction)
+      turned = abs(q(:, :, 1)*q_before(:, :, 2) - q(:, :, 2)*q_before(:, :, 1))/max(shear(after), tiny(1.0_wp))
+    end associate
+  end function turned
 
   !> Compute the magnitude of the shear tractions [Pa].
   pure function shear(state)

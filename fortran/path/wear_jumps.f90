@@ -83,8 +83,8 @@ contains
       depth = archard_depth(energies, 1.0_wp, spread(friction, 3, n))
       first = maxval(abs(depth(:, :, n - 1) - depth(:, :, n - 2)))
       last = maxval(abs(depth(:, :, n) - depth(:, :, n - 1)))
-      left = min(left, options%closing_safety*last/max(maxval(depth(:, :, n)), tiny(1.0_wp)) &
-                 /(1.0_wp - min(last/max(first, tiny(1.0_wp)), options%slowest_closing)))
+      left = options%closing_safety*last/max(maxval(depth(:, :, n)), tiny(1.0_wp)) &
+             /(1.0_wp - min(last/max(first, tiny(1.0_wp)), options%slowest_closing))
     end associate
   end function wear_left
 

@@ -123,7 +123,7 @@ contains
     !> Cycles of each of the two jumps, largest pressure [Pa]
     real(c_double), intent(in) :: cycles, p_max
     !> What it changes
-    real(c_double), intent(out) :: change(5)
+    real(c_double), intent(out) :: change(7)
     !> By how much the two wear more [m]
     real(c_double), intent(out) :: slower(n_col, n_row)
     !> Energy by area of each cycle in the second jump, corrected [J/m^2]
@@ -144,7 +144,7 @@ contains
         call jump_change(lattice, pair, first, second, both, coefficient, friction, cycles, p_max, slower, found)
         call energy_of_second_jump(lattice, pair, path, coefficient, cycles, first, second, both, corrected)
       end associate
-      change = [found%stick, found%traction, found%added, found%lattice, found%gain]
+      change = [found%stick, found%traction, found%added, found%lattice, found%gain, found%spent, found%turned]
     end if
     call report(error, code, message)
   end subroutine change_by_jump

@@ -24,7 +24,7 @@ not help; the smallest one did not converge."""
 LEAST = 1e-3
 """Smallest adaptive load step, as a part of its segment."""
 
-_FIELDS = ("pressure", "gap", "traction_x", "traction_y")
+_FIELDS = ("pressure", "gap", "traction_x", "traction_y", "relative_displacement_x", "relative_displacement_y")
 _TRACTIONS = ("pressure", "traction_x", "traction_y")
 
 
@@ -43,6 +43,9 @@ class Change(NamedTuple):
         Possible change of the stick area by rings of nodes that enter, for any steps; a share, too.
     gain : float
         Change of the stick area over that of the tractions, both as shares, during the second half.
+    spent, turned : float
+        Dissipated energy of the halves, and the part that is uncertain since tractions turn in each, over the
+        area of a node (J/m2).
     """
 
     stick: float = 0.0
@@ -50,6 +53,8 @@ class Change(NamedTuple):
     added: float = 0.0
     lattice: float = 0.0
     gain: float = 1.0
+    spent: float = 0.0
+    turned: float = 0.0
 
 
 def change_by_halving(
@@ -313,22 +318,22 @@ class StepControl:
     """
 
     def __init__(self, least: float = LEAST) -> None:
-        self._numbers = np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+        self._numbers = np.array([1.0, 0.5, *[0.0] * 6])
         self._least = least
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any], least: float = LEAST) -> StepControl:
         """Return the control from the record of a step."""
         control, past = cls(least), record["memory"]
-        names = ("size", "first", "stick", "traction")
-        control._numbers[:] = [*(record[name] for name in names), past["stick"], past["traction"]]
+        names, energies = ("size", "first", "stick", "traction"), (past[name] for name in ("spent", "turned"))
+        control._numbers[:] = [*(record[name] for name in names), past["stick"], past["traction"], *energies]
         return control
 
     @property
     def record(self) -> dict[str, Any]:
         """The control in the record of a step."""
         size, first, stick, traction, *past = self._numbers.tolist()
-        memory = {"stick": past[0], "traction": past[1]}
+        memory = dict(zip(("stick", "traction", "spent", "turned"), past, strict=True))
         return {"size": size, "first": first, "stick": stick, "traction": traction, "memory": memory}
 
     def begin_with(self, size: float) -> None:

@@ -44,6 +44,8 @@ _NOTICED = 1e-6  # share of the normal load or approach from which tangential on
 _LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
+_WORTH_STATING = 1e-3  # share of the dissipated energy from which the bound on its error is shown
+_UNCERTAIN = 0.1  # ... and from which a remark is made
 _MOST_NAMED = 8  # load steps named in a sentence
 
 
@@ -112,6 +114,13 @@ def step_error_share(history: History) -> float | None:
     """Return the bound on the error of the stick area by load steps, as a share of the contact area."""
     error, area = float(history.get("stick_area_step_error", math.nan)), fitted("contact_area", history)
     return None if math.isnan(error) or not area else error / area
+
+
+def path_error_share(history: History) -> float:
+    """Return the bound on the error of the dissipated energy by load steps, as a share; 0 where next to nothing is dissipated."""
+    spent = float(history.get("dissipated_energy", 0.0))
+    noise = _NOTICED * _scale("dissipated_energy", history) if spent else 0.0
+    return float(history.get("dissipated_energy_path_error", 0.0)) / spent if spent > noise else 0.0
 
 
 def halved(history: History) -> str:
@@ -187,6 +196,8 @@ def step_rows(history: History) -> list[Row]:
         change = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
         words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"
         rows.append(("load steps", words))
+    if (share := path_error_share(history)) >= _WORTH_STATING:
+        rows.append(("energy by load steps", f"dissipated energy within {percent(share)}"))
     found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
     return [*rows, ("residuals", found), ("work", _work(history))]
 
@@ -397,6 +408,8 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
         halved_steps(histories, tolerance),
         adaptive_steps(histories, tolerance),
         limited_steps(histories, float(parameters.get("step_tolerance", 0.0))),
+        uncertain_energy(histories),
+        unclosed_cycle(histories[-1], float(parameters.get("wear_tolerance", math.inf))),
     ]
     return [sentence for sentence in sentences if sentence]
 
@@ -455,11 +468,25 @@ def limited_steps(histories: Sequence[History], tolerance: float) -> str:
     )
 
 
-def unclosed_cycle(cycles: int, left: float, tolerance: float) -> str:
-    """Describe a cycle of wear that does not close on unworn surfaces."""
+def uncertain_energy(histories: Sequence[History]) -> str:
+    """Describe a dissipated energy that the size of the load steps leaves uncertain; empty if it is not."""
+    share = path_error_share(histories[-1])
+    if share <= _UNCERTAIN:
+        return ""
     return (
-        f"the cycle of wear is not closed after {cycles} cycles on unworn surfaces: its wear may still change by "
-        f"{percent(left)}, expected at most wear.tolerance = {tolerance:g}; worn_depth_step_error includes this"
+        f"the size of the load steps leaves the dissipated energy uncertain by up to {percent(share)}, since nodes slip "
+        "in directions that turn or under a pressure that changes; twice as many steps leave half of it"
+    )
+
+
+def unclosed_cycle(history: History, tolerance: float) -> str:
+    """Describe a cycle of wear that does not close on unworn surfaces; empty of one that does."""
+    left = float(history.get("unworn_cycle_change", 0.0))
+    if not left > tolerance:
+        return ""
+    return (
+        f"the cycle of wear is not closed after {history['unworn_cycles']} cycles on unworn surfaces: its wear may still "
+        f"change by {percent(left)}, expected at most wear.tolerance = {tolerance:g}; worn_depth_step_error includes this"
     )
 
 

@@ -23,6 +23,7 @@ from ..variables import RESIDUALS
 
 _NEAR_SLIDING = 0.99  # share of mu P from which a tangential load may need full slip
 _SLIDING = 1.0 - 1e-6  # ... from which it does
+_TWISTED = 1.2  # moment over the largest under the pressure of a failed attempt, from which all slips
 _ROUNDING = 1e-11  # tolerance below which rounding errors may decide
 _SAME = 1e-3  # relative difference of residuals of one state
 _LOST = "the last attempt lost all contact"
@@ -119,12 +120,20 @@ def _sliding(
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
     bound = case.friction_coefficient * values[0] if z else math.nan
-    seen = bool(getattr(solution, "sliding", False))
+    moment, largest = _moments(case, lattice, solution, target, values)
+    seen = bool(getattr(solution, "sliding", False)) or (twist and abs(moment) > _TWISTED * largest > 0.0)
     doubtful = bool(torque or (shear and not shear <= _NEAR_SLIDING * bound))
     if not case.frictional or not (seen or (shear and shear >= _SLIDING * bound)):
         return doubtful and not math.isinf(case.friction_coefficient), "", ""
-    if twist and shear and shear < bound and (found := _moment(case, lattice, solution, target, values)):
-        return True, *found
+    if twist and abs(values[3] - moment) > abs(values[3]) and shear < bound and abs(moment) > 0.5 * largest:
+        place = ", ".join(f"{axis} = {quantity(at, 'm')}" for axis, at in zip("xy", _center(lattice, solution)))
+        return (
+            True,
+            f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at {place} (at most "
+            f"{quantity(largest, 'N m')}), since the tangential load acts at x = y = 0",
+            f"expected twist = 0 in place of the torque, a torque of {quantity(values[3] - moment, 'N m')}, or "
+            "surfaces that touch at x = y = 0",
+        )
     wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
@@ -133,30 +142,23 @@ def _sliding(
     return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}", expected
 
 
-def _moment(
+def _center(lattice: Lattice, solution: NormalSolution) -> tuple[float, float]:
+    """Return the centroid of the pressure; the origin without any."""
+    weights = solution.pressure if solution.pressure.any() else None
+    return (0.0, 0.0) if weights is None else tuple(float(np.average(at, weights=weights)) for at in (lattice.x, lattice.y))
+
+
+def _moments(
     case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
-) -> tuple[str, str] | None:
-    """Return a sentence on the moment of the loads about the contact, and what was expected; None if it is carried."""
-    pressure, mu = solution.pressure, case.friction_coefficient
-    if not pressure.any() or math.isnan(mu):
-        return None
-    x, y = (float(np.average(place, weights=pressure)) for place in (lattice.x, lattice.y))
-    load_x, load_y = (
-        value * (motion.control == "force")
-        for value, motion in zip(values[1:3], (target.x, target.y), strict=True)
-    )
-    of_load = x * load_y - y * load_x
-    moment = values[3] - of_load
-    largest = mu * lattice.cell_area * float(np.sum(pressure * np.hypot(lattice.x - x, lattice.y - y)))
-    if not (abs(of_load) > abs(values[3]) and abs(moment) > 0.5 * largest):
-        return None
-    return (
-        f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at x = "
-        f"{quantity(x, 'm')}, y = {quantity(y, 'm')} (at most {quantity(largest, 'N m')}): the tangential load acts "
-        f"at x = y = 0, and torque = {quantity(values[3], 'N m')} is prescribed there",
-        f"expected twist = 0 in place of the torque, a torque of about {quantity(of_load, 'N m')}, or surfaces "
-        "that touch at x = y = 0",
-    )
+) -> tuple[float, float]:
+    """Return the moment (N m) of the prescribed loads about the contact, and the largest that friction carries there."""
+    x, y = _center(lattice, solution)
+    loads = zip(values[1:3], (target.x, target.y), strict=True)
+    load_x, load_y = (value * (motion.control == "force") for value, motion in loads)
+    arm = np.hypot(lattice.x - x, lattice.y - y)
+    mu = case.friction_coefficient  # NaN of another law: unknown
+    largest = mu * lattice.cell_area * float(np.sum(solution.pressure * arm))
+    return values[3] - (x * load_y - y * load_x), largest
 
 
 def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:

@@ -285,7 +285,8 @@ class WearPath(GivenPath):
             if self._left <= tolerance:
                 break
         else:
-            words = unclosed_cycle(self._unworn, self._left, tolerance)
+            found = {"unworn_cycles": self._unworn, "unworn_cycle_change": self._left}
+            words = unclosed_cycle(found, tolerance)
             self.window.listener.said("unclosed", level=logging.WARNING, warning=words)
             warnings.warn(words, PathWarning, stacklevel=2)
         self._tolerance = usual
@@ -300,6 +301,7 @@ class WearPath(GivenPath):
         slipped = cycle.state.accumulated_slip + jump * cycle.path
         density = cycle.state.dissipation_density + jump * worn_by
         spent = cycle.state.dissipated_energy + jump * window.lattice.cell_area * float(worn_by.sum())
+        missed = cycle.state.dissipated_energy_path_error
         state = self._unspent(cycle.state)
         *_, last = self.case.load_steps
         # the loads at the end of the cycle on the new gap; what slips is no part of the cycle
@@ -310,7 +312,12 @@ class WearPath(GivenPath):
         sums: dict[str, Any] = dict(zip(("accumulated_slip", "dissipation_density"), spread, strict=True))
         return _Cycle(
             self.window.lattice,
-            dataclasses.replace(state, **sums, dissipated_energy=spent),
+            dataclasses.replace(
+                state,
+                **sums,
+                dissipated_energy=spent,
+                dissipated_energy_path_error=missed + jump * state.dissipated_energy_path_error,
+            ),
             np.asarray(self.window.worn),
             energy,
             path,
@@ -350,7 +357,11 @@ class WearPath(GivenPath):
         """Return a state from which slip and dissipated energy count anew."""
         zero = np.zeros(state.pressure.shape)
         return dataclasses.replace(
-            state, accumulated_slip=zero, dissipation_density=zero, dissipated_energy=0.0
+            state,
+            accumulated_slip=zero,
+            dissipation_density=zero,
+            dissipated_energy=0.0,
+            dissipated_energy_path_error=0.0,
         )
 
     # --- records ------------------------------------------------------------------------------------------

@@ -331,6 +331,8 @@ module hc_options
     real(wp) :: noise = 0.01_wp
     !> Share of the range of a cycle within which its motion or its load has to come back
     real(wp) :: closure = 0.05_wp
+    !> The same of the motion where only the load has to come back: in gross sliding it does so before the motion has
+    real(wp) :: drift = 0.25_wp
   end type cycle_options_t
 
   !> Error bars (docs/theory/error_bars.md). With these factors errors known from closed solutions stay within the estimate.

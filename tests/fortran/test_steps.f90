@@ -162,6 +162,10 @@ contains
     call find_cycles([0.0_wp, 1.0_wp, -0.5_wp, 1.2_wp], [0.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], first, last)
     call check_true(error, all([first, last] == [2, 4]), 'a load that comes back')
     if (allocated(error)) return
+    ! gross sliding: the load is back halfway
+    call find_cycles([0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp], [0.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], first, last)
+    call check(error, size(first), 0, 'a motion that does not come back')
+    if (allocated(error)) return
     call check_true(error, size(turning_points([1.0_wp, 1.0_wp, 1.0_wp])) == 0, 'a constant does not turn')
     if (allocated(error)) return
 

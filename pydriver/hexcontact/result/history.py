@@ -326,7 +326,7 @@ def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
             return [
                 {
                     **{"cycle": number, "loading": kind, **_span(histories, first, last), "loop_area": area},
-                    "other_work": listed(_other_work(histories, kind, first, last), "and"),
+                    "other_work": listed(other, "and") if (other := _other_work(histories, kind, first, last)) else "",
                 }
                 for number, (first, last, area) in enumerate(found, start=1)
             ]

@@ -17,6 +17,7 @@ module hc_load_path
                               separated, slip, stick
   use hc_contact_residuals, only: tangential_residual
   use hc_friction_law, only: friction_law_t
+  use hc_step_error, only: turned_part
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_entry, only: solve_with_entry
@@ -25,6 +26,9 @@ module hc_load_path
   private
 
   public :: advance, join_steps
+
+  !> Traction over its bound from which a node slips
+  real(wp), parameter :: at_bound = 1.0_wp - 1.0e-6_wp
 
 contains
 
@@ -216,7 +220,7 @@ contains
     integer, intent(in) :: row
     !> Beginning and end of the step
     type(contact_state_t), intent(in) :: before, state
-    real(wp) :: bound(size(state%pressure, 1), 2), along(2), length, turned
+    real(wp) :: bound(size(state%pressure, 1), 2), reached(size(bound, 1)), length, turned
     integer :: col, first
 
     row_error = 0.0_wp
@@ -224,12 +228,14 @@ contains
     first = (row - 1)*size(bound, 1) + 1
     call friction%find_bounds(first, before%pressure(:, row), bound(:, 1))
     call friction%find_bounds(first, state%pressure(:, row), bound(:, 2))
+    call friction%find_lengths(before%traction(:, row, 1), before%traction(:, row, 2), reached)
     do col = 1, size(bound, 1)
       associate (q => state%traction(col, row, :), q_before => before%traction(col, row, :))
         length = norm2(q)
         if (state%zone(col, row) == slip .and. bound(col, 2) > 0.0_wp .and. length > 0.0_wp) then
-          along = q/length
-          turned = abs(along(1)*q_before(2) - along(2)*q_before(1))
+          turned = 0.0_wp
+          if (reached(col) >= at_bound*bound(col, 1)) &
+            turned = abs(turned_part(q_before(1), q_before(2), q(1), q(2)))
           row_error = row_error + norm2(state%slip_increment(col, row, :)) &
                       *(turned + length*abs(bound(col, 2) - bound(col, 1))/bound(col, 2))
         else if (state%zone(col, row) == separated .and. bound(col, 1) > 0.0_wp) then

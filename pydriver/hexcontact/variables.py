@@ -286,11 +286,11 @@ VARIABLES: dict[str, Variable] = {
     "wear_volume": _work("m3", "volume that is worn off both bodies", title="Wear volume", least=0.0),
     "max_worn_depth": _work("m", "largest worn depth of a node", title="Largest worn depth", least=0.0),
     "worn_depth_step_error": _work(
-        "m", "bound on the error of the worn depth by jumps and by unworn cycles that are not closed", **_FROM_0
+        "m", "bound on the error of the worn depth by jumps, and unworn cycles that are not closed", **_FROM_0
     ),
     "unworn_cycles": _work("1", "cycles that were solved on unworn surfaces", dtype="i4"),
     "unworn_cycle_change": _work(
-        "1", "bound on the change of the wear of the unworn cycle by further ones, share of the largest", **_FROM_0
+        "1", "bound on the change of a cycle's wear by further unworn ones, share of the largest", **_FROM_0
     ),
     "cycle_dissipated_energy": _work("J", "energy dissipated by friction in a cycle", **_FROM_0),
     "elastic_energy": _measure(

@@ -17,8 +17,17 @@ from .report import Table
 MODULUS, RADIUS, CONTACT, MU = 1e11, 1e-2, 1e-4, 0.5
 APPROACH, STICK = CONTACT**2 / RADIUS, 0.6 * CONTACT
 AWAY = (0.5, 1.0, 2.0, 4.0)
-# places of the apex between the nodes, in spacings along x and y: at a node, on an edge, in a triangle, anywhere
-PLACES = ((0.0, 0.0), (0.5, 0.0), (0.5, 0.289), (0.25, 0.144), (0.13, 0.31), (0.37, 0.07), (0.21, 0.43), (0.42, 0.36))
+# places of a node from the apex, in spacings along x and y: on it, half an edge away, anywhere
+PLACES = (
+    (0.0, 0.0),
+    (0.5, 0.0),
+    (0.5, 0.289),
+    (0.25, 0.144),
+    (0.13, 0.31),
+    (0.37, 0.07),
+    (0.21, 0.43),
+    (0.42, 0.36),
+)
 
 
 def limiting_depth(r: Any, stick: float = STICK) -> Any:
@@ -38,13 +47,13 @@ def limit_on_lattice(lattice: Any, gap: Any, disc: Any) -> tuple[Any, float]:
 
 
 def measure(*, quick: bool, long: bool) -> list[Table]:
-    """Return the errors by spacings in the contact radius and tolerance of the jumps: the range over the places of the lattice."""
+    """Return the range of the errors over places of the lattice, by spacings in the radius and tolerance."""
     table = Table(
         "Limiting shape after 3·10⁷ cycles: errors against the closed form",
         [
             *("spacings in a, `tolerance`", "cycles solved", "load", "pressure, mean over the disc"),
             *(f"depth beyond c + {away:g}" for away in AWAY),
-            *("of it by jumps", "stiff as a disc of"),
+            *("of it by jumps", "stiff as a disc of, over c"),
         ],
     )
     tasks = [(12, 0.1), (12, 0.03), (24, 0.1), (24, 0.03), (24, 0.01)] + [(48, 0.1), (48, 0.03)] * long
@@ -65,7 +74,7 @@ def _range(form: str, values: Any) -> str:
 
 
 def errors(nodes: int, tolerance: float, place: tuple[float, float]) -> list[float]:
-    """Return the cycles solved, errors of load, pressure on the disc and depth beyond it, of it by jumps, radius over c."""
+    """Return the cycles solved, errors of load, pressure and depth, that by jumps, and the radius over c."""
     body = {"young_modulus": MODULUS, "poisson_ratio": 0.0}
     shift = MU * (APPROACH - STICK**2 / RADIUS)
     path = [{"shift_x": x, "steps": n} for x, n in ((shift, 2), (-shift, 4), (0.0, 2))]

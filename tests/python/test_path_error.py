@@ -25,7 +25,9 @@ def sphere(loads: list[dict[str, Any]], soft: float = 210e9, poisson: float = 0.
     )
 
 
-def circle(steps: int | str, rows: int, turns: int = 1, share: float = 0.6, control: str = "tangential_load") -> Any:
+def circle(
+    steps: int | str, rows: int, turns: int = 1, share: float = 0.6, control: str = "tangential_load"
+) -> Any:
     """Return loads that turn once or more at a constant normal load."""
     size = share * MU * P if control == "tangential_load" else 3e-7
     path = [
@@ -112,7 +114,9 @@ def test_uncertain_energy_is_stated() -> None:
     summary = Summary.of_result(result)
     [remark] = [each for each in summary.remarks if "uncertain" in each]
     assert "leaves the dissipated energy uncertain by up to" in remark
-    assert not [each for each in Summary.of_result(sphere(circle(8, 12)).run()).remarks if "uncertain" in each]
+    assert not [
+        each for each in Summary.of_result(sphere(circle(8, 12)).run()).remarks if "uncertain" in each
+    ]
 
 
 def test_static_steps_have_no_bound() -> None:

@@ -104,7 +104,11 @@ def unlike(before: int = 0, **wear: Any) -> Case:
     ]
     turns = [{"label": "before", "path": path, "repeat": before}] if before else []
     return fretting(
-        body_1={"young_modulus": 4e11, "poisson_ratio": 0.3, "surface": {"shape": "sphere", "radius": RADIUS}},
+        body_1={
+            "young_modulus": 4e11,
+            "poisson_ratio": 0.3,
+            "surface": {"shape": "sphere", "radius": RADIUS},
+        },
         body_2={"young_modulus": 6e10, "poisson_ratio": 0.3},
         friction_coefficient=0.3,
         loads=[{"normal_load": 100.0, "steps": 2}, *turns, {"label": "fretting", "path": path}],
@@ -119,7 +123,9 @@ def settled() -> Any:
 
 
 @pytest.mark.parametrize(("before", "tolerance"), [(0, 0.1), (0, 0.01), (8, 0.1), (8, 0.01)])
-def test_bound_of_the_depth_holds_while_bodies_shake_down(settled: Any, before: int, tolerance: float) -> None:
+def test_bound_of_the_depth_holds_while_bodies_shake_down(
+    settled: Any, before: int, tolerance: float
+) -> None:
     found = worn(unlike(before, tolerance=tolerance).run()).isel(step=-1)
     off = np.abs(found["worn_depth"] - settled).max()
     assert 0.0 < off <= found["worn_depth_step_error"] < 1.2 * tolerance * found["max_worn_depth"]
@@ -242,12 +248,12 @@ def test_what_cannot_wear_is_refused(changes: dict[str, Any], sentence: str) -> 
 
 def test_cycles_of_wear_are_no_cycles_of_the_history() -> None:
     legs = [{"shift_x": SHIFT, "steps": 3}, {"shift_x": -SHIFT, "steps": 6}, {"shift_x": SHIFT, "steps": 6}]
-    turn = [{"label": "turn", "path": legs}, {"label": "fretting", "path": [*legs[1:], legs[0] | {"shift_x": SHIFT}]}]
+    turn = [{"label": "turn", "path": legs}, {"label": "fretting", "path": legs[1:]}]
     result = fretting(wear={"cycles": 20_000}, loads=[{"approach": APPROACH, "shift_x": 0.0}, *turn]).run()
     before = int((~(result.dataset["wear_cycles"] >= 0)).sum())
-    assert result.cycles["last_step"].to_list() == [16, before - 3]
+    assert result.cycles["last_step"].to_list() == [16, before]
     _, rows = energy_table(Summary.of_result(result).histories, 24)
-    assert ("segment 5", "wear, 20,000 cycles") in {row[:2] for row in rows}
+    assert ("segment 7", "wear, 20,000 cycles") in {row[:2] for row in rows}
 
 
 def test_cycle_without_slip_is_refused_when_it_is_known() -> None:

@@ -24,7 +24,14 @@ not help; the smallest one did not converge."""
 LEAST = 1e-3
 """Smallest adaptive load step, as a part of its segment."""
 
-_FIELDS = ("pressure", "gap", "traction_x", "traction_y", "relative_displacement_x", "relative_displacement_y")
+_FIELDS = (
+    "pressure",
+    "gap",
+    "traction_x",
+    "traction_y",
+    "relative_displacement_x",
+    "relative_displacement_y",
+)
 _TRACTIONS = ("pressure", "traction_x", "traction_y")
 
 
@@ -44,7 +51,7 @@ class Change(NamedTuple):
     gain : float
         Change of the stick area over that of the tractions, both as shares, during the second half.
     spent, turned : float
-        Dissipated energy of the halves, and the part that is uncertain since tractions turn in each, over the
+        Dissipated energy of the halves, and the part that is uncertain since the load turns in each, over the
         area of a node (J/m2).
     """
 

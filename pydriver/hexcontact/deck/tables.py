@@ -193,7 +193,7 @@ class Solver(Table):
         0.01,
         'incremental, steps = "auto": largest change by halving a load step, in the stick area as a share '
         "of the largest contact area and in the shear tractions as a share of what friction can carry; "
-        "uncertainty of the dissipated energy by directions of slip that turn, as a share",
+        "and share of the dissipated energy that a load that turns leaves uncertain",
         "0.02",
     )
 

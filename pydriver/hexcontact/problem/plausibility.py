@@ -109,15 +109,16 @@ LIMITS = (
     ),
     Limit(
         "turning_error",
-        "the tangential load turns in its steps, so that nodes slip in directions that turn: this leaves an error of "
-        "about {turning_percent} in the dissipated energy; {turning_steps:g} steps in place of each leave 10 %",
-        "A node slips against its traction at the end of the step, in the direction that it has turned to: (X6)",
+        "the tangential load turns in its steps, so that nodes slip in directions that turn: this leaves an "
+        "error of about {turning_percent} in the dissipated energy; {turning_steps:g} steps in place of each "
+        "leave 10 %",
+        "A node slips against its traction at the end of the step, which has turned: (X6)",
         most=_STEP_ERROR,
     ),
     Limit(
         "ring_spacings",
-        "the slip annulus of the tangential loop is {ring_spacings:.2g} spacings wide, expected at least 1: its "
-        "dissipated energy may be off by {ring_percent}",
+        "the slip annulus of the tangential loop is {ring_spacings:.2g} spacings wide, expected at least 1: "
+        "its dissipated energy may be off by {ring_percent}",
         "A ring of nodes sticks or slips as a whole: (X2)",
         least=1.0,
     ),
@@ -253,7 +254,7 @@ def _slipping(case: Problem) -> float:
 
 
 def _shear(case: Problem) -> np.ndarray[Any, Any] | None:
-    """Return loads or motions along x and y and about z over their largest, by step; None if control changes."""
+    """Return loads or motions along x, y and about z over their largest; None if control changes."""
     targets = [(step.x, step.y, step.twist) for step in case.load_steps]
     if any(len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)):
         return None
@@ -264,7 +265,7 @@ def _shear(case: Problem) -> np.ndarray[Any, Any] | None:
 
 
 def _turning(case: Problem) -> float | None:
-    """Return the error of the dissipated energy by loads that turn in steps of given size; None without slip."""
+    """Return the error of the dissipated energy by loads that turn; None without slip or such steps."""
     if case.solver.algorithm != "incremental" or case.adaptive or _slipping(case) < _NOTICED:
         return None
     shear = _shear(case)

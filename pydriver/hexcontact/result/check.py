@@ -281,9 +281,7 @@ _MEMORY = ("stick", "traction", "spent", "turned")
 _CONTROL: dict[str, Fits] = {  # of adaptive load steps
     **dict.fromkeys(("position", "load_steps"), lambda value: type(value) is int and value >= 0),
     **dict.fromkeys(("fraction", "done"), lambda value: _is_number(value) and 0 <= value <= 1),
-    "chooser": lambda value: (
-        _has_numbers(value, _CHOOSER) and _has_numbers(value.get("memory"), _MEMORY)
-    ),
+    "chooser": lambda value: _has_numbers(value, _CHOOSER) and _has_numbers(value.get("memory"), _MEMORY),
 }
 
 

@@ -117,7 +117,7 @@ def step_error_share(history: History) -> float | None:
 
 
 def path_error_share(history: History) -> float:
-    """Return the bound on the error of the dissipated energy by load steps, as a share; 0 where next to nothing is dissipated."""
+    """Return the bound on the error of the dissipated energy by load steps, as a share; 0 of noise."""
     spent = float(history.get("dissipated_energy", 0.0))
     noise = _NOTICED * _scale("dissipated_energy", history) if spent else 0.0
     return float(history.get("dissipated_energy_path_error", 0.0)) / spent if spent > noise else 0.0
@@ -262,7 +262,7 @@ def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], 
 def _loop_along(
     histories: Sequence[History], across: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return shift and load along the direction of the largest tangential load, or across it; None if there is none."""
+    """Return shift and load along the largest tangential load, or across it; None without one."""
     if "tangential_load_x" not in histories[0]:
         return None
     load, shift = (
@@ -278,7 +278,12 @@ def _loop_along(
 
 def _other_work(histories: Sequence[History], kind: str, first: int, last: int) -> list[str]:
     """Return what does work between two steps besides the load of a loop: other loads, the bulk stress."""
-    words = {"shear": "tangential load", "torsion": "torque", "normal": "normal load", "across": "load across"}
+    words = {
+        "shear": "tangential load",
+        "torsion": "torque",
+        "normal": "normal load",
+        "across": "load across",
+    }
     pairs = loops(histories)
     scales = {name: [float(np.abs(values).max()) for values in pair] for name, pair in pairs.items()}
     if across := _loop_along(histories, across=True) if kind == "shear" else None:
@@ -317,8 +322,8 @@ def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
     """Return the closed cycles of a load history with friction, of the first of `loops` that has any.
 
     A cycle goes from one turning point of the motion to the next but one. Besides number, kind of loading,
-    first and last step and dissipated energy (J) it has the area (J) of the loop of the load over its motion, and
-    what else does work in it. Cycles of wear, of which only the end is recorded, are left out.
+    first and last step and dissipated energy (J) it has the area (J) of the loop of the load over its motion,
+    and what else does work in it. Cycles of wear, of which only the end is recorded, are left out.
     """
     histories = [history for history in histories if not _of_wear(history)]
     for kind, (motion, load) in loops(histories).items() if is_frictional(histories[-1]) else ():
@@ -326,7 +331,9 @@ def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
             return [
                 {
                     **{"cycle": number, "loading": kind, **_span(histories, first, last), "loop_area": area},
-                    "other_work": listed(other, "and") if (other := _other_work(histories, kind, first, last)) else "",
+                    "other_work": listed(other, "and")
+                    if (other := _other_work(histories, kind, first, last))
+                    else "",
                 }
                 for number, (first, last, area) in enumerate(found, start=1)
             ]
@@ -474,8 +481,9 @@ def uncertain_energy(histories: Sequence[History]) -> str:
     if share <= _UNCERTAIN:
         return ""
     return (
-        f"the size of the load steps leaves the dissipated energy uncertain by up to {percent(share)}, since nodes slip "
-        "in directions that turn or under a pressure that changes; twice as many steps leave half of it"
+        f"the size of the load steps leaves the dissipated energy uncertain by up to {percent(share)}, since "
+        "nodes slip in directions that turn or under a pressure that changes; twice as many steps leave half "
+        "of it"
     )
 
 
@@ -485,8 +493,9 @@ def unclosed_cycle(history: History, tolerance: float) -> str:
     if not left > tolerance:
         return ""
     return (
-        f"the cycle of wear is not closed after {history['unworn_cycles']} cycles on unworn surfaces: its wear may still "
-        f"change by {percent(left)}, expected at most wear.tolerance = {tolerance:g}; worn_depth_step_error includes this"
+        f"the cycle of wear is not closed after {history['unworn_cycles']} cycles on unworn surfaces: its "
+        f"wear may still change by {percent(left)}, expected at most wear.tolerance = {tolerance:g}; "
+        "worn_depth_step_error includes this"
     )
 
 

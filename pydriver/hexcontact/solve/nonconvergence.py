@@ -125,14 +125,15 @@ def _sliding(
     doubtful = bool(torque or (shear and not shear <= _NEAR_SLIDING * bound))
     if not case.frictional or not (seen or (shear and shear >= _SLIDING * bound)):
         return doubtful and not math.isinf(case.friction_coefficient), "", ""
-    if twist and abs(values[3] - moment) > abs(values[3]) and shear < bound and abs(moment) > 0.5 * largest:
-        place = ", ".join(f"{axis} = {quantity(at, 'm')}" for axis, at in zip("xy", _center(lattice, solution)))
+    of_load = values[3] - moment
+    if twist and abs(of_load) > abs(values[3]) and abs(moment) > 0.5 * largest and not shear >= bound:
+        x, y = (quantity(at, "m") for at in _center(lattice, solution))
         return (
             True,
-            f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at {place} (at most "
-            f"{quantity(largest, 'N m')}), since the tangential load acts at x = y = 0",
-            f"expected twist = 0 in place of the torque, a torque of {quantity(values[3] - moment, 'N m')}, or "
-            "surfaces that touch at x = y = 0",
+            f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at x = {x}, "
+            f"y = {y} (at most {quantity(largest, 'N m')}), since the tangential load acts at x = y = 0",
+            f"expected twist = 0 in place of the torque, a torque of {quantity(of_load, 'N m')}, or surfaces "
+            "that touch at x = y = 0",
         )
     wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
@@ -144,14 +145,16 @@ def _sliding(
 
 def _center(lattice: Lattice, solution: NormalSolution) -> tuple[float, float]:
     """Return the centroid of the pressure; the origin without any."""
-    weights = solution.pressure if solution.pressure.any() else None
-    return (0.0, 0.0) if weights is None else tuple(float(np.average(at, weights=weights)) for at in (lattice.x, lattice.y))
+    if not solution.pressure.any():
+        return 0.0, 0.0
+    x, y = (float(np.average(place, weights=solution.pressure)) for place in (lattice.x, lattice.y))
+    return x, y
 
 
 def _moments(
     case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
 ) -> tuple[float, float]:
-    """Return the moment (N m) of the prescribed loads about the contact, and the largest that friction carries there."""
+    """Return the moment (N m) of the loads about the contact, and the largest that friction carries."""
     x, y = _center(lattice, solution)
     loads = zip(values[1:3], (target.x, target.y), strict=True)
     load_x, load_y = (value * (motion.control == "force") for value, motion in loads)

@@ -270,6 +270,11 @@ module hc_options
     real(wp) :: ring_shift = 0.7_wp, entering_factor = 5.0_wp, small_radius = 3.0_wp
     !> Largest gain G of (S3): where nothing but rounding errors is added to tractions it would be any number
     real(wp) :: most_gain = 10.0_wp
+    !> Factor on the changes that repeated cycles are expected to leave, and the largest ratio of one change to the change before
+    !> it: a series without decay counts as one that closes in 50 cycles
+    real(wp) :: closing_safety = 3.0_wp, slowest_closing = 0.98_wp
+    !> Change of the wear of a cycle over that of the shear tractions, both as shares, where only the latter is known
+    real(wp) :: closing_gain = 100.0_wp
     !> Shear tractions, over the largest pressure, that are rounding errors
     real(wp) :: shear_rounding = 1.0e-12_wp
   end type step_options_t
@@ -326,6 +331,8 @@ module hc_options
     real(wp) :: noise = 0.01_wp
     !> Share of the range of a cycle within which its motion or its load has to come back
     real(wp) :: closure = 0.05_wp
+    !> The same of the motion where only the load has to come back: in gross sliding it does so before the motion has
+    real(wp) :: drift = 0.25_wp
   end type cycle_options_t
 
   !> Error bars (docs/theory/error_bars.md). With these factors errors known from closed solutions stay within the estimate.

@@ -73,8 +73,8 @@ module hc_contact_state
     real(wp) :: load(n_motion) = 0.0_wp
     !> Approach, shifts [m] and twist [rad] of the remote parts; bulk strain of body 1 less that of body 2
     real(wp) :: motion(n_motion) = 0.0_wp
-    !> Energy dissipated by friction so far [J]
-    real(wp) :: dissipated_energy = 0.0_wp
+    !> Energy dissipated by friction so far, and bound on its error by the size of the load steps, (W4) [J]
+    real(wp) :: dissipated_energy = 0.0_wp, path_error = 0.0_wp
     !> Residual of the contact conditions along the normal
     real(wp) :: residual_normal = huge(1.0_wp)
     !> Residual of the friction conditions, with the slip increment that is recorded; of a load step that was halved it may
@@ -313,7 +313,7 @@ contains
       call raise(error, status%invalid_input, 'the state to go on from does not have the shape of the lattice window')
       return
     end if
-    fits = all(ieee_is_finite([state%load, state%motion, state%dissipated_energy]))
+    fits = all(ieee_is_finite([state%load, state%motion, state%dissipated_energy, state%path_error]))
     do row = 1, lattice%extent(2)
       fits = fits .and. all(ieee_is_finite(state%pressure(:, row))) .and. all(ieee_is_finite(state%traction(:, row, :))) &
              .and. all(ieee_is_finite(state%relative_displacement(:, row, :))) &

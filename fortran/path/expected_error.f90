@@ -11,7 +11,7 @@ module hc_expected_error
   private
 
   public :: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, entry_steps, &
-            oblique_error, oblique_steps
+            oblique_error, oblique_steps, turning_error
 
   !> Relative errors that a lattice leaves at most, in nine of ten positions of it.
   type :: lattice_errors_t
@@ -125,5 +125,23 @@ contains
     real(wp), intent(in) :: load_ratio
     oblique_steps = 1.0_wp + max(0.0_wp, oblique_error(1.0_wp, load_ratio)/error - 1.0_wp)/per_oblique_step
   end function oblique_steps
+
+  !> Estimate the error of the dissipated energy where the tangential load turns, (X6): the largest part of a load, over the largest
+  !> of all loads, that is transverse to the load at the end of the step.
+  pure real(wp) function turning_error(shear)
+    !> Tangential load or shift along x and y, and torque or twist, each over its largest, at the end of each step (3, :)
+    real(wp), intent(in) :: shear(:, :)
+    real(wp) :: along(size(shear, 2))
+    integer :: k
+
+    turning_error = 0.0_wp
+    along = norm2(shear, dim=1)
+    do k = 2, size(shear, 2)
+      associate (q => shear(:, k), before => shear(:, k - 1))
+        if (along(k) > 0.0_wp) turning_error = max(turning_error, norm2(before - dot_product(before, q)/along(k)**2*q))
+      end associate
+    end do
+    if (turning_error > 0.0_wp) turning_error = turning_error/maxval(along)
+  end function turning_error
 
 end module hc_expected_error

@@ -59,7 +59,8 @@ contains
     allocate (first(0), last(0))
     k = 1
     do while (k + 2 <= size(turns))
-      if (is_back(motion(turns(k:k + 2)), tuning%closure) .or. is_back(load(turns(k:k + 2)), tuning%closure)) then
+      if (is_back(motion(turns(k:k + 2)), tuning%closure) .or. (is_back(load(turns(k:k + 2)), tuning%closure) &
+                                                                .and. is_back(motion(turns(k:k + 2)), tuning%drift))) then
         first = [first, turns(k)]
         last = [last, turns(k + 2)]
         k = k + 1

@@ -13,8 +13,11 @@
 module hc_load_path
   use hc_precision, only: wp
   use hc_error, only: error_t, status, raise
-  use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached, stick
+  use hc_contact_state, only: contact_state_t, load_target_t, check_state, check_target, force_control, rim_reached, &
+                              separated, slip, stick
   use hc_contact_residuals, only: tangential_residual
+  use hc_friction_law, only: friction_law_t
+  use hc_step_error, only: turned_part
   use hc_contact_problem, only: friction_problem_t
   use hc_contact_solver, only: friction_solver_t
   use hc_contact_entry, only: solve_with_entry
@@ -23,6 +26,9 @@ module hc_load_path
   private
 
   public :: advance, join_steps
+
+  !> Traction over its bound from which a node slips
+  real(wp), parameter :: at_bound = 1.0_wp - 1.0e-6_wp
 
 contains
 
@@ -171,8 +177,8 @@ contains
                                                     problem%tangential_compliance, problem%space)
   end subroutine find_slip_residual
 
-  !> Add slip path and dissipated energy of a step, sum of A (-q . ds) [J], to those before; where a node sticks ds is nothing
-  !> but rounding errors.
+  !> Add slip path, dissipated energy of a step, sum of A (-q . ds) [J], and the bound on its error to those before; where a node
+  !> sticks ds is nothing but rounding errors.
   subroutine add_slip(problem, before, static, state)
     type(friction_problem_t), intent(in) :: problem
     !> State at the beginning of the step
@@ -181,11 +187,12 @@ contains
     logical, intent(in) :: static
     !> State at its end
     type(contact_state_t), intent(inout) :: state
-    real(wp) :: part(size(state%pressure, 2)), spent(size(state%pressure, 1))
+    real(wp) :: part(size(state%pressure, 2)), error(size(part)), spent(size(state%pressure, 1))
     integer :: row
 
     !$omp parallel do schedule(static) num_threads(problem%space%threads) private(spent)
     do row = 1, size(part)
+      error(row) = row_error(problem%friction, row, before, state)
       associate (q => state%traction(:, row, :), ds => state%slip_increment(:, row, :))
         state%accumulated_slip(:, row) = norm2(ds, dim=2)
         if (.not. static) state%accumulated_slip(:, row) = before%accumulated_slip(:, row) + state%accumulated_slip(:, row)
@@ -197,8 +204,47 @@ contains
     end do
     !$omp end parallel do
     state%dissipated_energy = problem%lattice%cell_area()*sum(part)
-    if (.not. static) state%dissipated_energy = before%dissipated_energy + state%dissipated_energy
+    state%path_error = 0.0_wp  ! without a path
+    if (static) return
+    state%dissipated_energy = before%dissipated_energy + state%dissipated_energy
+    state%path_error = before%path_error + problem%lattice%cell_area()*sum(error)
   end subroutine add_slip
+
+  !> Bound the error of the energy that a row of nodes dissipates in a step, by area, (W4): slip at the traction of the end of the
+  !> step may have been at any between both ends, of another direction or under another pressure. Where a traction only
+  !> grows, or reverses, a node slips at its bound alone.
+  pure real(wp) function row_error(friction, row, before, state)
+    !> Friction law
+    class(friction_law_t), intent(in) :: friction
+    !> Number of the row
+    integer, intent(in) :: row
+    !> Beginning and end of the step
+    type(contact_state_t), intent(in) :: before, state
+    real(wp) :: bound(size(state%pressure, 1), 2), reached(size(bound, 1)), length, turned
+    integer :: col, first
+
+    row_error = 0.0_wp
+    if (.not. friction%is_bounded()) return
+    first = (row - 1)*size(bound, 1) + 1
+    call friction%find_bounds(first, before%pressure(:, row), bound(:, 1))
+    call friction%find_bounds(first, state%pressure(:, row), bound(:, 2))
+    call friction%find_lengths(before%traction(:, row, 1), before%traction(:, row, 2), reached)
+    do col = 1, size(bound, 1)
+      associate (q => state%traction(col, row, :), q_before => before%traction(col, row, :))
+        length = norm2(q)
+        if (state%zone(col, row) == slip .and. bound(col, 2) > 0.0_wp .and. length > 0.0_wp) then
+          turned = 0.0_wp
+          if (reached(col) >= at_bound*bound(col, 1)) &
+            turned = abs(turned_part(q_before(1), q_before(2), q(1), q(2)))
+          row_error = row_error + norm2(state%slip_increment(col, row, :)) &
+                      *(turned + length*abs(bound(col, 2) - bound(col, 1))/bound(col, 2))
+        else if (state%zone(col, row) == separated .and. bound(col, 1) > 0.0_wp) then
+          row_error = row_error + bound(col, 1)*norm2(state%relative_displacement(col, row, :) &
+                                                      - before%relative_displacement(col, row, :))
+        end if
+      end associate
+    end do
+  end function row_error
 
   !> Return part of the way from a state to a target.
   pure type(load_target_t) function between(state, target, fraction)

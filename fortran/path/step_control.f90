@@ -46,6 +46,8 @@ module hc_step_control
     real(wp) :: stick = 0.0_wp, traction = 0.0_wp
     !> Those of all steps, fading
     real(wp) :: past_stick = 0.0_wp, past_traction = 0.0_wp
+    !> Sums over the steps: dissipated energy, and the part that is uncertain since tractions turn
+    real(wp) :: spent = 0.0_wp, turned = 0.0_wp
     !> Tuning numbers
     type(step_options_t) :: options
   contains
@@ -125,7 +127,7 @@ contains
     real(wp), intent(in) :: tolerance
     !> rejected, accepted, limited or failed
     integer, intent(out) :: verdict
-    real(wp) :: over(2), next
+    real(wp) :: over(3), next
     logical :: useless, inherited
 
     associate (size => attempt%end - attempt%start)
@@ -141,7 +143,7 @@ contains
                    size < self%options%largest_retry*attempt%last_size)
         verdict = rejected
         if (useless) verdict = limited
-        if (over(2) <= 1.0_wp .and. (over(1) <= 1.0_wp .or. inherited)) verdict = accepted
+        if (maxval(over(2:)) <= 1.0_wp .and. (over(1) <= 1.0_wp .or. inherited)) verdict = accepted
         next = size*min(self%options%largest_retry, max(self%options%smallest_retry, self%growth(change, tolerance)))
         if (verdict == rejected) then
           attempt%last_excess = maxval(over)
@@ -165,7 +167,7 @@ contains
     real(wp), intent(in) :: tolerance
     !> accepted or limited
     integer, intent(in) :: verdict
-    real(wp) :: factor, over(2)
+    real(wp) :: factor, over(3)
 
     factor = self%growth(change, tolerance)
     over = self%excess(change, tolerance)
@@ -180,6 +182,8 @@ contains
       self%size = size*min(self%options%most_growth, max(self%options%least_growth, factor))
       if (attempt%start <= 0.0_wp) self%first = size
     end associate
+    self%spent = self%spent + change%spent
+    self%turned = self%turned + change%turned
     self%stick = change%stick
     self%traction = change%traction
     self%past_stick = max(abs(change%stick), self%options%stick_memory*self%past_stick)
@@ -203,7 +207,7 @@ contains
     if (self%past_traction > 0.0_wp) traction_bound = tolerance + self%options%own_safety*self%past_traction
   end function traction_bound
 
-  !> Compute what a load step changes over what it may, of the stick area and of the tractions.
+  !> Compute what a load step changes over what it may, of the stick area, of the tractions, and of their direction.
   !>
   !> Smaller steps cannot help against the rings of the lattice, nor against tractions that differ from before.
   pure function excess(self, change, tolerance)
@@ -212,13 +216,17 @@ contains
     type(step_change_t), intent(in) :: change
     !> What a step may change, over the largest contact area
     real(wp), intent(in) :: tolerance
-    real(wp) :: excess(2)
+    real(wp) :: excess(3)
 
     excess = [self%options%stick_safety*abs(change%stick)/max(tolerance, change%lattice, self%options%stick_safety*self%traction), &
-              change%added/(self%options%added_share*tolerance)]
+              change%added/(self%options%added_share*tolerance), 0.0_wp]
+    ! the energy of the step, or that of all steps, is known to the tolerance
+    if (change%turned > 0.0_wp) excess(3) = min(change%turned/change%spent, &
+                                                (self%turned + change%turned)/(self%spent + change%spent))/tolerance
   end function excess
 
-  !> Estimate by what factor a larger step would have changed the stick area, with the size, and the tractions, with its square.
+  !> Estimate by what factor a larger step would have changed the stick area and the direction of tractions, with the size, and
+  !> the tractions, with its square.
   pure real(wp) function growth(self, change, tolerance)
     class(step_control_t), intent(in) :: self
     !> What its halves change
@@ -227,7 +235,7 @@ contains
     real(wp), intent(in) :: tolerance
 
     associate (over => max(self%excess(change, tolerance), self%options%least_excess))
-      growth = min(self%options%aim/over(1), self%options%aim/sqrt(over(2)))
+      growth = min(self%options%aim/over(1), self%options%aim/sqrt(over(2)), self%options%aim/over(3))
     end associate
   end function growth
 

@@ -17,7 +17,7 @@ module hc_step_error
   implicit none
   private
 
-  public :: step_change_t, compare_halves, stick_edge_of, shear_free
+  public :: step_change_t, compare_halves, stick_edge_of, shear_free, turned_part
 
   !> What the halves of a load step change.
   type :: step_change_t
@@ -31,6 +31,8 @@ module hc_step_error
     real(wp) :: lattice = 0.0_wp
     !> Change of the stick area over that of the tractions, in these units, during the second half
     real(wp) :: gain = 1.0_wp
+    !> Dissipated energy of the halves, and the part that is uncertain since the load turns in each, (W4), over the cell area
+    real(wp) :: spent = 0.0_wp, turned = 0.0_wp
   end type step_change_t
 
 contains
@@ -86,6 +88,13 @@ contains
       change%added = scale*space%sum(norm2(whole%traction - halves%traction &
                                            - (whole_before%traction - halves_before%traction), dim=3))
     end associate
+
+    if (friction%is_bounded()) then
+      change%spent = space%sum(shear(half)*slipped(halves_before, half) + shear(halves)*slipped(half, halves))
+      ! nodes that turn one way and others that turn the other way do so under a load that keeps its direction
+      change%turned = abs(space%sum(turned(halves_before, half)*slipped(halves_before, half) &
+                                    + turned(half, halves)*slipped(half, halves)))
+    end if
 
     grown = abs(sticking%area - stick_area(lattice, candidate, friction, half, tuning))/area
     loaded = scale*space%sum(norm2(half%traction - halves%traction, dim=3))
@@ -176,6 +185,39 @@ contains
       call friction%find_bounds((row - 1)*size(bound, 1) + 1, state%pressure(:, row), bound(:, row))
     end do
   end function bounds
+
+  !> Compute the slip during a step; 0 where nodes do not slip at its end [m].
+  pure function slipped(before, after)
+    !> Beginning and end
+    type(contact_state_t), intent(in) :: before, after
+    real(wp) :: slipped(size(after%traction, 1), size(after%traction, 2))
+
+    slipped = merge(norm2(after%relative_displacement - before%relative_displacement, dim=3), 0.0_wp, after%zone == slip)
+  end function slipped
+
+  !> Compute by how much a traction may have turned while a node slipped, (W4): its part before the step that is transverse to that
+  !> at the end, positive where it turns from x to y. Beyond a right angle less and less: a node whose traction reverses sticks until that is at its bound again.
+  elemental real(wp) function turned_part(before_x, before_y, x, y) result(turned)
+    !> Traction at the beginning and at the end of the step [Pa]
+    real(wp), intent(in) :: before_x, before_y, x, y
+    real(wp) :: product
+
+    turned = 0.0_wp
+    product = hypot(before_x, before_y)*hypot(x, y)
+    if (product <= 0.0_wp) return
+    turned = (before_x*y - before_y*x)/hypot(x, y)*min(1.0_wp, 1.0_wp + (x*before_x + y*before_y)/product)
+  end function turned_part
+
+  !> Compute these parts of the shear tractions of two states; a node that stuck slips in the direction that it is pulled to [Pa].
+  pure function turned(before, after)
+    !> Beginning and end
+    type(contact_state_t), intent(in) :: before, after
+    real(wp) :: turned(size(after%traction, 1), size(after%traction, 2))
+
+    turned = 0.0_wp
+    where (before%zone == slip) turned = turned_part(before%traction(:, :, 1), before%traction(:, :, 2), &
+                                                     after%traction(:, :, 1), after%traction(:, :, 2))
+  end function turned
 
   !> Compute the magnitude of the shear tractions [Pa].
   pure function shear(state)

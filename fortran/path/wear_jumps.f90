@@ -20,7 +20,7 @@ module hc_wear_jumps
   implicit none
   private
 
-  public :: archard_depth, wear_by, jump_change, energy_of_second_jump, expect_end, remember_end
+  public :: archard_depth, wear_by, wear_left, jump_change, energy_of_second_jump, expect_end, remember_end
 
 contains
 
@@ -57,6 +57,36 @@ contains
     depth = depth + cycles*archard_depth(energy, coefficient, friction)
     volume = area*sum(depth)
   end subroutine wear_by
+
+  !> Bound the change of the wear of a cycle by further repetitions, over the largest of a node, (V9).
+  !>
+  !> Changes fade like 1/n**2 in the n-th repetition, which leaves n times the last one; n follows from the last two. A
+  !> geometric series leaves less. Until three cycles are known, the bound follows from the shear tractions, which are back where
+  !> they were when a cycle is closed.
+  pure real(wp) function wear_left(energies, traction, pressure, friction) result(left)
+    !> Dissipated energy of the last cycles, at most three, by area (n_col, n_row, :) [J/m^2]
+    real(wp), intent(in) :: energies(:, :, :)
+    !> Shear tractions at the beginning and at the end of the last cycle (n_col, n_row, 2, 2) [Pa]
+    real(wp), intent(in) :: traction(:, :, :, :)
+    !> Pressure at its end (n_col, n_row) [Pa]
+    real(wp), intent(in) :: pressure(:, :)
+    !> Coefficient of friction (n_col, n_row)
+    real(wp), intent(in) :: friction(:, :)
+    type(step_options_t) :: options
+    real(wp), allocatable :: depth(:, :, :)
+    real(wp) :: first, last
+
+    associate (n => size(energies, 3))
+      left = options%closing_gain*sum(norm2(traction(:, :, :, 2) - traction(:, :, :, 1), dim=3)) &
+             /max(sum(friction*pressure, mask=energies(:, :, n) > 0.0_wp), tiny(1.0_wp))
+      if (n < 3) return
+      depth = archard_depth(energies, 1.0_wp, spread(friction, 3, n))
+      first = maxval(abs(depth(:, :, n - 1) - depth(:, :, n - 2)))
+      last = maxval(abs(depth(:, :, n) - depth(:, :, n - 1)))
+      left = options%closing_safety*last/max(maxval(depth(:, :, n)), tiny(1.0_wp)) &
+             /(1.0_wp - min(last/max(first, tiny(1.0_wp)), options%slowest_closing))
+    end associate
+  end function wear_left
 
   !> Compute what two jumps change in comparison with one of both, (V6): the depth, and its root mean square over what the
   !> largest pressure indents one node, as tractions that the step adds.

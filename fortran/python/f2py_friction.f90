@@ -186,7 +186,7 @@ contains
     integer(c_int64_t), intent(in) :: before
     integer(c_int64_t), intent(out) :: after
     !> Numbers of the new state
-    real(c_double), intent(out) :: numbers(12)
+    real(c_double), intent(out) :: numbers(13)
     !> R_n, R_t, R_P, R_Q, R_M
     real(c_double), intent(out) :: residuals(5)
     !> Active sets that were tried, times that the step was halved

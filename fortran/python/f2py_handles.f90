@@ -33,7 +33,7 @@ module hc_f2py_handles
   !> dissipated energy by area
   integer, parameter :: n_field = 10
   !> Numbers of a state: loads, motions with the bulk strain, dissipated energy
-  integer, parameter :: n_number = n_load + n_motion + 1
+  integer, parameter :: n_number = n_load + n_motion + 2
 
   !> Largest number of objects.
   integer, parameter :: n_slot = 4096
@@ -299,7 +299,7 @@ contains
     type(contact_state_t), intent(in) :: state
     real(c_double) :: numbers(n_number)
 
-    numbers = [state%load(:n_load), state%motion, state%dissipated_energy]
+    numbers = [state%load(:n_load), state%motion, state%dissipated_energy, state%path_error]
   end function numbers_of
 
   !> Unpack the numbers of a state.
@@ -309,7 +309,8 @@ contains
 
     state%load(:n_load) = numbers(:n_load)
     state%motion = numbers(n_load + 1:n_load + n_motion)
-    state%dissipated_energy = numbers(n_number)
+    state%dissipated_energy = numbers(n_number - 1)
+    state%path_error = numbers(n_number)
   end subroutine unpack_numbers
 
   !> Return an error as a code and a message.

@@ -22,7 +22,7 @@ contains
     !> Its fields but for the slip increment
     real(c_double), intent(in) :: pressure(n_col*n_row), traction_x(n_col*n_row), traction_y(n_col*n_row), gap(n_col*n_row), &
                                   displacement_x(n_col*n_row), displacement_y(n_col*n_row), slip(n_col*n_row), &
-                                  density(n_col*n_row), numbers(12)
+                                  density(n_col*n_row), numbers(13)
     !> Address of the state, or 0: there is no memory for it
     integer(c_int64_t), intent(out) :: address
     type(contact_state_t), pointer :: state

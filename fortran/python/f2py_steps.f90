@@ -1,6 +1,6 @@
 !> Adaptive load steps and expected errors for Python: flat procedures for f2py, no mathematics.
 !>
-!> A control is its six numbers, a change its five, an attempt its five, in the order of the types of the core.
+!> A control is its eight numbers, a change its seven, an attempt its five, in the order of the types of the core.
 module hc_f2py_steps
   use iso_c_binding, only: c_double, c_int
   use hc_error, only: error_t
@@ -13,14 +13,15 @@ module hc_f2py_steps
   use hc_step_error, only: step_change_t, compare_halves, shear_free
   use hc_step_control, only: step_control_t, step_attempt_t
   use hc_expected_error, only: lattice_errors_t, lattice_errors, lattice_spacings, slip_ring, even_steps, entry_error, &
-                               entry_steps, oblique_error, oblique_steps
+                               entry_steps, oblique_error, oblique_steps, turning_error
   implicit none
   private
 
-  public :: change_by_halving, is_shear_free, first_attempt, decide_attempt, accept_attempt, errors_of_lattice, errors_of_entry
+  public :: change_by_halving, is_shear_free, first_attempt, decide_attempt, accept_attempt, errors_of_lattice, errors_of_entry, &
+            error_of_turns, width_of_ring
 
-  !> Fields of a state that are compared: pressure, gap, traction along x and along y.
-  integer, parameter :: n_field = 4
+  !> Fields of a state that are compared: pressure, gap, traction and relative displacement along x and along y.
+  integer, parameter :: n_field = 6
 
 contains
 
@@ -38,12 +39,12 @@ contains
     integer(c_int), intent(in) :: n_coefficient
     real(c_double), intent(in) :: coefficient(n_coefficient), law(4)
     !> Fields and zones of five states: the end of the whole step, the middle and the end of the halves, both at the beginning
-    real(c_double), intent(in) :: fields(n_col, n_row, 4, 5)
+    real(c_double), intent(in) :: fields(n_col, n_row, 6, 5)
     integer(c_int), intent(in) :: zones(n_col, n_row, 5)
     !> Largest contact area of the history [m^2]
     real(c_double), intent(in) :: area
     !> What the halves change
-    real(c_double), intent(out) :: change(5)
+    real(c_double), intent(out) :: change(7)
     !> Status and its message
     integer(c_int), intent(out) :: code
     character(len=512), intent(out) :: message
@@ -60,13 +61,14 @@ contains
       do k = 1, size(state)
         state(k)%pressure = fields(:, :, 1, k)
         state(k)%gap = fields(:, :, 2, k)
-        state(k)%traction = fields(:, :, 3:n_field, k)
+        state(k)%traction = fields(:, :, 3:4, k)
+        state(k)%relative_displacement = fields(:, :, 5:n_field, k)
         state(k)%zone = zones(:, :, k)
       end do
       call friction_of(coefficient, law, lattice%size(), friction)
       call compare_halves(lattice, candidate /= 0, friction, state(1), state(2), state(3), state(4), &
                           state(5), area, found, field_space_t())
-      change = [found%stick, found%traction, found%added, found%lattice, found%gain]
+      change = [found%stick, found%traction, found%added, found%lattice, found%gain, found%spent, found%turned]
     end if
     call report(error, code, message)
   end subroutine change_by_halving
@@ -91,7 +93,7 @@ contains
   !> Return the first attempt at a load step.
   subroutine first_attempt(control, least, fraction, largest, attempt)
     !> Control of the load steps; at the beginning of a segment its first size follows from that of the last one
-    real(c_double), intent(inout) :: control(6)
+    real(c_double), intent(inout) :: control(8)
     !> Smallest load step
     real(c_double), intent(in) :: least
     !> Part of the segment that is done, largest load step
@@ -109,7 +111,7 @@ contains
   !> Decide what becomes of an attempt.
   subroutine decide_attempt(control, least, attempt, converged, change, tolerance, verdict)
     !> Control of the load steps
-    real(c_double), intent(in) :: control(6)
+    real(c_double), intent(in) :: control(8)
     !> Smallest load step
     real(c_double), intent(in) :: least
     !> The attempt; if it is rejected, the next one
@@ -117,7 +119,7 @@ contains
     !> Not zero: it was solved
     integer(c_int), intent(in) :: converged
     !> What the halves change
-    real(c_double), intent(in) :: change(5)
+    real(c_double), intent(in) :: change(7)
     !> What a step may change
     real(c_double), intent(in) :: tolerance
     !> 0: rejected, 1: accepted, 2: smaller ones are of no use, 3: it did not converge and is the smallest there is
@@ -134,13 +136,13 @@ contains
   !> Take over an attempt.
   subroutine accept_attempt(control, least, attempt, change, tolerance, verdict, bounds)
     !> Control of the load steps
-    real(c_double), intent(inout) :: control(6)
+    real(c_double), intent(inout) :: control(8)
     !> Smallest load step
     real(c_double), intent(in) :: least
     !> The attempt
     real(c_double), intent(in) :: attempt(5)
     !> What the halves change
-    real(c_double), intent(in) :: change(5)
+    real(c_double), intent(in) :: change(7)
     !> What a step may change
     real(c_double), intent(in) :: tolerance
     !> What became of it
@@ -201,17 +203,41 @@ contains
     needed = max(needed, oblique_steps(goal, load_ratio))
   end subroutine errors_of_entry
 
+  !> Estimate the error of the dissipated energy where the tangential load turns.
+  subroutine error_of_turns(n, shear, error)
+    !> Number of load steps
+    integer(c_int), intent(in) :: n
+    !> Tangential load or shift along x and y, and torque or twist, each over its largest, at the end of each step
+    real(c_double), intent(in) :: shear(3, n)
+    !> Its error as a share
+    real(c_double), intent(out) :: error
+
+    error = turning_error(shear)
+  end subroutine error_of_turns
+
+  !> Compute the width of the slip ring over the contact radius.
+  subroutine width_of_ring(load_ratio, width)
+    !> Q/mu P
+    real(c_double), intent(in) :: load_ratio
+    !> Width over radius
+    real(c_double), intent(out) :: width
+
+    width = slip_ring(load_ratio)
+  end subroutine width_of_ring
+
   !> Set up a control from its numbers.
   pure type(step_control_t) function control_of(numbers, least)
-    real(c_double), intent(in) :: numbers(6), least
-    control_of = step_control_t(numbers(1), numbers(2), numbers(3), numbers(4), numbers(5), numbers(6), step_options_t(least))
+    real(c_double), intent(in) :: numbers(8), least
+    control_of = step_control_t(numbers(1), numbers(2), numbers(3), numbers(4), numbers(5), numbers(6), numbers(7), numbers(8), &
+                                step_options_t(least))
   end function control_of
 
   !> Return a control as numbers.
   pure function numbers_of_control(control) result(numbers)
     type(step_control_t), intent(in) :: control
-    real(c_double) :: numbers(6)
-    numbers = [control%size, control%first, control%stick, control%traction, control%past_stick, control%past_traction]
+    real(c_double) :: numbers(8)
+    numbers = [control%size, control%first, control%stick, control%traction, control%past_stick, control%past_traction, &
+               control%spent, control%turned]
   end function numbers_of_control
 
   !> Set up an attempt from its numbers.
@@ -229,8 +255,8 @@ contains
 
   !> Set up a change from its numbers.
   pure type(step_change_t) function change_of(numbers)
-    real(c_double), intent(in) :: numbers(5)
-    change_of = step_change_t(numbers(1), numbers(2), numbers(3), numbers(4), numbers(5))
+    real(c_double), intent(in) :: numbers(7)
+    change_of = step_change_t(numbers(1), numbers(2), numbers(3), numbers(4), numbers(5), numbers(6), numbers(7))
   end function change_of
 
 end module hc_f2py_steps

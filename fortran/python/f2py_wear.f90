@@ -7,12 +7,12 @@ module hc_f2py_wear
   use hc_lattice, only: lattice_t, new_lattice
   use hc_memory, only: require_memory
   use hc_step_error, only: step_change_t
-  use hc_wear_jumps, only: wear_by, jump_change, energy_of_second_jump, expect_end, remember_end
+  use hc_wear_jumps, only: wear_by, wear_left, jump_change, energy_of_second_jump, expect_end, remember_end
   use hc_wear_ahead, only: worn_cycle_t, energy_ahead, energy_ahead_memory
   implicit none
   private
 
-  public :: wear_of_cycles, energy_of_jump, change_by_jump, expected_end, remembered_end
+  public :: wear_of_cycles, wear_left_open, energy_of_jump, change_by_jump, expected_end, remembered_end
 
 contains
 
@@ -39,6 +39,23 @@ contains
     call wear_by(energy, coefficient, friction, cycles, area, worn, volume)
     deepest = maxval(worn)
   end subroutine wear_of_cycles
+
+  !> Bound the change of the wear of a cycle by further repetitions.
+  subroutine wear_left_open(n_col, n_row, n_cycle, energies, traction, pressure, friction, left)
+    !f2py threadsafe
+    !> Number of columns, rows and known cycles
+    integer(c_int), intent(in) :: n_col, n_row, n_cycle
+    !> Dissipated energy of the last cycles by area [J/m^2]
+    real(c_double), intent(in) :: energies(n_col, n_row, n_cycle)
+    !> Shear tractions at the beginning and at the end of the last one [Pa]
+    real(c_double), intent(in) :: traction(n_col, n_row, 2, 2)
+    !> Pressure at its end [Pa], coefficient of friction
+    real(c_double), intent(in) :: pressure(n_col, n_row), friction(n_col, n_row)
+    !> Share of the largest wear of a node
+    real(c_double), intent(out) :: left
+
+    left = wear_left(energies, traction, pressure, friction)
+  end subroutine wear_left_open
 
   !> Find the energy of a cycle by which a jump wears.
   subroutine energy_of_jump(n_col, n_row, basis, lambda, interface, energy, path, pressure, gap, candidate, friction, by_load, &
@@ -106,7 +123,7 @@ contains
     !> Cycles of each of the two jumps, largest pressure [Pa]
     real(c_double), intent(in) :: cycles, p_max
     !> What it changes
-    real(c_double), intent(out) :: change(5)
+    real(c_double), intent(out) :: change(7)
     !> By how much the two wear more [m]
     real(c_double), intent(out) :: slower(n_col, n_row)
     !> Energy by area of each cycle in the second jump, corrected [J/m^2]
@@ -127,7 +144,7 @@ contains
         call jump_change(lattice, pair, first, second, both, coefficient, friction, cycles, p_max, slower, found)
         call energy_of_second_jump(lattice, pair, path, coefficient, cycles, first, second, both, corrected)
       end associate
-      change = [found%stick, found%traction, found%added, found%lattice, found%gain]
+      change = [found%stick, found%traction, found%added, found%lattice, found%gain, found%spent, found%turned]
     end if
     call report(error, code, message)
   end subroutine change_by_jump

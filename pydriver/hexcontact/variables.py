@@ -275,13 +275,23 @@ VARIABLES: dict[str, Variable] = {
         title="Dissipated energy", least=0.0, scale=_WORK, summary=6, slip_zone=True, core="numbers",
         **_FRICTION,
     ),
+    "dissipated_energy_path_error": _work(
+        "J", "bound on the error of the dissipated energy by the size of load steps",
+        least=0.0, frictional=True, core="numbers",
+    ),
     "dissipated_energy_step": _scalar(
         "J", "energy dissipated by friction during the step", least=0.0, scale=_WORK, slip_zone=True
     ),
     "wear_cycles": _work("1", "cycles that have worn the surfaces", **_FROM_0),
     "wear_volume": _work("m3", "volume that is worn off both bodies", title="Wear volume", least=0.0),
     "max_worn_depth": _work("m", "largest worn depth of a node", title="Largest worn depth", least=0.0),
-    "worn_depth_step_error": _work("m", "error of the worn depth by the size of jumps", **_FROM_0),
+    "worn_depth_step_error": _work(
+        "m", "bound on the error of the worn depth by jumps, and unworn cycles that are not closed", **_FROM_0
+    ),
+    "unworn_cycles": _work("1", "cycles that were solved on unworn surfaces", dtype="i4"),
+    "unworn_cycle_change": _work(
+        "1", "bound on the change of a cycle's wear by further unworn ones, share of the largest", **_FROM_0
+    ),
     "cycle_dissipated_energy": _work("J", "energy dissipated by friction in a cycle", **_FROM_0),
     "elastic_energy": _measure(
         "J", "elastic energy stored in both bodies",

@@ -21,9 +21,9 @@ module test_steps
   use hc_lattice, only: lattice_t, new_lattice, equilateral_basis
   use hc_wear_ahead, only: energy_ahead, worn_cycle_t
   use hc_normal_law, only: unilateral_t
-  use hc_wear_jumps, only: energy_of_second_jump, jump_change, wear_by
+  use hc_wear_jumps, only: energy_of_second_jump, jump_change, wear_by, wear_left
   use hc_expected_error, only: entry_error, entry_steps, even_steps, lattice_errors, lattice_errors_t, lattice_spacings, &
-    oblique_error, oblique_steps, slip_ring
+    oblique_error, oblique_steps, slip_ring, turning_error
   use test_friction, only: new_sphere
   use testing, only: test_t, new_test, check, check_raised, check_true, largest
   implicit none
@@ -54,7 +54,9 @@ contains
       new_test('expected_errors', test_expected), &
       new_test('wear_jumps', test_wear_jumps), &
       new_test('wear_ahead', test_wear_ahead), &
-      new_test('change_by_halves', test_change_by_halves) &
+      new_test('change_by_halves', test_change_by_halves), &
+      new_test('wear_left', test_wear_left), &
+      new_test('turning_limits_a_step', test_turning) &
     ]
   end subroutine collect_steps
 
@@ -93,6 +95,53 @@ contains
     end associate
   end subroutine test_wear_jumps
 
+  !> What further cycles change: from the tractions at first, then from the last two changes, which fade or do not.
+  subroutine test_wear_left(error)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: friction(2, 1) = reshape([0.5_wp, 0.25_wp], [2, 1]), pressure(2, 1) = 4.0_wp
+    type(step_options_t) :: options
+    real(wp) :: energies(2, 1, 3), traction(2, 1, 2, 2)
+
+    ! depths 8, 0; 4, 0; 2, 8 with the coefficient 1: changes of 4, then of 8
+    energies = reshape([4.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 1.0_wp, 2.0_wp], [2, 1, 3])
+    traction = 0.0_wp
+    traction(1, 1, :, 2) = [0.3_wp, -0.4_wp]
+    ! only the first node slips, whose friction carries 2
+    call check(error, wear_left(energies(:, :, :2), traction, pressure, friction), options%closing_gain*0.25_wp, thr, 'tractions')
+    if (allocated(error)) return
+    call check(error, wear_left(energies, traction, pressure, friction), options%closing_safety/(1.0_wp - options%slowest_closing), &
+               1.0e-12_wp, 'changes that grow')
+    if (allocated(error)) return
+    energies(:, 1, 3) = [1.5_wp, 0.0_wp]
+    call check(error, wear_left(energies, traction, pressure, friction), options%closing_safety/3.0_wp/0.75_wp, thr, 'a quarter')
+    if (allocated(error)) return
+    energies(:, :, 2) = energies(:, :, 3)
+    call check(error, wear_left(energies, traction, pressure, friction), 0.0_wp, 0.0_wp, 'closed')
+  end subroutine test_wear_left
+
+  !> A step in which tractions turn by more than the tolerance is rejected; the next one is smaller in proportion.
+  subroutine test_turning(error)
+    type(error_t), allocatable, intent(out) :: error
+    type(step_control_t) :: control
+    type(step_attempt_t) :: attempt
+    integer :: verdict
+
+    attempt = step_attempt_t(start=0.0_wp, end=1.0_wp)
+    call control%decide(attempt, .true., step_change_t(spent=1.0_wp, turned=0.04_wp), 0.02_wp, verdict)
+    call check(error, verdict, rejected, 'turned too far')
+    if (allocated(error)) return
+    call check(error, [attempt%end, attempt%last_excess], [0.4_wp, 2.0_wp], thr, 'a smaller step')
+    if (allocated(error)) return
+    call control%decide(attempt, .true., step_change_t(spent=1.0_wp, turned=0.016_wp), 0.02_wp, verdict)
+    call check(error, verdict, accepted, 'turned by less')
+    if (allocated(error)) return
+    ! a quarter of a turn in three steps, there and back; no load after none
+    call check(error, turning_error(reshape([0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, cos(0.5_wp), sin(0.5_wp), 0.0_wp, &
+                                             -cos(0.5_wp), -sin(0.5_wp), 0.0_wp], [3, 4])), sin(0.5_wp), thr, 'angle')
+    if (allocated(error)) return
+    call check(error, turning_error(reshape([0.0_wp, 0.0_wp, 0.0_wp], [3, 1])), 0.0_wp, 0.0_wp, 'no load')
+  end subroutine test_turning
+
   !> Turning points and cycles of a motion that goes to and fro, and the area of an elliptic loop.
   subroutine test_cycles(error)
     type(error_t), allocatable, intent(out) :: error
@@ -116,6 +165,10 @@ contains
     ! the motion drifts, its load does not
     call find_cycles([0.0_wp, 1.0_wp, -0.5_wp, 1.2_wp], [0.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], first, last)
     call check_true(error, all([first, last] == [2, 4]), 'a load that comes back')
+    if (allocated(error)) return
+    ! gross sliding: the load is back halfway
+    call find_cycles([0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp], [0.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], first, last)
+    call check(error, size(first), 0, 'a motion that does not come back')
     if (allocated(error)) return
     call check_true(error, size(turning_points([1.0_wp, 1.0_wp, 1.0_wp])) == 0, 'a constant does not turn')
     if (allocated(error)) return

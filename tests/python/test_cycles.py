@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from hexcontact import Case, Result, open_result, plotting
 from hexcontact.cli import tables
 from hexcontact.cli.app import app
-from hexcontact.result.history import contact_size, some_steps
+from hexcontact.result.history import contact_size, energy_table, some_steps
 from hexcontact.variables import VARIABLES
 
 DECK = """\
@@ -66,6 +66,27 @@ def test_segments_and_cycles_of_a_result(result: Result) -> None:
     # the work of the load is what friction dissipates, but for the chords between the steps
     np.testing.assert_allclose(cycles["loop_area"], cycles["dissipated_energy"], rtol=0.03)
     assert (cycles["loop_area"] < cycles["dissipated_energy"]).all()
+
+
+def test_area_of_a_loop_is_no_energy_where_other_loads_do_work() -> None:
+    legs = [(s, {"tangential_load_x": f"{s * 0.5} mu P", "steps": 4}) for s in (1, -1, 1)]
+    pressed, changes = {"normal_load": 100.0}, {"bulk stress": "bulk_stress_xx", "normal load": "normal_load"}
+    deck = Case.from_text(DECK).deck_text
+    for words, key in changes.items():
+        value = {"bulk_stress_xx": 5e7, "normal_load": 20.0}[key]
+        path = [load | {key: (100.0 if key == "normal_load" else 0.0) + s * value} for s, load in legs]
+        bulk = {"bulk": {"body": 1}} if key == "bulk_stress_xx" else {}
+        result = Case.from_text(deck, overrides={"load": [pressed, *path], **bulk}).run()
+        [other] = result.cycles["other_work"]
+        assert other == words
+        [row] = [row for row in energy_table(tables.histories_of(result), 24)[1] if row[0] == "cycle 1"]
+        assert row[-1].endswith(f", without {words}")
+    [other] = (
+        Case.from_text(deck, overrides={"load": [pressed, *(load for _, load in legs)]})
+        .run()
+        .cycles["other_work"]
+    )
+    assert other == ""
 
 
 def test_nothing_is_worn_without_wear(result: Result) -> None:

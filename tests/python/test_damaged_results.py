@@ -280,7 +280,7 @@ def test_every_bound_of_the_table_is_looked_at() -> None:
 CONTROL = {
     **{"position": 1, "fraction": 0.5, "load_steps": 3, "done": 0.5, "area": 1e-8},
     "chooser": {**dict.fromkeys(("size", "first", "stick", "traction"), 0.5)}
-    | {"memory": {"stick": 0.0, "traction": 0.0}},
+    | {"memory": dict.fromkeys(("stick", "traction", "spent", "turned"), 0.0)},
 }
 
 

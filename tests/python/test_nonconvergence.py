@@ -14,6 +14,7 @@ import pytest
 from hexcontact import Case, ConvergenceError
 from hexcontact.core import influence
 from hexcontact.solve import nonconvergence
+from hexcontact.solve.frictional import state_of
 from hexcontact.solve.steps import steps, window_type
 
 SPHERE = {"young_modulus": 210e9, "poisson_ratio": 0.3, "surface": {"shape": "sphere", "radius": 10e-3}}
@@ -47,6 +48,35 @@ def _names() -> list[str]:
 def compliance(case: Case, lattice: Any) -> float:
     """d_n of docs/theory/residuals.md, (R1)."""
     return case.pair.lambda_1 * float(influence.pyramid_kernels(0.0, 0.0).K1) * lattice.spacing
+
+
+def test_moment_of_a_load_about_a_far_origin_is_named() -> None:
+    far = SPHERE | {"surface": SPHERE["surface"] | {"offset": [5e-3, -3e-3]}}
+    loads = [{"normal_load": 20.0}, {"tangential_load_y": 3.0, "torque": 0.0, "steps": 4}]
+    case = Case(body_1=far, body_2=SPHERE | {"surface": {"shape": "flat"}}, friction_coefficient=0.3,
+                nodes_in_radius=8, loads=loads)  # fmt: skip
+    sentence = (
+        r"gross sliding: friction cannot carry the moment of -3\.750 mN m about the contact at x = 5\.000 mm"
+        r", y = -3\.000 mm \(at most 38\d\.\d µN m\), since the tangential load acts at x = y = 0; .*"
+        r"expected twist = 0 in place of the torque, a torque of 3\.750 mN m"
+    )
+    with pytest.raises(ConvergenceError, match=sentence):
+        case.run()
+
+
+def test_torque_beyond_friction_is_gross_sliding_whatever_the_solver_found() -> None:
+    # 3 pi/16 mu P a is 2.7 mN m
+    case = sphere(loads=[{"normal_load": 100.0}, {"torque": 5e-4}])
+    lattice = window_type(case)(case, case.lattice).lattice
+    *_, last = steps(case)
+    bad = replace(state_of(last), converged=False, sliding=False)
+    target = case.load_steps[-1]
+    for torque, words in (
+        (5e-3, "gross sliding: friction cannot carry the torque of 5.000 mN m"),
+        (5e-4, "did not"),
+    ):
+        values = (100.0, 0.0, 0.0, torque)
+        assert words in str(nonconvergence.error(case, lattice, bad, target, values))
 
 
 def changed_at(field: np.ndarray, row: int, col: int, value: float) -> np.ndarray:

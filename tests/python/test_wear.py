@@ -8,10 +8,12 @@ import pytest
 from matplotlib.collections import TriMesh
 
 import hexcontact
-from hexcontact import Case, DeckError, ElasticPair, NormalContact, plotting
+from hexcontact import Case, DeckError, ElasticPair, NormalContact, PathWarning, plotting
+from hexcontact.cli.tables import Summary
 from hexcontact.deck.write import starter
-from hexcontact.result.history import step_rows
+from hexcontact.result.history import energy_table, step_rows
 from hexcontact.result.journal import Journal, journal_of
+from hexcontact.solve import wear as solving
 from hexcontact.text import cycle_count
 
 MODULUS, RADIUS, CONTACT, MU, WEAR = 1e11, 1e-2, 1e-4, 0.5, 1e-14
@@ -94,13 +96,65 @@ def test_worn_contact_carries_its_load_on_the_stick_zone() -> None:
     assert np.abs(last["worn_depth"] - depth).max() < 0.01 * depth.max()
 
 
+def unlike(before: int = 0, **wear: Any) -> Case:
+    """A stiff sphere on a soft plane, which shakes down under a tangential load to and fro."""
+    path = [
+        {"tangential_load_x": f"{share} mu P", "steps": steps}
+        for share, steps in ((0.7, 1), (-0.7, 2), (0.0, 1))
+    ]
+    turns = [{"label": "before", "path": path, "repeat": before}] if before else []
+    return fretting(
+        body_1={
+            "young_modulus": 4e11,
+            "poisson_ratio": 0.3,
+            "surface": {"shape": "sphere", "radius": RADIUS},
+        },
+        body_2={"young_modulus": 6e10, "poisson_ratio": 0.3},
+        friction_coefficient=0.3,
+        loads=[{"normal_load": 100.0, "steps": 2}, *turns, {"label": "fretting", "path": path}],
+        wear={"coefficient_1": 1e-14, "cycles": 30, **wear},
+    )
+
+
+@pytest.fixture(scope="module")
+def settled() -> Any:
+    """Depth after 30 cycles that were all solved, and had closed before."""
+    return worn(unlike(before=40, jump=1).run())["worn_depth"].values[-1]
+
+
+@pytest.mark.parametrize(("before", "tolerance"), [(0, 0.1), (0, 0.01), (8, 0.1), (8, 0.01)])
+def test_bound_of_the_depth_holds_while_bodies_shake_down(
+    settled: Any, before: int, tolerance: float
+) -> None:
+    found = worn(unlike(before, tolerance=tolerance).run()).isel(step=-1)
+    off = np.abs(found["worn_depth"] - settled).max()
+    assert 0.0 < off <= found["worn_depth_step_error"] < 1.2 * tolerance * found["max_worn_depth"]
+    assert found["unworn_cycle_change"] <= tolerance
+    assert 1 <= int(found["unworn_cycles"]) < 20
+
+
+def test_unworn_cycle_of_bodies_that_are_alike_closes_at_once() -> None:
+    found = worn(fretting(wear={"cycles": 20_000}).run())
+    assert found["unworn_cycles"].values.tolist() == [1] * found.sizes["step"]
+    assert (found["unworn_cycle_change"] < 1e-4).all()
+
+
+def test_unworn_cycle_that_does_not_close_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solving, "MOST_UNWORN", 2)
+    with pytest.warns(PathWarning, match="not closed after 2 cycles on unworn surfaces: its wear may still"):
+        result = unlike(tolerance=0.01).run()
+    [remark] = [each for each in Summary.of_result(result).remarks if "not closed" in each]
+    assert "expected at most wear.tolerance = 0.01" in remark
+
+
 def test_halved_jumps_change_the_depth_as_stated() -> None:
     fine = worn(fretting(wear={"cycles": 100_000, "jump": 2000}).run()).isel(step=-1)
     coarse = worn(fretting(wear={"cycles": 100_000}).run()).isel(step=-1)
     off = np.abs(coarse["worn_depth"] - fine["worn_depth"]).max()
     assert 0.0 < off <= coarse["worn_depth_step_error"]
     assert coarse["worn_depth_step_error"] < 0.15 * coarse["max_worn_depth"]
-    assert coarse["worn_depth_step_error"] == np.abs(coarse["worn_depth_step_change"]).max()
+    left = coarse["unworn_cycle_change"] * coarse["max_worn_depth"]
+    assert coarse["worn_depth_step_error"] == np.abs(coarse["worn_depth_step_change"]).max() + left
 
 
 @pytest.mark.parametrize("last", [5, 14, 15, 16, 17])
@@ -190,6 +244,16 @@ def test_broken_cycles_are_stated() -> None:
 def test_what_cannot_wear_is_refused(changes: dict[str, Any], sentence: str) -> None:
     with pytest.raises(DeckError, match=sentence):
         fretting(**changes)
+
+
+def test_cycles_of_wear_are_no_cycles_of_the_history() -> None:
+    legs = [{"shift_x": SHIFT, "steps": 3}, {"shift_x": -SHIFT, "steps": 6}, {"shift_x": SHIFT, "steps": 6}]
+    turn = [{"label": "turn", "path": legs}, {"label": "fretting", "path": legs[1:]}]
+    result = fretting(wear={"cycles": 20_000}, loads=[{"approach": APPROACH, "shift_x": 0.0}, *turn]).run()
+    before = int((~(result.dataset["wear_cycles"] >= 0)).sum())
+    assert result.cycles["last_step"].to_list() == [16, before]
+    _, rows = energy_table(Summary.of_result(result).histories, 24)
+    assert ("segment 7", "wear, 20,000 cycles") in {row[:2] for row in rows}
 
 
 def test_cycle_without_slip_is_refused_when_it_is_known() -> None:

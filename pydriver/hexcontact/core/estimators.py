@@ -263,6 +263,28 @@ def expected_entry_error(
     return float(error), float(steps), float(needed)
 
 
+def expected_turning_error(shear: Array) -> float:
+    """Estimate the error of the dissipated energy by load steps in which the tangential load turns, (X6).
+
+    Parameters
+    ----------
+    shear : ndarray, (n, 3)
+        Tangential load or shift along x and y, and torque or twist, each over its largest, at the end of each
+        load step.
+
+    Returns
+    -------
+    float
+        The error as a share of the energy.
+    """
+    return float(_core.hc_f2py_steps.error_of_turns(shear.T)) if len(shear) else 0.0
+
+
+def slip_ring(load_ratio: float) -> float:
+    """Return the width of the slip ring over the contact radius, 1 - (1 - Q/mu P)^(1/3)."""
+    return float(_core.hc_f2py_steps.width_of_ring(load_ratio))
+
+
 def _ellipse(numbers: Array) -> Ellipse:
     major, minor, angle, x, y = numbers.tolist()
     return Ellipse(major, minor, angle, (x, y))

@@ -118,8 +118,8 @@ class ContactState(NormalSolution):
         Rigid motions of the remote parts [m], [rad].
     bulk_strain_xx, bulk_strain_yy, bulk_strain_xy : float
         Bulk strain of body 1 less that of body 2.
-    dissipated_energy : float
-        Dissipated energy [J].
+    dissipated_energy, dissipated_energy_path_error : float
+        Dissipated energy, and bound on its error by the size of the load steps [J].
     residual_normal, residual_tangential, residual_force, residual_shear_force, residual_torque : float
         Residuals of the contact conditions and of the prescribed loads. That of the friction conditions is
         for the slip of the whole step, and may be above the tolerance after halving.
@@ -155,6 +155,7 @@ class ContactState(NormalSolution):
     bulk_strain_yy: float = 0.0
     bulk_strain_xy: float = 0.0
     dissipated_energy: float = 0.0
+    dissipated_energy_path_error: float = 0.0
     residual_tangential: float = 0.0
     residual_shear_force: float = 0.0
     residual_torque: float = 0.0

@@ -24,7 +24,14 @@ not help; the smallest one did not converge."""
 LEAST = 1e-3
 """Smallest adaptive load step, as a part of its segment."""
 
-_FIELDS = ("pressure", "gap", "traction_x", "traction_y")
+_FIELDS = (
+    "pressure",
+    "gap",
+    "traction_x",
+    "traction_y",
+    "relative_displacement_x",
+    "relative_displacement_y",
+)
 _TRACTIONS = ("pressure", "traction_x", "traction_y")
 
 
@@ -43,6 +50,9 @@ class Change(NamedTuple):
         Possible change of the stick area by rings of nodes that enter, for any steps; a share, too.
     gain : float
         Change of the stick area over that of the tractions, both as shares, during the second half.
+    spent, turned : float
+        Dissipated energy of the halves, and the part that is uncertain since the load turns in each, over the
+        area of a node (J/m2).
     """
 
     stick: float = 0.0
@@ -50,6 +60,8 @@ class Change(NamedTuple):
     added: float = 0.0
     lattice: float = 0.0
     gain: float = 1.0
+    spent: float = 0.0
+    turned: float = 0.0
 
 
 def change_by_halving(
@@ -131,6 +143,30 @@ def worn(
     mu = np.broadcast_to(friction.coefficient, lattice.shape)
     found = _wear.wear_of_cycles(energy.T, coefficient, mu.T, cycles, lattice.cell_area, depth.T)
     return np.ascontiguousarray(found[0].T), float(found[1]), float(found[2])
+
+
+def wear_left(
+    friction: FrictionLaw, energies: Sequence[Array], before: ContactState, after: ContactState
+) -> float:
+    """Bound the change of the wear of a cycle by further repetitions: docs/theory/wear.md, (V9).
+
+    Parameters
+    ----------
+    friction : FrictionLaw
+        Friction at the nodes.
+    energies : sequence of ndarray, (n_row, n_col)
+        Energy that friction dissipates in each of the last cycles, at most three, by area (J/m2).
+    before, after : ContactState
+        Beginning and end of the last cycle.
+
+    Returns
+    -------
+    float
+        Share of the largest wear of a node.
+    """
+    mu = np.broadcast_to(friction.coefficient, after.pressure.shape)
+    tractions = np.array([[state.traction_x, state.traction_y] for state in (before, after)])
+    return float(_wear.wear_left_open(np.array(energies).T, tractions.T, after.pressure.T, mu.T))
 
 
 def expected_end(
@@ -289,22 +325,22 @@ class StepControl:
     """
 
     def __init__(self, least: float = LEAST) -> None:
-        self._numbers = np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+        self._numbers = np.array([1.0, 0.5, *[0.0] * 6])
         self._least = least
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any], least: float = LEAST) -> StepControl:
         """Return the control from the record of a step."""
         control, past = cls(least), record["memory"]
-        names = ("size", "first", "stick", "traction")
-        control._numbers[:] = [*(record[name] for name in names), past["stick"], past["traction"]]
+        names, energies = ("size", "first", "stick", "traction"), (past[name] for name in ("spent", "turned"))
+        control._numbers[:] = [*(record[name] for name in names), past["stick"], past["traction"], *energies]
         return control
 
     @property
     def record(self) -> dict[str, Any]:
         """The control in the record of a step."""
         size, first, stick, traction, *past = self._numbers.tolist()
-        memory = {"stick": past[0], "traction": past[1]}
+        memory = dict(zip(("stick", "traction", "spent", "turned"), past, strict=True))
         return {"size": size, "first": first, "stick": stick, "traction": traction, "memory": memory}
 
     def begin_with(self, size: float) -> None:

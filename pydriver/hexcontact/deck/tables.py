@@ -192,7 +192,8 @@ class Solver(Table):
     step_tolerance: Annotated[float, Quantity(NUMBER, at_least=1e-4, at_most=0.5)] = meaning(
         0.01,
         'incremental, steps = "auto": largest change by halving a load step, in the stick area as a share '
-        "of the largest contact area and in the shear tractions as a share of what friction can carry",
+        "of the largest contact area and in the shear tractions as a share of what friction can carry; "
+        "and share of the dissipated energy that a load that turns leaves uncertain",
         "0.02",
     )
 

@@ -40,7 +40,10 @@ def parameters_of(case: Problem) -> dict[str, Any]:
         **({"bulk_state": case.deck.bulk.state} if case.deck.bulk else {}),
         **({"step_tolerance": case.solver.step_tolerance} if case.adaptive else {}),
         **(
-            {"cycle_tolerance": wear.cycle_tolerance(case.solver.tolerance)}
+            {
+                "cycle_tolerance": wear.cycle_tolerance(case.solver.tolerance),
+                "wear_tolerance": wear.tolerance,
+            }
             if (wear := case.deck.wear)
             else {}
         ),

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.estimators import LATTICE_ERRORS, expected_entry_error, expected_lattice_errors
+from ..core.estimators import (
+    LATTICE_ERRORS,
+    expected_entry_error,
+    expected_lattice_errors,
+    expected_turning_error,
+    slip_ring,
+)
 from ..deck.interface import TwoCoefficients
 from ..text import listed, percent, quantity
 from ..variables import LOADS, spelled
@@ -129,6 +135,21 @@ LIMITS = (
         "Contact beside a hole would end there only because the data do",
         most=0.0,
     ),
+    Limit(
+        "turning_error",
+        "the tangential load turns in its steps, so that nodes slip in directions that turn: this leaves an "
+        "error of about {turning_percent} in the dissipated energy; {turning_steps:g} steps in place of each "
+        "leave 10 %",
+        "A node slips against its traction at the end of the step, which has turned: (X6)",
+        most=_STEP_ERROR,
+    ),
+    Limit(
+        "ring_spacings",
+        "the slip annulus of the tangential loop is {ring_spacings:.2g} spacings wide, expected at least 1: "
+        "its dissipated energy may be off by {ring_percent}",
+        "A ring of nodes sticks or slips as a whole: (X2)",
+        least=1.0,
+    ),
 )
 """All limits, in the order of the warnings."""
 
@@ -180,6 +201,14 @@ def expected(case: Problem) -> dict[str, Any]:
             "needed_spacings": math.ceil(needed),
             **{f"{name}_error": error for name, error in zip(LATTICE_ERRORS, errors.tolist(), strict=True)},
         }
+    if (turning := _turning(case)) is not None:
+        found |= {"turning_error": turning, "turning_steps": math.ceil(turning / _STEP_ERROR)}
+    if (ring := _ring(case)) is not None and case.accuracy is None:
+        errors, _ = expected_lattice_errors(found["spacings"], ring, _LATTICE_ERROR)
+        found |= {
+            "ring_spacings": slip_ring(ring) * found["spacings"],
+            "ring_error": float(errors[LATTICE_ERRORS.index("dissipated_energy")]),
+        }
     if entering := list(_entering(case)):
         error, steps, needed = max(entering)
         found |= {"step_error": error, "growing_steps": steps, "needed_steps": math.ceil(needed)}
@@ -196,6 +225,8 @@ def warnings(case: Problem) -> list[str]:
         "radius_words": "smaller half-axis of the contact" if _half_axes(found) else "contact radius",
         "growing_words": _even_steps(found.get("growing_steps", 0.0)),
         "step_percent": percent(found.get("step_error", 0.0)),
+        "turning_percent": percent(found.get("turning_error", 0.0)),
+        "ring_percent": percent(found.get("ring_error", 0.0)),
     }
     passed = [
         limit for limit in LIMITS if not limit.least <= found.get(limit.quantity, limit.usual) <= limit.most
@@ -257,6 +288,36 @@ def _slipping(case: Problem) -> float:
         return 0.0
     ratio = max(_load_ratio(case, step) for step in case.load_steps)
     return max(ratio, _NOTICED) if ratio else 0.8 * (abs(case.pair.beta) > _ALIKE)
+
+
+def _shear(case: Problem) -> np.ndarray[Any, Any] | None:
+    """Return loads or motions along x, y and about z over their largest; None if control changes."""
+    targets = [(step.x, step.y, step.twist) for step in case.load_steps]
+    if any(len({target.control for target in motion}) > 1 for motion in zip(*targets, strict=True)):
+        return None
+    values = np.array([[target.value for target in motions] for motions in targets])
+    largest = np.abs(values).max(axis=0)
+    largest[:2] = largest[:2].max()
+    return values / np.where(largest > 0.0, largest, 1.0)
+
+
+def _turning(case: Problem) -> float | None:
+    """Return the error of the dissipated energy by loads that turn; None without slip or such steps."""
+    if case.solver.algorithm != "incremental" or case.adaptive or _slipping(case) < _NOTICED:
+        return None
+    shear = _shear(case)
+    return None if shear is None else expected_turning_error(shear)
+
+
+def _ring(case: Problem) -> float | None:
+    """Return the largest Q/mu P of tangential loads that return; None if none is known to."""
+    if not case.frictional or math.isinf(case.friction_coefficient):
+        return None
+    largest, shear = max(_load_ratio(case, step) for step in case.load_steps), _shear(case)
+    if shear is None or not 0.0 < largest < _NOTICED:
+        return None
+    changes = np.diff(shear[:, :2], axis=0)
+    return largest if (np.sum(changes[1:] * changes[:-1], axis=1) < 0.0).any() else None
 
 
 def _entering(case: Problem) -> Iterator[tuple[float, float, float]]:

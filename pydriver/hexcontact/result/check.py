@@ -83,6 +83,7 @@ _LATER = {
     INTERFACE[2]: lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: no springs
     INTERFACE[1]: lambda value: _is_number(value) and 1 <= value < math.inf,
     "cycle_tolerance": _is_positive,
+    "wear_tolerance": _is_positive,
     "entry": _one_of("implicit", "interpolated"),
     "bulk_state": _one_of(*BULK_STATES),
     **dict.fromkeys(("friction_law", "machine", "stopped"), _is_text),
@@ -275,13 +276,12 @@ def fault_of_record(metadata: Metadata, step: Step) -> str:
     )
 
 
-_CHOOSER = ("size", "first", "stick", "traction")  # and a memory of the last two
+_CHOOSER = ("size", "first", "stick", "traction")
+_MEMORY = ("stick", "traction", "spent", "turned")
 _CONTROL: dict[str, Fits] = {  # of adaptive load steps
     **dict.fromkeys(("position", "load_steps"), lambda value: type(value) is int and value >= 0),
     **dict.fromkeys(("fraction", "done"), lambda value: _is_number(value) and 0 <= value <= 1),
-    "chooser": lambda value: (
-        _has_numbers(value, _CHOOSER) and _has_numbers(value.get("memory"), _CHOOSER[2:])
-    ),
+    "chooser": lambda value: _has_numbers(value, _CHOOSER) and _has_numbers(value.get("memory"), _MEMORY),
 }
 
 

@@ -44,6 +44,8 @@ _NOTICED = 1e-6  # share of the normal load or approach from which tangential on
 _LEFT_OPEN = 1e-6  # share of the largest value below which changes of a quantity are rounding errors
 _NOISE = 1e-9  # ... below which they are written as zero
 ROUND = 0.97  # ratio of the half-axes of a contact from which it counts as a circle
+_WORTH_STATING = 1e-3  # share of the dissipated energy from which the bound on its error is shown
+_UNCERTAIN = 0.1  # ... and from which a remark is made
 _MOST_NAMED = 8  # load steps named in a sentence
 
 
@@ -114,6 +116,13 @@ def step_error_share(history: History) -> float | None:
     return None if math.isnan(error) or not area else error / area
 
 
+def path_error_share(history: History) -> float:
+    """Return the bound on the error of the dissipated energy by load steps, as a share; 0 of noise."""
+    spent = float(history.get("dissipated_energy", 0.0))
+    noise = _NOTICED * _scale("dissipated_energy", history) if spent else 0.0
+    return float(history.get("dissipated_energy_path_error", 0.0)) / spent if spent > noise else 0.0
+
+
 def halved(history: History) -> str:
     """Return "halved 2 times" for a step that was halved until the solver converged; else nothing."""
     cuts = int(history.get("cuts", 0))
@@ -155,7 +164,7 @@ def describe(history: History, short: bool = False) -> str:
         if not short:
             parts.append(" ".join(contact_size(history)).removeprefix("contact "))
             parts += [f"{sign} {value:.1e}" for sign, value in residuals(history).items()]
-    if history.get("wear_cycles", -1.0) >= 0.0:
+    if _of_wear(history):
         worn = quantity(history["max_worn_depth"], "m")
         parts.append(f"cycles {cycle_count(history['wear_cycles'])}  worn {worn}")
     parts.append(parts_of(history))
@@ -179,7 +188,7 @@ def step_rows(history: History) -> list[Row]:
     ]
     if is_frictional(history):
         rows.append(("stick", _stick(history)))
-    if history.get("wear_cycles", -1.0) >= 0.0:
+    if _of_wear(history):
         rows.append(("cycles of wear", cycle_count(history["wear_cycles"])))
         names = "wear_volume", "max_worn_depth"
         rows += [(spelled(name), quantity(history[name], VARIABLES[name].units)) for name in names]
@@ -187,6 +196,8 @@ def step_rows(history: History) -> list[Row]:
         change = 100 * history["stick_area_step_change"] / fitted("contact_area", history)
         words = f"stick area within {100 * error:.1f} % of the contact area, {change + 0.0:+.2f} % by halving"
         rows.append(("load steps", words))
+    if (share := path_error_share(history)) >= _WORTH_STATING:
+        rows.append(("energy by load steps", f"dissipated energy within {percent(share)}"))
     found = ", ".join(f"{sign} = {value:.1e}" for sign, value in residuals(history).items())
     return [*rows, ("residuals", found), ("work", _work(history))]
 
@@ -241,17 +252,51 @@ def loops(histories: Sequence[History]) -> dict[str, tuple[NDArray[np.float64], 
     Shear is along the direction of the largest tangential load.
     """
     names, found = worth_showing(histories), {}
-    if "tangential_load_x" in histories[0]:
-        load, shift = (
-            np.stack([_column(histories, f"{name}_{axis}") for axis in "xy"])
-            for name in ("tangential_load", "shift")
-        )
-        direction = line_of(load, _NOTICED * float(_column(histories, "normal_load").max()), np.inf)
-        if direction is not None:
-            found["shear"] = np.array(direction) @ shift, np.array(direction) @ load
+    if (along := _loop_along(histories)) is not None:
+        found["shear"] = along
     if "torque" in names:
         found["torsion"] = _column(histories, "twist"), _column(histories, "torque")
     return {**found, "normal": (_column(histories, "approach"), _column(histories, "normal_load"))}
+
+
+def _loop_along(
+    histories: Sequence[History], across: bool = False
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return shift and load along the largest tangential load, or across it; None without one."""
+    if "tangential_load_x" not in histories[0]:
+        return None
+    load, shift = (
+        np.stack([_column(histories, f"{name}_{axis}") for axis in "xy"])
+        for name in ("tangential_load", "shift")
+    )
+    direction = line_of(load, _NOTICED * float(_column(histories, "normal_load").max()), np.inf)
+    if direction is None:
+        return None
+    along = np.array([-direction[1], direction[0]] if across else direction)
+    return along @ shift, along @ load
+
+
+def _other_work(histories: Sequence[History], kind: str, first: int, last: int) -> list[str]:
+    """Return what does work between two steps besides the load of a loop: other loads, the bulk stress."""
+    words = {
+        "shear": "tangential load",
+        "torsion": "torque",
+        "normal": "normal load",
+        "across": "load across",
+    }
+    pairs = loops(histories)
+    scales = {name: [float(np.abs(values).max()) for values in pair] for name, pair in pairs.items()}
+    if across := _loop_along(histories, across=True) if kind == "shear" else None:
+        pairs["across"], scales["across"] = across, scales[kind]
+    span = slice(first, last + 1)
+    found = [
+        words[name]
+        for name, pair in pairs.items()
+        if name != kind
+        and all(np.ptp(v[span]) > _NOTICED * scale for v, scale in zip(pair, scales[name], strict=True))
+    ]
+    bulk = [_column(histories, name) for name in BULK_STRESS if name in histories[0]]
+    return found + ["bulk stress"] * any(np.ptp(v[span]) > _NOTICED * np.abs(v).max() for v in bulk)
 
 
 def segments(histories: Sequence[History]) -> list[dict[str, Any]]:
@@ -277,12 +322,19 @@ def cycles(histories: Sequence[History]) -> list[dict[str, Any]]:
     """Return the closed cycles of a load history with friction, of the first of `loops` that has any.
 
     A cycle goes from one turning point of the motion to the next but one. Besides number, kind of loading,
-    first and last step and dissipated energy (J) it has the area (J) of the loop of the load over its motion.
+    first and last step and dissipated energy (J) it has the area (J) of the loop of the load over its motion,
+    and what else does work in it. Cycles of wear, of which only the end is recorded, are left out.
     """
+    histories = [history for history in histories if not _of_wear(history)]
     for kind, (motion, load) in loops(histories).items() if is_frictional(histories[-1]) else ():
         if found := cycles_of(motion, load):
             return [
-                {"cycle": number, "loading": kind, **_span(histories, first, last), "loop_area": area}
+                {
+                    **{"cycle": number, "loading": kind, **_span(histories, first, last), "loop_area": area},
+                    "other_work": listed(other, "and")
+                    if (other := _other_work(histories, kind, first, last))
+                    else "",
+                }
                 for number, (first, last, area) in enumerate(found, start=1)
             ]
     return []
@@ -294,14 +346,26 @@ def energy_table(histories: Sequence[History], most: int) -> tuple[Row, list[Row
     parts, loops = segments(histories), cycles(histories)
     if len(parts) < 2 or not is_frictional(histories[-1]):
         return headers, []
-    named = [(f"segment {row['segment']}", row["label"], row) for row in parts[-most:]]
+    named = [(f"segment {row['segment']}", _worn_label(row, histories), row) for row in parts[-most:]]
     named += [(f"cycle {row['cycle']}", row["loading"], row) for row in loops[-most:]]
     shown, rows = 5 if loops else 4, []
     for name, words, row in named:
         area = quantity(row["loop_area"], "J") if "loop_area" in row else ""
+        area += f", without {row['other_work']}" if row.get("other_work") else ""
         steps = f"{row['first_step']} to {row['last_step']}"
         rows.append((name, words, steps, quantity(row["dissipated_energy"], "J"), area)[:shown])
     return headers[:shown], rows
+
+
+def _of_wear(history: History) -> bool:
+    """Test whether a step is the end of a cycle of wear, which represents many."""
+    return float(history.get("wear_cycles", math.nan)) >= 0.0
+
+
+def _worn_label(row: Mapping[str, Any], histories: Sequence[History]) -> str:
+    """Return the label of a segment, with the number of cycles that it represents."""
+    last = histories[row["last_step"] - 1]
+    return f"{row['label']}, {cycle_count(last['wear_cycles'])} cycles" if _of_wear(last) else row["label"]
 
 
 def _span(histories: Sequence[History], before: int, end: int) -> dict[str, Any]:
@@ -351,6 +415,8 @@ def remarks(histories: Sequence[History], parameters: History) -> list[str]:
         halved_steps(histories, tolerance),
         adaptive_steps(histories, tolerance),
         limited_steps(histories, float(parameters.get("step_tolerance", 0.0))),
+        uncertain_energy(histories),
+        unclosed_cycle(histories[-1], float(parameters.get("wear_tolerance", math.inf))),
     ]
     return [sentence for sentence in sentences if sentence]
 
@@ -406,6 +472,30 @@ def limited_steps(histories: Sequence[History], tolerance: float) -> str:
     return (
         f"{len(missed)} of {len(histories)} load steps change more by halving than solver.step_tolerance = "
         f"{tolerance:g}, and smaller ones did not help: {_steps(missed)}; their stick_area_step_error holds"
+    )
+
+
+def uncertain_energy(histories: Sequence[History]) -> str:
+    """Describe a dissipated energy that the size of the load steps leaves uncertain; empty if it is not."""
+    share = path_error_share(histories[-1])
+    if share <= _UNCERTAIN:
+        return ""
+    return (
+        f"the size of the load steps leaves the dissipated energy uncertain by up to {percent(share)}, since "
+        "nodes slip in directions that turn or under a pressure that changes; twice as many steps leave half "
+        "of it"
+    )
+
+
+def unclosed_cycle(history: History, tolerance: float) -> str:
+    """Describe a cycle of wear that does not close on unworn surfaces; empty of one that does."""
+    left = float(history.get("unworn_cycle_change", 0.0))
+    if not left > tolerance:
+        return ""
+    return (
+        f"the cycle of wear is not closed after {history['unworn_cycles']} cycles on unworn surfaces: its "
+        f"wear may still change by {percent(left)}, expected at most wear.tolerance = {tolerance:g}; "
+        "worn_depth_step_error includes this"
     )
 
 

@@ -191,8 +191,9 @@ class Result(BelowSurface):
         """Closed cycles of a load history with friction, a line each; empty if there are none.
 
         Columns: kind of loading ("shear", "torsion", "normal"), first and last step, energy that friction
-        dissipated (J), and area (J) of the loop of the load over its motion. A cycle begins where the motion
-        turns back, at the end of the step before its first.
+        dissipated (J), area (J) of the loop of the load over its motion, and what else does work in the cycle
+        ("bulk stress", "normal load"): the area is not the energy then. A cycle begins where the motion turns
+        back, at the end of the step before its first. Cycles of wear, which represent many, are left out.
         """
         return self._parts(cycles)
 

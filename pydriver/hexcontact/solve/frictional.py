@@ -17,6 +17,7 @@ from .frictionless import Window
 
 # numbers of a state that have the names of the history
 _NUMBERS = (*CORE["numbers"], *CORE["residuals"], "operator_applications")
+_PATH_ERROR = "dissipated_energy_path_error"  # static steps have no path
 _ROUGHLY = 1e-4  # residual of a solution that serves for the size of the contact
 
 
@@ -92,9 +93,9 @@ class FrictionWindow(Window[ContactState]):
         spent_before = 0.0 if before is None or static else before.dissipated_energy
         spent = solution.dissipated_energy - spent_before
         history = {**super()._history(solution, before), "dissipated_energy_step": spent}
-        return {
-            name: value for name, value in history.items() if self.case.deck.bulk or name not in BULK_STRAIN
-        }
+        left_out = () if self.case.deck.bulk else BULK_STRAIN
+        left_out = (*left_out, _PATH_ERROR) if static else left_out
+        return {name: value for name, value in history.items() if name not in left_out}
 
     def largest_contact_area(self) -> float:
         """Return the contact area at the largest load of the history, without friction (m2)."""
@@ -118,7 +119,7 @@ def state_of(step: Step) -> ContactState:
     DeckError
         If a field or a value is missing, as in a frictionless run.
     """
-    needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN}
+    needed = {*FrictionWindow.state, *_NUMBERS, "sweeps", "cuts"} - {*BULK_STRAIN, _PATH_ERROR}
     if missing := needed - step.fields.keys() - step.history.keys():
         raise DeckError(
             f"step {step.number} holds no state of a contact with friction: it lacks "

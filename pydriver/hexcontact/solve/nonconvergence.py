@@ -23,6 +23,7 @@ from ..variables import RESIDUALS
 
 _NEAR_SLIDING = 0.99  # share of mu P from which a tangential load may need full slip
 _SLIDING = 1.0 - 1e-6  # ... from which it does
+_TWISTED = 1.2  # moment over the largest under the pressure of a failed attempt, from which all slips
 _ROUNDING = 1e-11  # tolerance below which rounding errors may decide
 _SAME = 1e-3  # relative difference of residuals of one state
 _LOST = "the last attempt lost all contact"
@@ -76,9 +77,8 @@ def error(
     step = f"step {target.index + 1}{planned}{segment}"
     shown = listed([f"{sign} = {_number(value)}" for sign, value in residuals.items()], "and")
     after = f"after {listed(_tried(solution), 'and')} the residuals are {shown}"
-    doubtful, excess = _sliding(case, solution, target, values)
+    doubtful, excess, expected = _sliding(case, lattice, solution, target, values)
     if excess:
-        expected = "expected a smaller load, or a prescribed motion in its place (shift_x, shift_y, twist)"
         return ConvergenceError(f"{step}: gross sliding: {excess}; {after}; {expected}", details)
     lines = [f"{step} did not converge: {after}; solver.tolerance = {case.solver.tolerance:g} was expected"]
     if worst.what == _LOST:
@@ -114,21 +114,54 @@ def _tried(solution: NormalSolution) -> list[str]:
 
 
 def _sliding(
-    case: Problem, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
-) -> tuple[bool, str]:
-    """Return whether friction may not carry the load, and a sentence if it cannot."""
+    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+) -> tuple[bool, str, str]:
+    """Return whether friction may not carry the load, and if it cannot, a sentence and what was expected."""
     z, x, y, twist = (motion.control == "force" for motion in target.targets)
     shear, torque = math.hypot(x * values[1], y * values[2]), abs(twist * values[3])
     bound = case.friction_coefficient * values[0] if z else math.nan
-    seen = bool(getattr(solution, "sliding", False))
+    moment, largest = _moments(case, lattice, solution, target, values)
+    seen = bool(getattr(solution, "sliding", False)) or (twist and abs(moment) > _TWISTED * largest > 0.0)
     doubtful = bool(torque or (shear and not shear <= _NEAR_SLIDING * bound))
     if not case.frictional or not (seen or (shear and shear >= _SLIDING * bound)):
-        return doubtful and not math.isinf(case.friction_coefficient), ""
+        return doubtful and not math.isinf(case.friction_coefficient), "", ""
+    of_load = values[3] - moment
+    if twist and abs(of_load) > abs(values[3]) and abs(moment) > 0.5 * largest and not shear >= bound:
+        x, y = (quantity(at, "m") for at in _center(lattice, solution))
+        return (
+            True,
+            f"friction cannot carry the moment of {quantity(moment, 'N m')} about the contact at x = {x}, "
+            f"y = {y} (at most {quantity(largest, 'N m')}), since the tangential load acts at x = y = 0",
+            f"expected twist = 0 in place of the torque, a torque of {quantity(of_load, 'N m')}, or surfaces "
+            "that touch at x = y = 0",
+        )
     wanted = [f"tangential load of {quantity(shear, 'N')}"] if shear else []
     wanted += [f"torque of {quantity(torque, 'N m')}"] if torque else []
     known = f" (friction.coefficient x normal_load = {quantity(bound, 'N')})"
     known = known if shear and math.isfinite(bound) else ""
-    return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}"
+    expected = "expected a smaller load, or a prescribed motion in its place (shift_x, shift_y, twist)"
+    return True, f"friction cannot carry the {listed(wanted, 'and the')}{known}", expected
+
+
+def _center(lattice: Lattice, solution: NormalSolution) -> tuple[float, float]:
+    """Return the centroid of the pressure; the origin without any."""
+    if not solution.pressure.any():
+        return 0.0, 0.0
+    x, y = (float(np.average(place, weights=solution.pressure)) for place in (lattice.x, lattice.y))
+    return x, y
+
+
+def _moments(
+    case: Problem, lattice: Lattice, solution: NormalSolution, target: LoadStep, values: tuple[float, ...]
+) -> tuple[float, float]:
+    """Return the moment (N m) of the loads about the contact, and the largest that friction carries."""
+    x, y = _center(lattice, solution)
+    loads = zip(values[1:3], (target.x, target.y), strict=True)
+    load_x, load_y = (value * (motion.control == "force") for value, motion in loads)
+    arm = np.hypot(lattice.x - x, lattice.y - y)
+    mu = case.friction_coefficient  # NaN of another law: unknown
+    largest = mu * lattice.cell_area * float(np.sum(solution.pressure * arm))
+    return values[3] - (x * load_y - y * load_x), largest
 
 
 def _advice(case: Problem, worst: Worst, doubtful: bool, adaptive: bool) -> list[str]:

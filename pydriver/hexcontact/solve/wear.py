@@ -8,7 +8,9 @@ docs/theory/wear.md.
 from __future__ import annotations
 
 import dataclasses
+import logging
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -28,17 +30,21 @@ from ..core.steps import (
     energy_of_jump,
     expected_end,
     remember_end,
+    wear_left,
     worn,
 )
-from ..errors import ConvergenceError, DeckError
+from ..errors import ConvergenceError, DeckError, PathWarning
 from ..problem.loads import LoadStep
 from ..problem.problem import Problem
+from ..result.history import unclosed_cycle
 from ..result.step import Step
 from ..variables import LOADS, RESIDUALS, WORN
 from .adaptive import GivenPath
 from .frictional import FrictionWindow, state_of
 
 LABEL = "wear"  # of the cycles that wear, which are no part of the load history
+MOST_UNWORN = 50  # cycles on unworn surfaces, until they close
+_SUMMED = ("sweeps", "cuts", "operator_applications")  # of the load steps of a cycle
 _LEAST = 1e-12  # smallest jump, as a share of all cycles
 
 
@@ -163,6 +169,8 @@ class WearPath(GivenPath):
         self._ends = _Ends(window.lattice, 1 + len(case.cycle))
         self._tolerance = case.deck.wear.cycle_tolerance(case.solver.tolerance)
         self._last = before[-1] if self._number > len(case.load_steps) else None
+        # number of unworn cycles, and the share by which their wear may still change
+        self._unworn, self._left = 0, 0.0
 
     def steps(self, state: Any, target: LoadStep, begun: Mapping[str, float]) -> Iterator[tuple[Step, Any]]:
         """Solve a load step before the first cycle that wears."""
@@ -187,10 +195,7 @@ class WearPath(GivenPath):
         if self._last is None:
             zero = np.zeros(self.window.lattice.shape)
             unworn = _Cycle(self.window.lattice, state, zero, zero, zero, 0.0, zero)
-            cycle = self._solved(unworn, 0.0, zero)
-            if not cycle.energy.any():
-                label = self._wear.cycle
-                raise DeckError(f'wear.cycle = "{label}": no node slips in this cycle, so that nothing wears')
+            cycle = self._closed(unworn)
             self._begin_size(cycle)
             yield self._recorded(cycle, state)
         else:
@@ -261,6 +266,32 @@ class WearPath(GivenPath):
 
     # --- cycles -------------------------------------------------------------------------------------------
 
+    def _closed(self, start: _Cycle) -> _Cycle:
+        """Return the unworn cycle, repeated until its wear is known to the tolerance."""
+        energies, tolerance = list[Array](), self._wear.tolerance
+        # residuals are those of the load history: larger ones would decide whether it is closed
+        usual, self._tolerance = self._tolerance, self.case.solver.tolerance
+        for self._unworn in range(1, MOST_UNWORN + 1):
+            cycle = self._solved(start, 0.0, np.zeros(start.lattice.shape))
+            if not cycle.energy.any():
+                label = self._wear.cycle
+                raise DeckError(f'wear.cycle = "{label}": no node slips in this cycle, so that nothing wears')
+            energies = [np.asarray(start.lattice.embed(each, cycle.lattice, 0.0)) for each in energies[-2:]]
+            energies.append(cycle.energy)
+            begun, window = start.on(self.window).state, self.window
+            self._left = wear_left(window.friction, energies, begun, cycle.state)
+            sums = {name: cycle.about[name] + start.about.get(name, 0) for name in _SUMMED}
+            start = dataclasses.replace(cycle, about=cycle.about | sums)
+            if self._left <= tolerance:
+                break
+        else:
+            found = {"unworn_cycles": self._unworn, "unworn_cycle_change": self._left}
+            words = unclosed_cycle(found, tolerance)
+            self.window.listener.said("unclosed", level=logging.WARNING, warning=words)
+            warnings.warn(words, PathWarning, stacklevel=2)
+        self._tolerance = usual
+        return start
+
     def _solved(self, cycle: _Cycle, until: float, worn_by: Array) -> _Cycle:
         """Wear the surfaces by an energy a cycle until some cycles are done, and solve the cycle then."""
         cycle, jump = cycle.on(self.window), until - cycle.cycles
@@ -270,6 +301,7 @@ class WearPath(GivenPath):
         slipped = cycle.state.accumulated_slip + jump * cycle.path
         density = cycle.state.dissipation_density + jump * worn_by
         spent = cycle.state.dissipated_energy + jump * window.lattice.cell_area * float(worn_by.sum())
+        missed = cycle.state.dissipated_energy_path_error
         state = self._unspent(cycle.state)
         *_, last = self.case.load_steps
         # the loads at the end of the cycle on the new gap; what slips is no part of the cycle
@@ -280,7 +312,12 @@ class WearPath(GivenPath):
         sums: dict[str, Any] = dict(zip(("accumulated_slip", "dissipation_density"), spread, strict=True))
         return _Cycle(
             self.window.lattice,
-            dataclasses.replace(state, **sums, dissipated_energy=spent),
+            dataclasses.replace(
+                state,
+                **sums,
+                dissipated_energy=spent,
+                dissipated_energy_path_error=missed + jump * state.dissipated_energy_path_error,
+            ),
             np.asarray(self.window.worn),
             energy,
             path,
@@ -309,7 +346,7 @@ class WearPath(GivenPath):
             if self._ends.lattice != self.window.lattice:
                 self._ends = _Ends(self.window.lattice, 1 + len(self.case.cycle))
             self._ends.found(place, cycles, state)
-            for name in ("sweeps", "cuts", "operator_applications"):
+            for name in _SUMMED:
                 about[name] = about.get(name, 0) + getattr(state, name)
             for name in RESIDUALS.values():
                 about[name] = max(about.get(name, 0.0), getattr(state, name))
@@ -320,7 +357,11 @@ class WearPath(GivenPath):
         """Return a state from which slip and dissipated energy count anew."""
         zero = np.zeros(state.pressure.shape)
         return dataclasses.replace(
-            state, accumulated_slip=zero, dissipation_density=zero, dissipated_energy=0.0
+            state,
+            accumulated_slip=zero,
+            dissipation_density=zero,
+            dissipated_energy=0.0,
+            dissipated_energy_path_error=0.0,
         )
 
     # --- records ------------------------------------------------------------------------------------------
@@ -337,7 +378,9 @@ class WearPath(GivenPath):
             "wear_cycles": cycle.cycles,
             "wear_volume": volume,
             "max_worn_depth": deepest,
-            "worn_depth_step_error": float(abs(cycle.change).max()),
+            "worn_depth_step_error": float(abs(cycle.change).max()) + self._left * deepest,
+            "unworn_cycles": self._unworn,
+            "unworn_cycle_change": self._left,
             "seconds": time.perf_counter() - self._started,
             "cycle_dissipated_energy": cycle.spent,
         }
@@ -374,6 +417,8 @@ class WearPath(GivenPath):
         """Return the last cycle of a run that goes on."""
         self._size = StepControl.from_record(step.control["chooser"], _LEAST)
         self._ends = _Ends.from_record(step, 1 + len(self.case.cycle))
+        self._unworn = int(step.history["unworn_cycles"])
+        self._left = float(step.history["unworn_cycle_change"])
         fields = {name: np.array(step.fields[name]) for name in WORN}
         return _Cycle(
             step.lattice,

@@ -13,7 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deck.tables import BULK_STATES
-from ..variables import FIELDS, INTERFACE, LARGEST, NOT_KEPT, RESIDUALS, VARIABLES, names_where
+from ..variables import (
+    FIELDS,
+    FIXED,
+    INTERFACE,
+    LARGEST,
+    NOT_KEPT,
+    RESIDUALS,
+    SHEAR_LIMIT,
+    VARIABLES,
+    names_where,
+)
 from .layout import Metadata, history_of, lattice_of
 from .step import Step
 
@@ -82,7 +92,7 @@ _LATER = {
     INTERFACE[0]: _is_positive,
     INTERFACE[2]: lambda value: _is_number(value) and 0 <= value < math.inf,  # 0: no springs
     INTERFACE[1]: lambda value: _is_number(value) and 1 <= value < math.inf,
-    "cycle_tolerance": _is_positive,
+    **dict.fromkeys((SHEAR_LIMIT, "cycle_tolerance"), _is_positive),
     "entry": _one_of("implicit", "interpolated"),
     "bulk_state": _one_of(*BULK_STATES),
     **dict.fromkeys(("friction_law", "machine", "stopped"), _is_text),
@@ -310,7 +320,7 @@ def _fault_of_control(step: Step) -> str:
 
 def _fault_of_step(step: Step) -> str:
     for name, values in step.fields.items():
-        if name not in FIELDS and name != "initial_gap":
+        if name not in FIELDS and name not in FIXED:
             return f"{name} is no field"
         if values.shape != step.lattice.shape:
             return f"{name} has the shape {values.shape}, not {step.lattice.shape}"

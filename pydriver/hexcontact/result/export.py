@@ -18,7 +18,7 @@ from ..files import replacing
 from ..interior.stress import TENSOR
 from ..interior.tables import as_volume, computed, tables_of
 from ..text import escaped, visible
-from ..variables import CONVENTIONS, FIELDS, VARIABLES, VECTORS
+from ..variables import CONVENTIONS, FIELDS, FIXED, VARIABLES, VECTORS
 from . import mesh
 from .interpolate import is_kept, with_shown
 from .result import Result
@@ -232,8 +232,9 @@ def _vtk(kind: str, result: Result, number: int, grid: str) -> str:
 def _point_data(result: Result, number: int, source: str | None) -> Iterator[tuple[str, NDArray[Any], str]]:
     """Yield name, nodal values and unit of the fields of a step, with components joined to vectors."""
     fields = dict(_fields(result, number, source))
-    if "initial_gap" in result.dataset:
-        yield "initial_gap", result.dataset["initial_gap"].values.ravel(), "m"
+    for name in FIXED:
+        if name in result.dataset:
+            yield name, result.dataset[name].values.ravel(), VARIABLES[name].unit
     for vector, parts in VECTORS.items():
         if all(part in fields for part in parts):
             columns = [fields.pop(part).ravel() for part in parts]
@@ -303,7 +304,7 @@ def to_ugrid(
         mesh.add_column(file, "step", "i4", ("step",), VARIABLES["step"].attributes, steps)
         mesh.write_mesh(file, result.lattice)
         on_nodes = {"mesh": mesh.TOPOLOGY, "location": "node", "coordinates": "mesh_node_x mesh_node_y"}
-        names = [name for name in ("initial_gap", *FIELDS) if name in result.dataset]
+        names = [name for name in (*FIXED, *FIELDS) if name in result.dataset]
         columns = {}
         for name in names:
             variable = VARIABLES[name]
@@ -311,7 +312,7 @@ def to_ugrid(
             packed = {"zlib": True, "complevel": 1, "fill_value": fill}
             dims, attributes = (*variable.dims[:-2], mesh.NODE), variable.attributes | on_nodes
             column = mesh.add_column(file, name, variable.dtype, dims, attributes, **packed)
-            if name == "initial_gap":
+            if name in FIXED:
                 column[...] = result.dataset[name].values.ravel()
             else:
                 columns[name] = column

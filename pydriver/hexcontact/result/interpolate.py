@@ -8,7 +8,6 @@ and stick, which lie between the nodes, unless the source "nodes" is asked for.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
@@ -21,11 +20,9 @@ from ..core.edges import ContactEdges, Limits, TractionField
 from ..core.interpolation import crossings, linear, nearest, section_ends
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
-from ..deck.interface import shear_limits
-from ..deck.tables import Deck
 from ..errors import DeckError
 from ..text import did_you_mean
-from ..variables import EDGES, NOT_KEPT, TRACTIONS, VARIABLES
+from ..variables import EDGES, NODAL_FRICTION, NOT_KEPT, SHEAR_LIMIT, TRACTIONS, VARIABLES
 
 if TYPE_CHECKING:
     import xarray
@@ -127,10 +124,11 @@ def tractions_of(step: xarray.Dataset, lattice: Lattice, source: str | None = No
         if name not in fields or not is_kept(fields[name]):
             at = int(step["step"])
             raise DeckError(f"the {name} of step {at} was not kept (output.fields, output.every)")
-    from ..analytic.hertz_gap import is_compliant
+    from ..analytic.hertz_gap import friction_of, is_compliant
 
-    limits = limits_of(step.attrs, lattice) if "traction_x" in fields else None
-    return traction_field(lattice, fields, limits, source, not is_compliant(step.attrs))
+    known = step.attrs
+    limits = limits_of(friction_of(known), step, float(known.get(SHEAR_LIMIT, math.inf)))
+    return traction_field(lattice, fields, limits, source, not is_compliant(known))
 
 
 def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None) -> xarray.Dataset:
@@ -142,18 +140,16 @@ def with_shown(step: xarray.Dataset, lattice: Lattice, source: str | None = None
     return step.assign({name: step[name].copy(data=found[name]) for name in names})
 
 
-def limits_of(attributes: Mapping[Any, Any], lattice: Lattice) -> Limits | None:
-    """Return coefficient of friction and bound (Pa) at the nodes of a result; None if they are unknown."""
-    from ..analytic.hertz_gap import friction_of
+def limits_of(friction: float, fields: Mapping[Any, ArrayLike], bound: float) -> Limits | None:
+    """Return coefficient of friction at the nodes and bound (Pa) of the shear traction; None if unknown.
 
-    mu = friction_of(attributes)
-    if not math.isnan(mu):
-        return (mu, math.inf) if 0.0 < mu < math.inf else None
-    try:
-        friction = Deck.checked(tomllib.loads(str(attributes.get("deck", ""))))[0].get("friction")
-    except ValueError:
+    The coefficient is one number, or NaN if it is among the fields of a step: it varies, or has a bound.
+    """
+    if not math.isnan(friction):
+        return (friction, bound) if 0.0 < friction < math.inf else None
+    if NODAL_FRICTION not in fields:  # of another law
         return None
-    return shear_limits(friction, lattice.x, lattice.y) if friction else None
+    return np.nan_to_num(np.asarray(fields[NODAL_FRICTION])), bound  # NaN where no step had a node
 
 
 class PressureField:

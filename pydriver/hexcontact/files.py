@@ -35,6 +35,8 @@ def text_of(path: str | Path, expected: str) -> str:
         If there is no such file, it is a folder or a device, too large, or not UTF-8.
     """
     fault = ""
+    if "\0" in str(path):
+        raise DeckError(f"{path}: cannot be read (embedded null byte); expected {expected}")
     try:
         with open(path, "rb", opener=_opened) as file:
             if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -52,8 +54,8 @@ def text_of(path: str | Path, expected: str) -> str:
         fault = f"is not UTF-8 text (byte {error.start})"
         if content.startswith(_HDF5):
             fault = "is a netCDF file, such as a result; hexcontact info shows it"
-    except (OSError, ValueError) as error:
-        fault = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+    except OSError as error:
+        fault = f"cannot be read ({error.strerror or error})"
     raise DeckError(f"{path}: {fault}; expected {expected}")
 
 

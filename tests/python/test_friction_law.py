@@ -117,7 +117,7 @@ MAP = xarray.DataArray(mu_of(GRID)[:, None] + 0 * GRID, coords={"x": GRID, "y": 
     ids=["formula", "function", "map", "limited_formula", "limited"],
 )
 def test_a_step_and_its_result_show_the_same_tractions(coefficient, limit, tmp_path):
-    """The law is evaluated once, at the nodes; between them a run, its file and its result agree to the bit."""
+    """The law is evaluated once, at the nodes; between them run, file and result agree to the bit."""
     file, steps = tmp_path / "sheared.nc", []
     loads = [{"normal_load": 100.0}, {"tangential_load_x": 15.0, "steps": 2}]
     problem = case(coefficient, shear_limit=limit, loads=loads)

@@ -160,13 +160,21 @@ def _files_of_groups(cgroups: Path, groups: bytes) -> list[tuple[str, str, str, 
 
 def _left_in_group(limit: str, usage: str, statistics: str, cache: bytes) -> int | None:
     """Return limit less usage, without the file cache, which the kernel frees on demand."""
+    allowed = _number_in(limit)
+    if allowed is None or allowed > _NO_LIMIT:  # "max" is no limit, nor is what no machine has
+        return None
     try:
-        allowed = int(_read(limit))  # "max" is no limit, nor is what no machine has
-        if allowed > _NO_LIMIT:
-            return None
-        used, known = int(_read(usage)), _read(statistics).split()
-        freed = dict(zip(known[::2], known[1::2], strict=True)).get(cache, 0)
-        return max(0, allowed - used + int(freed))
+        used, known = _number_in(usage), _read(statistics).split()
+    except OSError:
+        return None
+    freed = dict(zip(known[::2], known[1::2], strict=False)).get(cache, 0)
+    return None if used is None else max(0, allowed - used + int(freed))
+
+
+def _number_in(path: str | Path) -> int | None:
+    """Return the number in a file of the kernel; None if there is none."""
+    try:
+        return int(_read(path))
     except (OSError, ValueError):
         return None
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deck.below import Fatigue
-from ..errors import DeckError
+from ..errors import DeckError, NoSuchStep
 from ..files import replacing
 from ..interior.stress import TENSOR
 from ..interior.tables import as_volume, computed, tables_of
@@ -49,7 +49,7 @@ def kept_steps(result: Result, numbers: Sequence[int] | None = None) -> list[int
     if numbers is not None:
         try:
             wanted = [int(result.step(number)["step"]) for number in numbers]
-        except IndexError as error:
+        except NoSuchStep as error:
             raise DeckError(f"--step: {error}") from error
     kept = [number for number in wanted if any(is_kept(field) for _, field in _fields(result, number))]
     if not kept or (numbers is not None and len(kept) < len(wanted)):

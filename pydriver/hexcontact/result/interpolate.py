@@ -20,7 +20,7 @@ from ..core.edges import ContactEdges, Limits, TractionField
 from ..core.interpolation import crossings, linear, nearest, section_ends
 from ..core.lattice import Lattice
 from ..deck.below import SOURCES
-from ..errors import DeckError
+from ..errors import DeckError, NotInResult
 from ..text import did_you_mean
 from ..variables import EDGES, NODAL_FRICTION, NOT_KEPT, SHEAR_LIMIT, TRACTIONS, VARIABLES
 
@@ -99,13 +99,13 @@ def traction_field(
     zero = np.zeros(lattice.shape)
     kept = {name: np.asarray(values) for name, values in fields.items() if is_kept(np.asarray(values))}
     if "pressure" not in kept:
-        raise DeckError("the pressure was not kept (output.fields, output.every)")
+        raise NotInResult("the pressure was not kept (output.fields, output.every)")
     tractions = np.array([kept.get(name, zero) for name in TRACTIONS], dtype=float)
     if source == "nodes" or (source is None and not (sharp and "gap" in kept)):
         return TractionField.of_nodes(tractions, lattice.basis, lattice.start)
     if not sharp or "gap" not in kept:
         why = "there are none with a compliant interface" if not sharp else "the gap was not kept"
-        raise DeckError(f"source = 'edges': expected nodes; the edges need the gap, and {why}")
+        raise NotInResult(f"source = 'edges': expected nodes; the edges need the gap, and {why}")
     zone = kept.get("zone")
     contact = tractions[0] > 0.0 if zone is None else zone > 0
     sheared = zone is not None and all(name in kept for name in TRACTIONS)
@@ -123,7 +123,7 @@ def tractions_of(step: xarray.Dataset, lattice: Lattice, source: str | None = No
     for name in ("pressure", "gap") if source == "edges" else ("pressure",):
         if name not in fields or not is_kept(fields[name]):
             at = int(step["step"])
-            raise DeckError(f"the {name} of step {at} was not kept (output.fields, output.every)")
+            raise NotInResult(f"the {name} of step {at} was not kept (output.fields, output.every)")
     from ..analytic.hertz_gap import friction_of, is_compliant
 
     known = step.attrs
@@ -276,16 +276,17 @@ def chosen_fields(names: Sequence[str], fields: Fields, step: int) -> dict[str, 
     for name in names:
         if name not in fields:
             known = name in VARIABLES and VARIABLES[name].is_field
-            what = "was not kept (output.fields)" if known else "is no field"
             hint = did_you_mean(name, fields) or f"; there are {', '.join(fields)}"
-            raise DeckError(f"{name} {what}{hint}")
+            if known:
+                raise NotInResult(f"{name} was not kept (output.fields){hint}")
+            raise DeckError(f"{name} is no field{hint}")
     found = {name: np.asarray(fields[name]) for name in names or fields}
     kept = {name: values for name, values in found.items() if is_kept(values)}
     for name in names:
         if name not in kept:
-            raise DeckError(f"{name} of step {step} was not kept (output.every)")
+            raise NotInResult(f"{name} of step {step} was not kept (output.every)")
     if not names and not any(VARIABLES[name].is_field for name in kept):
-        raise DeckError(f"no field of step {step} was kept (output.fields, output.every)")
+        raise NotInResult(f"no field of step {step} was kept (output.fields, output.every)")
     return kept
 
 

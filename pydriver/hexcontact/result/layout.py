@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..core.lattice import Lattice
+from ..errors import NoSuchStep
 from ..text import did_you_mean, html_table, text_table
 from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
 from .step import Step
@@ -279,7 +280,7 @@ def step_of(dataset: xarray.Dataset, number: int) -> xarray.Dataset:
         return dataset.isel(step=number)
     if number in numbers:
         return dataset.sel(step=number)
-    raise IndexError(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
+    raise NoSuchStep(f"there is no step {number}; the result has steps {numbers[0]} to {numbers[-1]}")
 
 
 def history_of(dataset: xarray.Dataset) -> list[str]:

@@ -140,13 +140,18 @@ def _is_running(holder: dict[str, Any] | None) -> bool:
     """Test whether the process that wrote the lock runs on this machine, not a later one of its number."""
     import psutil
 
-    if not holder or holder.get("host") != os.uname().nodename:
+    number = holder.get("process") if holder else None
+    if not holder or holder.get("host") != os.uname().nodename or type(number) is not int or number < 1:
         return False
     try:
-        began = psutil.Process(int(holder.get("process", -1))).create_time()
-    except (psutil.NoSuchProcess, ValueError, TypeError):
+        os.kill(number, 0)
+    except (ProcessLookupError, OverflowError):
         return False
-    except psutil.Error:
+    except PermissionError:  # of another user
+        pass
+    try:
+        began = psutil.Process(number).create_time()
+    except (psutil.Error, OSError):  # as without /proc
         return True
     return bool(began < float(holder.get("time", math.inf)) + _CLOCKS)
 

@@ -57,6 +57,14 @@ def test_another_layout_is_refused_with_its_number(out: Path) -> None:
         open_result(out)
 
 
+@pytest.mark.parametrize("place", ["journal.fault_of_record", "netcdf.fault_of_result", "journal.made"])
+def test_a_defect_of_the_reader_is_no_damage(out: Path, place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(out, count=3 if "netcdf" in place else 2)
+    monkeypatch.setattr(f"hexcontact.result.{place}", None)
+    with pytest.raises(TypeError, match="'NoneType' object is not callable"):
+        open_result(out)
+
+
 def test_a_truncated_file_is_damaged_not_a_crash(out: Path) -> None:
     written(out)
     whole = out.read_bytes()

@@ -211,7 +211,7 @@ def _bounds(name: str, history: Mapping[str, Any], window: float) -> tuple[Any, 
 
 
 def fault_of_fields(dataset: xarray.Dataset) -> str:
-    """Return a fault of a result without a seal, whose fields are read step by step; empty if there is none."""
+    """Return a fault of a result without a seal, whose fields are read step by step; else nothing."""
     try:
         tomllib.loads(str(dataset.attrs["deck"]))
     except tomllib.TOMLDecodeError as error:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..core.lattice import Lattice
 from ..errors import NoSuchStep
+from ..files import made, require_kinds
 from ..text import did_you_mean, html_table, text_table
 from ..variables import CONVENTIONS, FIELDS, FIXED, SCHEMA_VERSION, VARIABLES, Variable
 from .step import Step
@@ -102,8 +103,9 @@ class Metadata:
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> Metadata:
         """Return the metadata of what `dataclasses.asdict` gave, after JSON."""
+        require_kinds(values, fields=list, resumed=list)
         tuples = {name: tuple(values[name]) for name in ("fields", "resumed")}
-        return cls(**{**values, **tuples})
+        return made(cls, {**values, **tuples})
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> Metadata:

@@ -234,6 +234,11 @@ def require_free(stresses: Iterable[Path], overwrite: bool) -> None:
             )
 
 
+def is_mesh(path: Path) -> bool:
+    """Test whether a file has the fields of a result on a mesh, as `hexcontact.result.export` writes it."""
+    return {"content", "hexcontact_version"} <= _names_of_attributes(path)
+
+
 def stress_files(deck: str, output: Path) -> Iterable[Path]:
     """Return the files beside an output that hold the tables [[stress]] and [[fatigue]] of its deck."""
     if not any(name in deck for name in _BELOW):

@@ -104,6 +104,14 @@ def holder_of(text: bytes) -> dict[str, Any] | None:
     return {} if text.startswith(b'{"process": ') and len(text) <= _LONGEST else None
 
 
+def begun(path: Path) -> float | None:
+    """Return when the run that left a lock began (s since 1970), inf if it died at once; None without one."""
+    if not names_a_run(path):
+        return None
+    began = (holder_of(path.read_bytes()) or {}).get("time")
+    return float(began) if isinstance(began, int | float) else math.inf
+
+
 def names_a_run(path: Path) -> bool:
     """Test whether a run has written this lock, or created it: it is blank for a moment."""
     with contextlib.suppress(OSError):

@@ -149,7 +149,7 @@ class Journal:
 
     def remove(self) -> None:
         """Delete all `files`, but not the lock."""
-        for path in self.records:
+        for path in reversed(self.records):  # what is left if it is killed is the beginning of a run
             path.unlink(missing_ok=True)
         self.tidy()
 

@@ -366,7 +366,9 @@ class Problem:
         if self.adaptive:
             sentence = 'expected steps as numbers with it, not "auto": all lattices need the same load steps'
             return [Mistake(("accuracy", "target"), wanted.target, sentence)]
-        third = self.on_lattice(self.lattice.spacing / 2, self.lattice.origin).lattice.size
+        from .refinement import LEAST_LEVELS, Trial
+
+        third = Trial(LEAST_LEVELS - 1).case(self).lattice.size
         if third <= wanted.max_nodes:
             return []
         sentence = (

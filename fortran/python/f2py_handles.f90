@@ -2,7 +2,8 @@
 !>
 !> A handle is a slot number with a generation count, so that a stale handle is
 !> an error and never another object. A handle in use by one thread is refused
-!> in another. States of contacts have handles of the same kind. The cache of spectra is here, too. No other module has state; this one is not part of the Fortran library.
+!> in another. States of contacts have handles of the same kind. The cache of spectra is here, too.
+!> No other module has state; this one is not part of the Fortran library.
 module hc_f2py_handles
   use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
